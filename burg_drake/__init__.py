@@ -1,0 +1,31 @@
+"""Reproducible robot-grasping scenes and reachability-aware grasp evaluation on Drake.
+
+The names below are the public entry points; each is imported from its room on first use, so that
+importing the package stays instantaneous.
+"""
+
+from __future__ import annotations
+
+from burg_drake.core.lazy import attach
+
+__version__ = "0.1.0"
+
+__all__, __getattr__, __dir__ = attach(
+    __name__,
+    {
+        "burg_drake.core.errors": ["BurgError"],
+        "burg_drake.core.grasps": ["GraspSet"],
+        "burg_drake.core.outcome": ["Outcome", "Stage"],
+        "burg_drake.evaluation.cascade": ["evaluate"],
+        "burg_drake.grasping.antipodal": ["sample_antipodal"],
+        "burg_drake.motion.reach": ["ArmReach"],
+        "burg_drake.objects.build": ["build_library"],
+        "burg_drake.objects.library": ["load_library"],
+        "burg_drake.scene.scene": ["load_scene"],
+        "burg_drake.scene.validate": ["validate_scene"],
+        "burg_drake.simulation.hand_trial": ["HandTrial"],
+        "burg_drake.station.diagram": ["build_station_diagram"],
+        "burg_drake.station.engine": ["ENGINES", "Engine"],
+        "burg_drake.station.station": ["load_station"],
+    },
+)

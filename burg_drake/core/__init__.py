@@ -1,0 +1,1 @@
+"""Ground floor: errors, frames, documents and grasp sets. Nothing here imports pydrake."""

@@ -1,0 +1,52 @@
+"""The error tree: everything that a user can cause derives from `BurgError`.
+
+A grasp that slips and a pose out of reach are outcomes, not errors; see `core.outcome`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class BurgError(Exception):
+    """Base of all errors that burg_drake raises on purpose; the message is one clear line."""
+
+
+class InvalidInputError(BurgError, ValueError):
+    """A value from outside (argument, document, mesh) that cannot be used."""
+
+
+class DocumentError(InvalidInputError):
+    """A YAML document that does not fit its schema; the message names file, line and key."""
+
+
+class MeshError(InvalidInputError):
+    """A mesh that cannot be made into a simulated object."""
+
+
+class UnknownNameError(BurgError, KeyError):
+    """A name that nothing goes by; the message lists what exists."""
+
+    def __str__(self) -> str:  # KeyError would print the repr of the message
+        return str(self.args[0]) if self.args else ""
+
+
+class MissingDependencyError(BurgError, ImportError):
+    """An optional package or system library is not installed; the message says how to get it."""
+
+
+class SimulationError(BurgError, RuntimeError):
+    """Drake could not step or evaluate a diagram that should have been sound."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Ends an error message about an unknown `name`: the nearest valid one and the full list.
+
+    Returns:
+        For example `did you mean 'mug'? Known: bowl, mug`.
+    """
+    names = sorted(known)
+    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return f"{hint}Known: {', '.join(names) if names else '(none)'}"

@@ -1,0 +1,60 @@
+"""Writing files whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
+
+
+def atomic_write(path: str | Path, content: str | bytes) -> None:
+    """Writes `content` beside `path` and renames it into place; parent folders are made.
+
+    Args:
+        path: file to write or replace.
+        content: text (stored as UTF-8) or bytes.
+
+    Raises:
+        InvalidInputError: the place cannot be written to.
+    """
+    path = Path(path)
+    data = content.encode() if isinstance(content, str) else content
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+    finally:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)
+
+
+def writable_folder(path: str | Path) -> Path:
+    """Makes `path` a folder that can be written to, before any work is spent on its contents.
+
+    Raises:
+        InvalidInputError: `path` is a file, or nothing can be written there.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write to folder {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+    return path

@@ -1,0 +1,176 @@
+"""Rigid transforms in batches, and the frames of a grasp.
+
+A pose `X_AB` is a 4x4 homogeneous matrix, the pose of frame B measured and expressed in frame A;
+a batch has shape (..., 4, 4). Composition is `X_AB @ X_BC`. Quaternions are ordered wxyz.
+
+The grasp frame G sits midway between the finger pads (the tool centre point); +z is the approach
+direction and +x the closing direction. Turning G by 180 degrees about its z axis swaps the
+fingers and is the same physical grasp.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core.errors import InvalidInputError
+
+Array = NDArray[np.float64]
+
+POSE_TOLERANCE = 1e-6
+"""Largest deviation from orthonormality that `check_pose` accepts."""
+
+
+def make_pose(R_AB: ArrayLike | None = None, p_AB: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """Poses from rotations and positions.
+
+    Args:
+        R_AB: (..., 3, 3) rotation matrices; identity if None.
+        p_AB: (..., 3) positions [m]; leading shapes broadcast.
+
+    Returns:
+        (..., 4, 4) poses.
+    """
+    rotation = np.eye(3) if R_AB is None else np.asarray(R_AB, dtype=float)
+    position = np.asarray(p_AB, dtype=float)
+    shape = np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1])
+    X_AB = np.zeros((*shape, 4, 4))
+    X_AB[..., :3, :3] = rotation
+    X_AB[..., :3, 3] = position
+    X_AB[..., 3, 3] = 1.0
+    return X_AB
+
+
+def inverse(X_AB: ArrayLike) -> Array:
+    """`X_BA` from `X_AB`, (..., 4, 4)."""
+    X = np.asarray(X_AB, dtype=float)
+    R_BA = np.swapaxes(X[..., :3, :3], -1, -2)
+    return make_pose(R_BA, -(R_BA @ X[..., :3, 3:])[..., 0])
+
+
+def transform_points(X_AB: ArrayLike, p_BQ: ArrayLike) -> Array:
+    """Points (..., N, 3) given in B, expressed in A, for poses `X_AB` (..., 4, 4)."""
+    X = np.asarray(X_AB, dtype=float)
+    return np.asarray(p_BQ, dtype=float) @ np.swapaxes(X[..., :3, :3], -1, -2) + X[..., None, :3, 3]
+
+
+def rotation_from_rpy(rpy: ArrayLike) -> Array:
+    """(..., 3) roll, pitch, yaw [rad] about fixed x, y, z axes -> (..., 3, 3) `Rz Ry Rx`."""
+    return _batch(rpy, 3, lambda v: Rotation.from_euler("xyz", v).as_matrix(), (3, 3))
+
+
+def rpy_from_rotation(R_AB: ArrayLike) -> Array:
+    """(..., 3, 3) -> (..., 3) roll, pitch, yaw [rad], pitch in [-pi/2, pi/2]."""
+    with warnings.catch_warnings():  # at gimbal lock yaw 0 is a valid choice, nothing to warn of
+        warnings.simplefilter("ignore", UserWarning)
+        return _batch_matrix(R_AB, lambda R: R.as_euler("xyz"), 3)
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """(..., 4) wxyz quaternions, normalised here -> (..., 3, 3)."""
+    return _batch(
+        quaternion,
+        4,
+        lambda v: Rotation.from_quat(v, scalar_first=True).as_matrix(),
+        (3, 3),
+    )
+
+
+def quaternion_from_rotation(R_AB: ArrayLike) -> Array:
+    """(..., 3, 3) -> (..., 4) wxyz unit quaternions with w >= 0."""
+    return _batch_matrix(R_AB, lambda R: R.as_quat(canonical=True, scalar_first=True), 4)
+
+
+def rotation_angle(R_AB: ArrayLike) -> Array:
+    """(..., 3, 3) -> (...,) angle of the rotation [rad], in [0, pi]."""
+    return _batch_matrix(R_AB, lambda R: R.magnitude()[:, None], 1)[..., 0]
+
+
+def rot_z(angle: float) -> Array:
+    """Rotation matrix (3, 3) by `angle` [rad] about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def check_pose(X_AB: ArrayLike, name: str) -> Array:
+    """Validates poses that come from outside.
+
+    Args:
+        X_AB: (..., 4, 4).
+        name: how the message calls it, such as `X_SO of 'mug'`.
+
+    Returns:
+        The poses as float array.
+
+    Raises:
+        InvalidInputError: wrong shape, not finite, not a right-handed rotation, or bad last row.
+    """
+    X = np.asarray(X_AB, dtype=float)
+    if X.shape[-2:] != (4, 4):
+        raise InvalidInputError(f"{name} has shape {X.shape}; expected (..., 4, 4)")
+    if not np.isfinite(X).all():
+        raise InvalidInputError(
+            f"{name} has NaN or infinite numbers; give finite metres and angles"
+        )
+    R = X[..., :3, :3]
+    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
+    if error > POSE_TOLERANCE or (np.linalg.det(R) < 0).any():
+        raise InvalidInputError(
+            f"{name} is not a rigid transform: its rotation part is off by {error:.2g}"
+            " from orthonormal or is a mirror image"
+        )
+    if np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(initial=0.0) > POSE_TOLERANCE:
+        raise InvalidInputError(f"{name} has a last row other than 0 0 0 1")
+    return X
+
+
+def swap_fingers(X_AG: ArrayLike) -> Array:
+    """The same grasps (..., 4, 4) with the fingers' places exchanged."""
+    return np.asarray(X_AG, dtype=float) @ make_pose(np.diag([-1.0, -1.0, 1.0]))
+
+
+def pregrasp(X_AG: ArrayLike, standoff: float) -> Array:
+    """Pregrasps `X_AP` (..., 4, 4): back along the approach axis by `standoff` [m]."""
+    return np.asarray(X_AG, dtype=float) @ make_pose(p_AB=(0.0, 0.0, -standoff))
+
+
+def grasp_from_axes(closing: ArrayLike, approach: ArrayLike, p_AG: ArrayLike) -> Array:
+    """Grasp poses from directions.
+
+    Args:
+        closing: (..., 3) closing directions, need not be unit length.
+        approach: (..., 3) approach directions of any length; the part along `closing` is removed.
+        p_AG: (..., 3) positions of the tool centre point [m].
+
+    Returns:
+        `X_AG` (..., 4, 4).
+
+    Raises:
+        InvalidInputError: closing and approach are parallel, or one of them is zero.
+    """
+    x = np.asarray(closing, dtype=float)
+    z = np.asarray(approach, dtype=float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+        z = z / np.linalg.norm(z, axis=-1, keepdims=True)
+        z = z - (z * x).sum(-1, keepdims=True) * x
+        length = np.linalg.norm(z, axis=-1, keepdims=True)
+        z = z / length
+    if not (length > 1e-9).all():
+        raise InvalidInputError("closing and approach directions must not be parallel or zero")
+    x, z = np.broadcast_arrays(x, z)
+    return make_pose(np.stack([x, np.cross(z, x), z], axis=-1), p_AG)
+
+
+def _batch(values: ArrayLike, size: int, convert, shape: tuple[int, ...]) -> Array:  # type: ignore[no-untyped-def]
+    v = np.asarray(values, dtype=float)
+    return np.asarray(convert(v.reshape(-1, size))).reshape(*v.shape[:-1], *shape)
+
+
+def _batch_matrix(R_AB: ArrayLike, convert, size: int) -> Array:  # type: ignore[no-untyped-def]
+    R = np.asarray(R_AB, dtype=float)
+    rotations = Rotation.from_matrix(R.reshape(-1, 3, 3))
+    return np.asarray(convert(rotations)).reshape(*R.shape[:-2], size)

@@ -1,0 +1,56 @@
+"""What can become of a grasp: the stages it passes and the one outcome that it ends with.
+
+Both enums are append-only: results files store their values.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Stage(StrEnum):
+    """Stages of the cascade in order. A grasp's stage is the one that decided its outcome."""
+
+    CLEAR = "clear"
+    REACHABLE = "reachable"
+    EXECUTED = "executed"
+
+
+class Outcome(StrEnum):
+    """Why a grasp ended. `LIFTED` alone is success."""
+
+    COLLISION_TARGET = "collision_target"
+    """The open hand overlaps the target at the grasp."""
+    COLLISION_TABLE = "collision_table"
+    """The open hand overlaps the table."""
+    COLLISION_CLUTTER = "collision_clutter"
+    """The open hand overlaps another object of the scene."""
+    COLLISION_BACKGROUND = "collision_background"
+    """The open hand overlaps a fixed body of the scene or station."""
+    NO_IK = "no_ik"
+    """No arm configuration puts the hand at the grasp and at the pregrasp."""
+    ARM_COLLISION = "arm_collision"
+    """Configurations exist, but in each found the arm collides."""
+    NO_CONTACT = "no_contact"
+    """The fingers closed and never touched the target."""
+    ONE_FINGER = "one_finger"
+    """The fingers stopped with only one of them on the target."""
+    CLOSED_EMPTY = "closed_empty"
+    """The target was touched, but escaped while the fingers closed."""
+    SLIPPED = "slipped"
+    """Both fingers held the target and lost it during the lift."""
+    DROPPED = "dropped"
+    """The target was lifted and lost while being held."""
+    LIFTED = "lifted"
+    """Both fingers still hold the target at the end."""
+    SIMULATION_FAILED = "simulation_failed"
+    """Drake could not step the trial; the reason is stored with the result."""
+
+    @property
+    def stage(self) -> Stage:
+        """The stage that decides this outcome."""
+        if self.value.startswith("collision_"):
+            return Stage.CLEAR
+        if self in (Outcome.NO_IK, Outcome.ARM_COLLISION):
+            return Stage.REACHABLE
+        return Stage.EXECUTED

@@ -1,0 +1,75 @@
+"""Finds the data that the package installs: `models/`, `scenes/` and `stations/`.
+
+A wheel carries them inside the package, a checkout beside it; both are found by the same
+references: `package://burg_drake/models/...` or a bare name such as `panda_tabletop`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+
+PACKAGE_URI = "package://burg_drake/"
+
+
+@cache
+def data_root() -> Path:
+    """Folder that holds `models/`, `scenes/` and `stations/`.
+
+    Raises:
+        InvalidInputError: the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for root in (package / "_data", package.parent):
+        if (root / "models").is_dir() and (root / "scenes").is_dir():
+            return root
+    raise InvalidInputError(
+        f"no models/ and scenes/ beside or inside {package}; reinstall burg_drake"
+    )
+
+
+def resolve(reference: str | Path, kind: str | None = None, base: Path | None = None) -> Path:
+    """Path of a document, model or library folder.
+
+    Args:
+        reference: `package://burg_drake/...`; or, with `kind`, the bare name of something that
+            the package installs; or a path, relative to `base` (or to the working directory).
+        kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or
+            `models` (bare names stand for a folder).
+        base: folder of the document that holds the reference.
+
+    Returns:
+        An existing path.
+
+    Raises:
+        UnknownNameError: nothing is there; the message lists the built-in names of this kind.
+    """
+    text = str(reference)
+    if text.startswith(PACKAGE_URI):
+        path = data_root() / text.removeprefix(PACKAGE_URI)
+        if not path.exists():
+            raise UnknownNameError(f"{text} does not exist in {data_root()}")
+        return path
+    if text.startswith("package://"):
+        raise UnknownNameError(f"{text}: only {PACKAGE_URI}... is known here")
+    path = Path(text).expanduser()
+    if kind is not None and path.name == text and not path.suffix:
+        builtin = data_root() / kind / (text if kind == "models" else f"{text}.yaml")
+        if builtin.exists():
+            return builtin
+    located = path if base is None else base / path
+    if located.exists():
+        return located.resolve()
+    where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
+    known = f"; {nearest(path.stem, builtin_names(kind))}" if kind else ""
+    raise UnknownNameError(f"{text} does not exist{where}{known}")
+
+
+def builtin_names(kind: str) -> list[str]:
+    """Bare names that `resolve` knows for a kind."""
+    folder = data_root() / kind
+    if kind == "models":
+        return sorted(p.name for p in folder.iterdir() if (p / "library.yaml").exists())
+    return sorted(p.stem for p in folder.glob("*.yaml"))

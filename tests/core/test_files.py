@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import atomic_write, writable_folder
+
+
+def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):
+    atomic_write(tmp_path / "a" / "b" / "text.yaml", "größe: 1\n")
+    atomic_write(str(tmp_path / "a" / "data.bin"), b"\x00\xff")
+    assert (tmp_path / "a" / "b" / "text.yaml").read_bytes() == "größe: 1\n".encode()
+    assert (tmp_path / "a" / "data.bin").read_bytes() == b"\x00\xff"
+
+
+@pytest.mark.parametrize("step", ["fsync", "chmod", "replace"])
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_failure_at_any_step_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch, step, error):
+    path = tmp_path / "results.csv"
+    path.write_text("old")
+
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(os, step, fail)
+    with pytest.raises((InvalidInputError, KeyboardInterrupt)) as caught:
+        atomic_write(path, "new and longer")
+    if isinstance(error, OSError):
+        assert str(caught.value) == (
+            f"cannot write {path}: No space left on device; choose a writable place"
+        )
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_permissions_are_those_of_an_ordinary_new_file(tmp_path: Path):
+    previous = os.umask(0o027)
+    try:
+        atomic_write(tmp_path / "written", "x")
+        (tmp_path / "plain").write_text("x")
+    finally:
+        os.umask(previous)
+    assert (tmp_path / "written").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_unwritable_places_are_named(tmp_path: Path):
+    file = tmp_path / "file"
+    file.write_text("in the way")
+    for write in (lambda: atomic_write(file / "x.csv", "x"), lambda: writable_folder(file / "run")):
+        with pytest.raises(InvalidInputError, match=r"^cannot write .*choose a writable place$"):
+            write()
+    with pytest.raises(InvalidInputError, match="cannot write to folder"):
+        writable_folder(file)
+    with pytest.raises(InvalidInputError, match="Is a directory"):
+        atomic_write(tmp_path, "x")
+    assert file.read_text() == "in the way"
+
+
+def test_writable_folder_is_made_and_left_empty(tmp_path: Path):
+    assert writable_folder(tmp_path / "runs" / "first") == tmp_path / "runs" / "first"
+    assert not list((tmp_path / "runs" / "first").iterdir())

@@ -1,0 +1,178 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import make_pose
+from burg_drake.core.grasps import GraspSet
+
+COLUMNS = ("X_OG", "width", "id", "object", "score")
+
+
+def poses(n: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return make_pose(Rotation.random(n, random_state=seed).as_matrix(), rng.normal(size=(n, 3)))
+
+
+def grasps(n: int = 20, seed: int = 0) -> GraspSet:
+    rng = np.random.default_rng(seed)
+    return GraspSet.create(
+        poses(n, seed),
+        object=rng.choice(["mug", "screwdriver", "größe"], n),
+        width=rng.uniform(0, 0.08, n),
+        score=np.where(rng.random(n) < 0.3, np.nan, rng.random(n)),
+        provenance={"sampler": "test", "opening": (0.0, 0.08), "state": {"inc": 2**127 + 1}},
+    )
+
+
+def assert_identical(a: GraspSet, b: GraspSet) -> None:
+    for name in COLUMNS:
+        one, two = getattr(a, name), getattr(b, name)
+        assert one.dtype == two.dtype
+        assert one.shape == two.shape
+        assert one.tobytes() == two.tobytes(), name
+    assert a.provenance == b.provenance
+
+
+def test_storage_restores_every_bit(tmp_path: Path):
+    extreme = grasps(3)
+    extreme.width[:] = [5e-324, np.nan, 0.1 + 0.2]
+    for i, original in enumerate((grasps(), extreme, grasps().select([]))):
+        original.save(tmp_path / f"{i}.npz")
+        assert_identical(GraspSet.load(tmp_path / f"{i}.npz"), original)
+
+
+def test_same_content_same_bytes_on_disk(tmp_path: Path):
+    for name in ("a.npz", "b.npz"):
+        grasps().save(tmp_path / name)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_identifiers_follow_from_object_pose_and_width_only():
+    X = poses(4)
+    reference = GraspSet.create(X, object="mug", width=0.03)
+    assert len(set(reference.id.tolist())) == 4
+    same = GraspSet.create(X[::-1], object=["mug"] * 4, width=[0.03] * 4, score=1.0)
+    np.testing.assert_array_equal(same.id[::-1], reference.id)
+    moved = X.copy()
+    moved[:, 0, 3] = np.nextafter(moved[:, 0, 3], 1e9)
+    for other in (
+        GraspSet.create(X, object="mugs", width=0.03),
+        GraspSet.create(X, object="mug", width=0.031),
+        GraspSet.create(X, object="mug"),
+        GraspSet.create(moved, object="mug", width=0.03),
+    ):
+        assert not set(other.id.tolist()) & set(reference.id.tolist())
+
+
+def test_negative_zeros_do_not_make_another_grasp():
+    X = np.eye(4)
+    minus = X.copy()
+    minus[0, 1] = minus[2, 3] = -0.0
+    one = GraspSet.create(X, object="mug", width=0.0)
+    assert one.id[0] == GraspSet.create(minus, object="mug", width=-0.0).id[0]
+
+
+def test_create_copies_and_fills():
+    X = poses(2)
+    made = GraspSet.create(X, object="mug")
+    X[:] = 0.0
+    assert made.X_OG[0, 3, 3] == 1.0
+    assert np.isnan(made.width).all() and np.isnan(made.score).all()
+    assert made.object.tolist() == ["mug", "mug"]
+    single = GraspSet.create(np.eye(4), object="mug", width=0.02)
+    assert len(single) == 1 and single.X_OG.shape == (1, 4, 4)
+    assert len(GraspSet.create(np.empty((0, 4, 4)), object="mug")) == 0
+
+
+def test_select_by_mask_index_slice_and_nothing():
+    whole = grasps(10)
+    mask = np.arange(10) % 3 == 1
+    for index in (mask, [1, 4, 7], slice(1, 8, 3)):
+        part = whole.select(index)
+        np.testing.assert_array_equal(part.id, whole.id[[1, 4, 7]])
+        np.testing.assert_array_equal(part.X_OG, whole.X_OG[[1, 4, 7]])
+        assert part.provenance == whole.provenance
+    assert whole.select(-1).id.tolist() == [whole.id[-1]]
+    assert len(whole.select([])) == len(whole.select(np.zeros(10, bool))) == 0
+
+
+def test_concatenate_undoes_select():
+    whole = grasps(10)
+    joined = GraspSet.concatenate(whole.select(slice(i, i + 4)) for i in range(0, 10, 4))
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
+    assert joined.provenance == {"parts": [whole.provenance] * 3}
+    with pytest.raises(InvalidInputError, match="at least one"):
+        GraspSet.concatenate([])
+
+
+def test_names_of_different_length_are_not_cut_when_joined():
+    joined = GraspSet.concatenate(
+        [GraspSet.create(np.eye(4), object=o) for o in ("mug", "screwdriver")]
+    )
+    assert joined.object.tolist() == ["mug", "screwdriver"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"X_OG": np.zeros((2, 3, 3))}, r"X_OG has shape \(2, 3, 3\)"),
+        ({"X_OG": np.full((2, 4, 4), np.nan)}, "NaN or infinite"),
+        ({"width": [0.1, 0.2, 0.3]}, r"width has shape \(3,\); expected \(2,\) or one value"),
+        ({"object": ["a"]}, r"object has shape \(1,\)"),
+        ({"score": np.zeros((2, 1))}, r"score has shape \(2, 1\)"),
+        ({"provenance": {"mesh": object()}}, "provenance has to consist of JSON values"),
+    ],
+)
+def test_create_refuses_what_does_not_fit(arguments, message):
+    with pytest.raises(InvalidInputError, match=message):
+        GraspSet.create(**{"X_OG": poses(2), "object": "mug", **arguments})
+
+
+def test_columns_of_unequal_length_are_refused():
+    g = grasps(3)
+    with pytest.raises(
+        InvalidInputError, match=r"GraspSet.score has shape \(2,\); expected \(3,\)"
+    ):
+        GraspSet(g.X_OG, g.width, g.id, g.object, g.score[:2])
+
+
+def test_files_that_are_no_grasp_set(tmp_path: Path):
+    def message(path: Path) -> str:
+        with pytest.raises(InvalidInputError) as caught:
+            GraspSet.load(path)
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    grasps().save(tmp_path / "good.npz")
+    good = (tmp_path / "good.npz").read_bytes()
+    strange = {
+        "empty": b"",
+        "text": b"x,y,z\n",
+        "cut": good[: len(good) // 2],
+        "damaged": good[:200] + bytes(64) + good[264:],
+    }
+    for name, data in strange.items():
+        (tmp_path / name).write_bytes(data)
+        assert message(tmp_path / name).startswith(
+            f"{tmp_path / name} is not a grasp set written by burg_drake: "
+        )
+    np.save(tmp_path / "burg.npy", poses(3))
+    np.savez(tmp_path / "other.npz", grasps=poses(3))
+    for name in ("burg.npy", "other.npz"):
+        assert "is not a grasp set" in message(tmp_path / name)
+    missing = tmp_path / "missing.npz"
+    assert message(missing) == f"cannot read {missing}: No such file or directory"
+
+
+def test_a_newer_version_is_named(tmp_path: Path):
+    header = {"format": "burg_drake.grasps", "version": 2, "provenance": {}}
+    np.savez(tmp_path / "new.npz", header=np.array(json.dumps(header)), poses=poses(2))
+    with pytest.raises(InvalidInputError, match=r"version 2; this release reads .* version 1$"):
+        GraspSet.load(tmp_path / "new.npz")
