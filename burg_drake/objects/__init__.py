@@ -1,0 +1,1 @@
+"""Meshes to sim-ready objects: repair, mass properties, convex pieces, SDF, stable poses."""

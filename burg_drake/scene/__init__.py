@@ -1,0 +1,1 @@
+"""Scene documents: which objects stand where on the board, and whether they can."""

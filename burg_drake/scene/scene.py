@@ -1,0 +1,167 @@
+"""The scene document: instances of library objects on the board, as readable YAML."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.frames import Array
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import Pose, dump_document, load_document, save_document
+from burg_drake.objects.library import ObjectEntry, ObjectLibrary, load_library
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instance:
+    """A placed object.
+
+    Attributes:
+        name: unique in the scene; the object's name if empty.
+        object: name in the library.
+        X_SO: pose of the object frame in the scene frame.
+    """
+
+    name: str = ""
+    object: str
+    X_SO: Pose = Pose()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Board:
+    """The printed board; the scene frame S has its origin in the board's corner.
+
+    Attributes:
+        size: extents along x and y [m]; A2 landscape by default.
+    """
+
+    size: tuple[float, float] = (0.594, 0.420)
+
+    def __post_init__(self) -> None:
+        if min(self.size) <= 0.0:
+            raise InvalidInputError(f"board size {list(self.size)} must be positive [m]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneDocument:
+    """Schema of a scene file.
+
+    Attributes:
+        name: the scene's name.
+        library: folder of the object library, relative to the scene file; or a built-in name.
+        board: the printed board.
+        instances: free objects.
+        background: fixed objects.
+    """
+
+    version: int = 1
+    name: str
+    description: str = ""
+    library: str
+    board: Board = Board()
+    instances: tuple[Instance, ...] = ()
+    background: tuple[Instance, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene with its library at hand.
+
+    Attributes:
+        document: contents of the scene file.
+        library: the library that the instances refer to.
+        path: the scene file.
+    """
+
+    document: SceneDocument
+    library: ObjectLibrary
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The scene's name."""
+        return self.document.name
+
+    @property
+    def board(self) -> Board:
+        """The printed board."""
+        return self.document.board
+
+    @cached_property
+    def instances(self) -> dict[str, Instance]:
+        """Free instances by name, in the document's order."""
+        return {i.name or i.object: i for i in self.document.instances}
+
+    @cached_property
+    def background(self) -> dict[str, Instance]:
+        """Fixed instances by name."""
+        return {i.name or i.object: i for i in self.document.background}
+
+    def instance(self, name: str) -> Instance:
+        """A free or fixed instance.
+
+        Raises:
+            UnknownNameError: no such instance.
+        """
+        known = {**self.background, **self.instances}
+        if name not in known:
+            raise UnknownNameError(f"scene {self.name!r} has no {name!r}; {nearest(name, known)}")
+        return known[name]
+
+    def entry(self, name: str) -> ObjectEntry:
+        """Library entry of an instance."""
+        return self.library.entry(self.instance(name).object)
+
+    def X_SO(self, name: str) -> Array:
+        """(4, 4) pose of an instance in the scene frame."""
+        return self.instance(name).X_SO.matrix()
+
+    @cached_property
+    def content(self) -> str:
+        """Hash of the placement and of every object in it; file locations do not count."""
+        objects = {i.object for i in (*self.instances.values(), *self.background.values())}
+        placed = SceneDocument(
+            name="",
+            library="",
+            board=self.board,
+            instances=self.document.instances,
+            background=self.document.background,
+        )
+        return content_hash(
+            dump_document(placed), {name: self.library.content[name] for name in objects}
+        )
+
+
+def load_scene(reference: str | Path) -> Scene:
+    """Loads a scene and its library.
+
+    Args:
+        reference: path of a scene file, or the bare name of a built-in scene.
+
+    Raises:
+        UnknownNameError: no such file or library, or an instance of an unknown object.
+        DocumentError: the file does not fit the schema, or two instances share a name.
+    """
+    path = resolve(reference, "scenes")
+    document = load_document(path, SceneDocument)
+    library = load_library(document.library, path.parent)
+    seen: set[str] = set()
+    for key, instances in (("instances", document.instances), ("background", document.background)):
+        for i, instance in enumerate(instances):
+            where = f"{path}: {key}[{i}]"
+            try:
+                library.entry(instance.object)
+            except UnknownNameError as error:
+                raise UnknownNameError(f"{where}: {error}") from error
+            name = instance.name or instance.object
+            if name in seen:
+                raise DocumentError(f"{where}: name {name!r} is used twice; give unique names")
+            seen.add(name)
+    return Scene(document, library, path)
+
+
+def save_scene(document: SceneDocument, path: str | Path) -> None:
+    """Writes a scene file; see `core.schema.save_document`."""
+    save_document(document, path)

@@ -1,0 +1,161 @@
+"""Whether a scene can be built as its document says: bounds of the board, contact with the ground.
+
+Only geometry is looked at here. Overlaps of bodies depend on the contact geometry that the station
+diagram holds; `station.check` finds those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, transform_points
+from burg_drake.scene.scene import Scene
+
+IN_BOUNDS_TOLERANCE = 1e-4
+"""How far an object may stick out over the board's edge [m]: rounding of documents."""
+TOUCH_TOLERANCE = 1e-3
+"""How deep an object may start in the ground or in another one [m]: it settles within a step."""
+HOVER_TOLERANCE = 5e-3
+"""How far an object may start above its support [m] before that is worth a word."""
+MILLIMETRES_SUSPECTED = 5.0
+"""A coordinate on a table of this size [m] or more was probably meant in millimetres."""
+
+IssueKind = Literal["out_of_bounds", "in_ground", "hovering", "overlap"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneIssue:
+    """Something about a scene that its author should know.
+
+    Attributes:
+        instance: name of the instance it is about.
+        kind: what is wrong. `hovering` is a warning, all else are errors.
+        amount: how far beyond, below, above or into something [m].
+        message: one clear line.
+    """
+
+    instance: str
+    kind: IssueKind
+    amount: float
+    message: str
+
+    @property
+    def is_error(self) -> bool:
+        """Grasps of this scene would be judged in a world other than the document's."""
+        return self.kind != "hovering"
+
+
+def validate_scene(scene: Scene) -> tuple[SceneIssue, ...]:
+    """Checks where the instances of a scene stand on the board.
+
+    Args:
+        scene: the scene; fixed background objects may stand anywhere.
+
+    Returns:
+        What was found, in the order of the document; nothing if all is well.
+    """
+    placed = {name: placed_vertices(scene, name) for name in (*scene.instances, *scene.background)}
+    issues: list[SceneIssue] = []
+    for name in scene.instances:
+        issue = _bounds_issue(scene, name, placed[name])
+        if issue is not None:
+            issues.append(issue)
+        others = [p for other, p in placed.items() if other != name]
+        issue = _ground_issue(name, placed[name], others)
+        if issue is not None:
+            issues.append(issue)
+    return tuple(issues)
+
+
+def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
+    """Refuses a scene with errors; warnings pass.
+
+    Raises:
+        InvalidInputError: one line with the first error and the number of further ones.
+    """
+    errors = [issue for issue in issues if issue.is_error]
+    if errors:
+        more = len(errors) - 1
+        rest = f" (and {more} more: burg-drake scene validate {scene.path})" if more else ""
+        raise InvalidInputError(f"{scene.path}: {errors[0].message}{rest}")
+
+
+def placed_vertices(scene: Scene, instance: str) -> Array:
+    """(N, 3) vertices of an instance's surface in the scene frame [m]."""
+    mesh = scene.library.path(scene.entry(instance).mesh)
+    return transform_points(scene.X_SO(instance), read_vertices(mesh))
+
+
+def read_vertices(mesh: Path) -> Array:
+    """(N, 3) vertices of an .obj file as a library holds it.
+
+    Raises:
+        InvalidInputError: the file has none.
+    """
+    rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
+    if not rows:
+        raise InvalidInputError(f"{mesh} has no vertices; build its library again")
+    return np.array(rows, dtype=float)
+
+
+def _bounds_issue(scene: Scene, name: str, p_SV: Array) -> SceneIssue | None:
+    size = np.array(scene.board.size)
+    lower, upper = p_SV[:, :2].min(axis=0), p_SV[:, :2].max(axis=0)
+    beyond = {
+        "left": -lower[0],
+        "right": upper[0] - size[0],
+        "lower": -lower[1],
+        "upper": upper[1] - size[1],
+    }
+    sides = sorted((s for s in beyond if beyond[s] > IN_BOUNDS_TOLERANCE), key=lambda s: -beyond[s])
+    if not sides:
+        return None
+    where = " and ".join(f"{_mm(beyond[s])} over the {s} edge" for s in sides)
+    board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
+    hint = ""
+    if np.abs(scene.X_SO(name)[:3, 3]).max() >= MILLIMETRES_SUSPECTED:
+        hint = "; translations are in metres"
+    return SceneIssue(
+        instance=name,
+        kind="out_of_bounds",
+        amount=float(beyond[sides[0]]),
+        message=f"{name!r} is out of bounds: {where} of the board ({board}){hint}",
+    )
+
+
+def _ground_issue(name: str, p_SV: Array, others: list[Array]) -> SceneIssue | None:
+    lowest = float(p_SV[:, 2].min())
+    if lowest < -TOUCH_TOLERANCE:
+        return SceneIssue(
+            instance=name,
+            kind="in_ground",
+            amount=-lowest,
+            message=f"{name!r} is in the ground: its lowest point is {_mm(-lowest)} below the board",
+        )
+    if lowest > HOVER_TOLERANCE and not any(_may_support(other, p_SV) for other in others):
+        return SceneIssue(
+            instance=name,
+            kind="hovering",
+            amount=lowest,
+            message=f"{name!r} hovers {_mm(lowest)} above the board; it will fall when simulated",
+        )
+    return None
+
+
+def _may_support(below: Array, above: Array) -> bool:
+    """Whether the bounding boxes let `above` rest on `below`; both (N, 3) points."""
+    overlap = (below.min(axis=0) < above.max(axis=0)) & (above.min(axis=0) < below.max(axis=0))
+    lowest = above[:, 2].min()
+    reach = below[:, 2].min() < lowest < below[:, 2].max() + HOVER_TOLERANCE
+    return bool(overlap[:2].all() and reach)
+
+
+def _mm(length: float) -> str:
+    """A length [m] for people."""
+    return f"{length * 1e3:.1f} mm" if length < 0.1 else f"{length:.3g} m"

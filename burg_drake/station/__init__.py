@@ -1,0 +1,1 @@
+"""Stations (robot, table, cameras) and the one place that builds Drake diagrams."""

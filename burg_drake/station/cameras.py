@@ -1,0 +1,67 @@
+"""The station's cameras as Drake sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+)
+from pydrake.math import RigidTransform
+from pydrake.planning import RobotDiagramBuilder
+from pydrake.systems.sensors import CameraInfo, RgbdSensor
+
+from burg_drake.core.errors import MissingDependencyError
+from burg_drake.station.station import Camera, Station
+from burg_drake.system_libraries import apt_command, missing_render_libraries
+
+RENDERER = "burg_drake"
+HALF_PIXEL = 0.5
+"""Drake puts pixel edges at integers, OpenCV pixel centres; intrinsics differ by half a pixel."""
+
+
+def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera]:
+    """Drake's render cameras of a station camera."""
+    (fx, fy), (cx, cy) = camera.focal, camera.principal_point
+    info = CameraInfo(camera.width, camera.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)
+    near, far = camera.depth_range
+    core = RenderCameraCore(RENDERER, info, ClippingRange(near / 2, far * 2), RigidTransform())
+    return ColorRenderCamera(core, False), DepthRenderCamera(core, DepthRange(near, far))
+
+
+def add_cameras(builder: RobotDiagramBuilder, station: Station) -> None:
+    """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
+
+    Raises:
+        MissingDependencyError: a system library of the renderer is missing (it would crash).
+    """
+    missing = missing_render_libraries()
+    if missing:
+        raise MissingDependencyError(
+            f"cameras need the system libraries {', '.join(missing)}; run: {apt_command()}"
+        )
+    scene_graph, system = builder.scene_graph(), builder.builder()
+    scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
+    for name, camera in station.document.cameras.items():
+        color, depth = render_cameras(camera)
+        sensor = system.AddSystem(
+            RgbdSensor(
+                scene_graph.world_frame_id(),
+                RigidTransform(np.array(camera.X_WC.matrix())),
+                color,
+                depth,
+            )
+        )
+        sensor.set_name(f"camera.{name}")
+        system.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+        for port, image in (
+            (sensor.color_image_output_port(), "color_image"),
+            (sensor.depth_image_32F_output_port(), "depth_image"),
+            (sensor.label_image_output_port(), "label_image"),
+        ):
+            system.ExportOutput(port, f"camera.{name}.{image}")

@@ -1,0 +1,81 @@
+"""The gripper document: a parallel hand as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, inverse
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import Pose, load_document
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finger:
+    """One finger of a parallel hand.
+
+    Attributes:
+        body: link of the finger in the hand's model.
+        joint: prismatic joint that moves it.
+        pad: name of the collision geometry that touches the object.
+        closed: joint position with the pads together [m].
+        open: joint position with the hand open [m].
+    """
+
+    body: str
+    joint: str
+    pad: str
+    closed: float
+    open: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hand:
+    """Schema of a hand document in `models/hands`.
+
+    Attributes:
+        name: the hand's name.
+        description: for people.
+        source: where the figures come from.
+        model: reference to the hand's model file.
+        body: link that the arm carries; its frame is H.
+        X_HG: grasp frame in H (midway between the pads; +z approach, +x closing).
+        opening: smallest and largest distance between the pads [m].
+        force: force of each finger on the object while gripping [N].
+        closing_speed: speed of each finger while closing [m/s].
+        fingers: the two fingers; the first one is on the side of +x of G.
+    """
+
+    version: int = 1
+    name: str
+    description: str = ""
+    source: str = ""
+    model: str
+    body: str
+    X_HG: Pose
+    opening: tuple[float, float]
+    force: float
+    closing_speed: float
+    fingers: tuple[Finger, Finger]
+
+    def __post_init__(self) -> None:
+        low, high = self.opening
+        if not 0.0 <= low < high:
+            raise InvalidInputError(f"opening {list(self.opening)} must rise from 0 or above [m]")
+        if self.force <= 0.0 or self.closing_speed <= 0.0:
+            raise InvalidInputError("force and closing_speed must be above 0")
+
+    def X_AH(self, X_AG: Array) -> Array:
+        """Hand body poses (..., 4, 4) that bring the grasp frame to `X_AG` (..., 4, 4)."""
+        return X_AG @ inverse(self.X_HG.matrix())
+
+
+def load_hand(reference: str, base: Path | None = None) -> Hand:
+    """Loads a hand document by path or built-in name such as `panda_hand`.
+
+    Raises:
+        UnknownNameError: no such hand.
+        DocumentError: the file does not fit the schema.
+    """
+    return load_document(resolve(reference, "models/hands", base), Hand)

@@ -1,0 +1,179 @@
+"""The station document: robot, table, board and cameras around a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import Pose, Vector3, dump_document, load_document
+from burg_drake.station.hand import Hand
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arm:
+    """An arm on its base.
+
+    Attributes:
+        model: reference to the arm's model file.
+        base: link that is welded to the world; its frame is A.
+        flange: frame that carries the hand.
+        X_FH: hand body in the flange frame.
+        X_WA: arm base in the world.
+        home: joint positions of the home posture [rad].
+    """
+
+    model: str = "package://burg_drake/models/panda/panda_arm.sdf"
+    base: str = "panda_link0"
+    flange: str = "panda_link8"
+    X_FH: Pose = Pose(rpy_deg=(0.0, 0.0, -45.0))
+    X_WA: Pose = Pose()
+    home: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A box whose top face lies in the plane z = 0 of the world.
+
+    Attributes:
+        center: x and y of the box's centre in the world [m].
+        size: extents along x, y, z [m].
+        friction: Coulomb coefficient of its surface.
+    """
+
+    center: tuple[float, float] = (0.0, 0.0)
+    size: Vector3 = (1.2, 1.6, 0.1)
+    friction: float = 0.5
+
+    def __post_init__(self) -> None:
+        if min(self.size) <= 0.0 or self.friction < 0.0:
+            raise InvalidInputError("table size must be positive and friction at least 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """A camera fixed in the world, with OpenCV's pinhole intrinsics (pixel centres at integers).
+
+    Attributes:
+        X_WC: optical frame in the world: z forward, x right, y down.
+        width, height: image size [pixels].
+        focal: fx, fy [pixels].
+        center: cx, cy [pixels]; the image centre if not given.
+        depth_range: nearest and farthest depth [m].
+    """
+
+    X_WC: Pose
+    width: int = 640
+    height: int = 480
+    focal: tuple[float, float] = (600.0, 600.0)
+    center: tuple[float, float] | None = None
+    depth_range: tuple[float, float] = (0.05, 5.0)
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.height, *self.focal) <= 0:
+            raise InvalidInputError("camera width, height and focal must be positive")
+        if not 0.0 < self.depth_range[0] < self.depth_range[1]:
+            raise InvalidInputError("camera depth_range must rise from above 0 [m]")
+
+    @property
+    def principal_point(self) -> tuple[float, float]:
+        """cx, cy [pixels]."""
+        return self.center or ((self.width - 1) / 2, (self.height - 1) / 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obstacle:
+    """A fixed box of the station.
+
+    Attributes:
+        X_WB: pose of the box's centre in the world.
+        size: extents [m].
+    """
+
+    X_WB: Pose
+    size: Vector3
+
+    def __post_init__(self) -> None:
+        if min(self.size) <= 0.0:
+            raise InvalidInputError(f"obstacle size {list(self.size)} must be positive [m]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StationDocument:
+    """Schema of a station file.
+
+    Attributes:
+        name: the station's name.
+        hand: hand document (built-in name or path).
+        arm: the arm; a station may do without.
+        X_WS: where the board lies: scene frame in the world.
+        table: the table top under the board.
+        cameras: by name.
+        background: fixed boxes by name.
+    """
+
+    version: int = 1
+    name: str
+    description: str = ""
+    hand: str = "panda_hand"
+    arm: Arm | None = None
+    X_WS: Pose = Pose()
+    table: Table = Table()
+    cameras: dict[str, Camera] = field(default_factory=dict)
+    background: dict[str, Obstacle] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """A station with its hand at hand.
+
+    Attributes:
+        document: contents of the station file.
+        hand: the hand that `document.hand` names.
+        hand_model: the hand's model file.
+        arm_model: the arm's model file, if there is an arm.
+        path: the station file.
+    """
+
+    document: StationDocument
+    hand: Hand
+    hand_model: Path
+    arm_model: Path | None
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The station's name."""
+        return self.document.name
+
+    @property
+    def content(self) -> str:
+        """Hash of the station, its hand document and the robot's model files; names and file
+        locations do not count."""
+        arm = self.document.arm and replace(self.document.arm, model="")
+        placed = replace(self.document, name="", description="", hand="", arm=arm)
+        models = [self.hand_model, *([self.arm_model] if self.arm_model else [])]
+        return content_hash(dump_document(placed), dump_document(self.hand), models)
+
+
+def load_station(reference: str | Path) -> Station:
+    """Loads a station and its hand.
+
+    Args:
+        reference: path of a station file, or the bare name of a built-in station.
+
+    Raises:
+        UnknownNameError: no such station, hand or model.
+        DocumentError: the file does not fit the schema.
+    """
+    path = resolve(reference, "stations")
+    document = load_document(path, StationDocument)
+    hand_path = resolve(document.hand, "models/hands", path.parent)
+    hand = load_document(hand_path, Hand)
+    hand_model = resolve(hand.model, base=hand_path.parent)
+    arm_model = None
+    if document.arm is not None:
+        arm_model = resolve(document.arm.model, base=path.parent)
+    return Station(document, hand, hand_model, arm_model, path)
