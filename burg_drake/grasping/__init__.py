@@ -1,0 +1,1 @@
+"""Grasp sampling and the screen of the open hand against the scene."""

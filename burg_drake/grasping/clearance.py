@@ -1,0 +1,104 @@
+"""The screen of the open hand against the scene, with the hand's real collision geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core.frames import Array
+from burg_drake.core.outcome import Outcome
+from burg_drake.station.diagram import StationDiagram
+from burg_drake.station.floating_hand import FloatingHand
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Verdict of the screen.
+
+    Attributes:
+        outcome: one of the `COLLISION_*` outcomes, or None if the hand is clear.
+        blocker: name of the instance, obstacle or `table` that is overlapped most.
+        overlap: depth of the deepest overlap [m]; 0 if clear.
+    """
+
+    outcome: Outcome | None
+    blocker: str = ""
+    overlap: float = 0.0
+
+
+class HandClearance:
+    """Checks grasps of one scene; objects stand where the scene document places them.
+
+    Args:
+        station_diagram: a diagram built with `robot="hand"`.
+    """
+
+    def __init__(self, station_diagram: StationDiagram) -> None:
+        self._hand = FloatingHand(station_diagram)
+        self._context = station_diagram.diagram.CreateDefaultContext()
+        self._plant_context = station_diagram.plant.GetMyMutableContextFromRoot(self._context)
+        self._query_port = station_diagram.scene_graph.get_query_output_port()
+        self._names = _names(station_diagram)
+        self._bodies = _filter_scene(station_diagram, self._context)
+        self._graph_context = station_diagram.scene_graph.GetMyContextFromRoot(self._context)
+        self._station_diagram = station_diagram
+
+    def check(self, instance: str, X_WG: Array) -> Clearance:
+        """Screens one grasp.
+
+        Args:
+            instance: the target's name in the scene.
+            X_WG: (4, 4) grasp in the world.
+
+        Returns:
+            The verdict; where several bodies are overlapped, the deepest overlap decides.
+        """
+        self._hand.place(self._plant_context, X_WG)
+        query = self._query_port.Eval(self._graph_context)
+        deepest, name = 0.0, ""
+        for pair in query.ComputePointPairPenetration():
+            other = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
+            if (pair.depth, other) > (deepest, name):
+                deepest, name = pair.depth, other
+        if not name:
+            return Clearance(None)
+        return Clearance(self._outcome(instance, name), name, deepest)
+
+    def _outcome(self, instance: str, blocker: str) -> Outcome:
+        if blocker == instance:
+            return Outcome.COLLISION_TARGET
+        if blocker == "table":
+            return Outcome.COLLISION_TABLE
+        if blocker in self._station_diagram.free:
+            return Outcome.COLLISION_CLUTTER
+        return Outcome.COLLISION_BACKGROUND
+
+
+def _names(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
+    """Names of all bodies that a hand can collide with."""
+    bodies = {**station_diagram.free, **station_diagram.fixed, "table": station_diagram.table}
+    return {index: name for name, index in bodies.items()}
+
+
+def _filter_scene(station_diagram: StationDiagram, context) -> dict:  # type: ignore[no-untyped-def, type-arg]
+    """Leaves only the pairs hand against scene in the context; returns geometry -> body."""
+    plant, scene_graph = station_diagram.plant, station_diagram.scene_graph
+    inspector = scene_graph.model_inspector()
+    bodies = {
+        geometry: plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)).index()
+        for geometry in inspector.GetAllGeometryIds()
+    }
+    robot = set(station_diagram.robot_bodies)
+    collision = [g for g in bodies if inspector.GetProximityProperties(g) is not None]
+    sides = (
+        GeometrySet([g for g in collision if bodies[g] in robot]),
+        GeometrySet([g for g in collision if bodies[g] not in robot]),
+    )
+    declaration = CollisionFilterDeclaration()
+    for side in sides:
+        declaration.ExcludeWithin(side)
+    graph_context = scene_graph.GetMyMutableContextFromRoot(context)
+    scene_graph.collision_filter_manager(graph_context).Apply(declaration)
+    return bodies

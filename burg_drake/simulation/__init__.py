@@ -1,0 +1,1 @@
+"""Executed grasp trials: phases, success criteria and margins."""

@@ -1,0 +1,48 @@
+"""What a trial returns: one typed outcome and continuous margins."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from burg_drake.core.outcome import Outcome
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """Continuous slack behind an outcome; NaN where the trial ended before it was defined.
+
+    Attributes:
+        overlap: how deep the open hand overlaps what it collides with [m]; 0 if clear.
+        slip: how far the target moved in the hand since the grip, at the grasp point [m].
+        tilt: how far the target turned in the hand since the grip [rad].
+        pad_force: normal force of the weaker pad [N], along the closing direction.
+        lift: how far the target's centre of mass rose [m].
+        others_moved: largest displacement of any other object [m].
+        end_time: simulated time at which the outcome was decided [s].
+    """
+
+    overlap: float = math.nan
+    slip: float = math.nan
+    tilt: float = math.nan
+    pad_force: float = math.nan
+    lift: float = math.nan
+    others_moved: float = math.nan
+    end_time: float = math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialResult:
+    """One executed trial.
+
+    Attributes:
+        outcome: why it ended.
+        margins: continuous slack.
+        blocker: what the hand collided with at the start, if anything.
+        reason: the simulator's message if it failed.
+    """
+
+    outcome: Outcome
+    margins: Margins
+    blocker: str = ""
+    reason: str = ""

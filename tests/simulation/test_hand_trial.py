@@ -1,0 +1,285 @@
+"""Trials judged by statics and symmetry, and outcomes whose truth is known by construction."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import swap_fingers
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import Pose
+from burg_drake.objects.build import build_library
+from burg_drake.objects.source import ObjectSource
+from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.simulation import hand_trial
+from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+from burg_drake.simulation.result import TrialResult
+from burg_drake.station.hand import load_hand
+from burg_drake.station.station import Obstacle, Station, StationDocument, Table
+
+BOX = (0.06, 0.09, 0.08)
+"""Size of the box [m]; only its x extent fits between the fingers."""
+BOX_MASS = 0.3
+GRAVITY = 9.81
+FORCE = 40.0
+
+
+def box_mesh(size: tuple[float, float, float]) -> trimesh.Trimesh:
+    """A box that stands on its origin."""
+    return trimesh.creation.box(
+        size, trimesh.transformations.translation_matrix((0, 0, size[2] / 2))
+    )
+
+
+@pytest.fixture(scope="session")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    sphere = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    sphere.apply_translation((0.0, 0.0, 0.03))
+    sources = [
+        ObjectSource(name="box", mesh=box_mesh(BOX), mass=BOX_MASS),
+        ObjectSource(name="heavy", mesh=box_mesh(BOX), mass=60.0),
+        ObjectSource(name="block", mesh=box_mesh((0.05, 0.05, 0.05)), mass=0.1),
+        ObjectSource(name="ball", mesh=sphere, mass=0.1),
+    ]
+    out = tmp_path_factory.mktemp("library")
+    assert not build_library(sources, out).failed
+    return out
+
+
+def make_station(X_WS: Pose = Pose(), obstacles: dict[str, Obstacle] | None = None) -> Station:
+    """The Panda hand over a large table, without an arm."""
+    hand = load_hand("panda_hand")
+    document = StationDocument(
+        name="test",
+        X_WS=X_WS,
+        table=Table(center=(0.3, 0.2), size=(3.0, 3.0, 0.1)),
+        background=obstacles or {},
+    )
+    return Station(document, hand, resolve(hand.model), None, Path("test.yaml"))
+
+
+@pytest.fixture(scope="session")
+def make_scene(library: Path, tmp_path_factory: pytest.TempPathFactory):
+    """Makes a scene from `(object, x, y, yaw in degrees)` or full instances."""
+
+    def make(*instances: tuple[str, float, float, float] | Instance) -> Scene:
+        placed = tuple(
+            i
+            if isinstance(i, Instance)
+            else Instance(object=i[0], X_SO=Pose((i[1], i[2], 0.0), rpy_deg=(0.0, 0.0, i[3])))
+            for i in instances
+        )
+        path = tmp_path_factory.mktemp("scene") / "scene.yaml"
+        document = SceneDocument(
+            name="test", library=str(library), board=Board(size=(0.6, 0.4)), instances=placed
+        )
+        save_scene(document, path)
+        return load_scene(path)
+
+    return make
+
+
+def from_above(z: float, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> np.ndarray:
+    """Grasp from above at (x, y, z) [m]; closes along x turned by `yaw` [rad]."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, s, 0.0, x], [s, -c, 0.0, y], [0.0, 0.0, -1.0, z], [0.0, 0.0, 0.0, 1.0]])
+
+
+CENTRE = from_above(0.05)
+
+SLOW = TrialSettings(lift_height=0.02, lift_time=2.0, hold_time=0.5)
+"""Accelerates by at most 0.03 m/s^2, so that weight alone decides."""
+
+
+@pytest.fixture(scope="module")
+def box_trial(make_scene) -> HandTrial:
+    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
+
+
+@pytest.fixture(scope="module")
+def slow_trial(make_scene) -> HandTrial:
+    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), settings=SLOW)
+
+
+def margins(result) -> np.ndarray:
+    return np.array(list(asdict(result.margins).values()))
+
+
+def test_centred_grasp_holds_with_the_commanded_force(box_trial: HandTrial) -> None:
+    result = box_trial.run("box", CENTRE)
+    assert result.outcome is Outcome.LIFTED
+    assert result.margins.pad_force == pytest.approx(FORCE, rel=0.01)
+    assert result.margins.lift == pytest.approx(0.30, abs=0.001)
+    assert result.margins.slip < 0.0005
+    assert result.margins.tilt < np.deg2rad(0.1)
+    assert result.margins.end_time > 2.0
+
+
+@pytest.mark.parametrize(("share", "outcome"), [(0.97, Outcome.SLIPPED), (1.03, Outcome.LIFTED)])
+def test_coulomb_limit(slow_trial: HandTrial, share: float, outcome: Outcome) -> None:
+    """Two pads carry 2 mu N; the box weighs m g."""
+    limit = BOX_MASS * GRAVITY / (2 * FORCE)
+    assert slow_trial.run("box", CENTRE, friction=share * limit).outcome is outcome
+
+
+def test_tilt_of_an_eccentric_grasp_falls_with_friction(box_trial: HandTrial) -> None:
+    """Gripped 20 mm beside its centre, the box is held against turning by the pads' friction."""
+    tilts = [
+        box_trial.run("box", from_above(0.05, y=0.02), friction=mu).margins.tilt
+        for mu in (0.2, 0.4, 0.8)
+    ]
+    assert tilts[0] > tilts[1] > tilts[2]
+    assert tilts[2] < np.deg2rad(1.0)
+
+
+def test_dropped_while_holding(make_scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pads lose most of their friction once the box is up."""
+    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
+    lift = hand_trial._Execution._lift
+
+    def lift_and_grease(execution: hand_trial._Execution) -> bool:
+        held = lift(execution)
+        trial._set_friction("box", 0.01)
+        return held
+
+    monkeypatch.setattr(hand_trial._Execution, "_lift", lift_and_grease)
+    result = trial.run("box", CENTRE)
+    assert result.outcome is Outcome.DROPPED
+    # sixty millimetres from the box's top to the pads' lower edge fall free in a tenth of a second
+    assert 1.76 + 0.05 < result.margins.end_time < 1.76 + 0.4
+
+
+def test_thin_air(box_trial: HandTrial) -> None:
+    result = box_trial.run("box", from_above(0.30))
+    assert result.outcome is Outcome.NO_CONTACT
+    assert result.margins.lift == pytest.approx(0.0, abs=1e-4)
+    assert np.isnan(result.margins.slip)
+
+
+def test_squeezed_out(make_scene) -> None:
+    """Pads that close beside the middle of a slippery ball push it away."""
+    trial = HandTrial(make_scene(("ball", 0.3, 0.2, 0.0)), make_station())
+    result = trial.run("ball", from_above(0.03, y=0.026), friction=0.05)
+    assert result.outcome is Outcome.CLOSED_EMPTY
+
+
+def test_one_finger_against_an_object_that_does_not_move(make_scene) -> None:
+    """60 kg on a table rub with more than both fingers' force: the first finger stops the hand."""
+    trial = HandTrial(make_scene(("heavy", 0.3, 0.2, 0.0)), make_station())
+    result = trial.run("heavy", from_above(0.05, x=0.006))
+    assert result.outcome is Outcome.ONE_FINGER
+    assert result.margins.lift == pytest.approx(0.0, abs=1e-3)
+
+
+def test_fingers_push_a_light_object_to_the_middle(box_trial: HandTrial) -> None:
+    result = box_trial.run("box", from_above(0.05, x=0.006))
+    assert result.outcome is Outcome.LIFTED
+
+
+@pytest.mark.parametrize(
+    ("X_OG", "outcome", "blocker", "overlap"),
+    [
+        # the finger tips are 9.5 mm beyond the grasp frame
+        (from_above(-0.01, x=0.15), Outcome.COLLISION_TABLE, "table", 0.0195),
+        (from_above(0.05, x=0.03), Outcome.COLLISION_TARGET, "box", None),
+        (from_above(0.03, x=-0.15), Outcome.COLLISION_CLUTTER, "block", None),
+        (from_above(0.05, y=0.2), Outcome.COLLISION_BACKGROUND, "post", None),
+    ],
+)
+def test_start_collisions(make_scene, X_OG, outcome, blocker, overlap) -> None:
+    scene = make_scene(("box", 0.3, 0.2, 0.0), ("block", 0.15 - 0.04, 0.2, 0.0))
+    post = Obstacle(X_WB=Pose((0.34, 0.4, 0.1)), size=(0.04, 0.04, 0.2))
+    result = HandTrial(scene, make_station(obstacles={"post": post})).run("box", X_OG)
+    assert (result.outcome, result.blocker) == (outcome, blocker)
+    if overlap is None:
+        assert result.margins.overlap > 0.001
+    else:
+        assert result.margins.overlap == pytest.approx(overlap, abs=1e-6)
+    assert result.margins.end_time == 0.0
+
+
+def test_hand_clear_by_a_hair(box_trial: HandTrial) -> None:
+    """Pads 40 mm from the middle, a face at 30 mm: 9.9 mm aside is clear, 10.1 mm is not."""
+    assert BOX[0] / 2 == 0.03
+    X_WO = box_trial.diagram.X_WO("box")
+    clear = box_trial.clearance.check("box", X_WO @ from_above(0.05, x=0.0099))
+    overlapping = box_trial.clearance.check("box", X_WO @ from_above(0.05, x=0.0101))
+    assert clear.outcome is None and clear.overlap == 0.0
+    assert overlapping.outcome is Outcome.COLLISION_TARGET
+    assert overlapping.overlap == pytest.approx(0.0001, abs=1e-6)
+
+
+GRASPS = [
+    CENTRE,
+    from_above(0.06, y=0.01, yaw=0.1),
+    from_above(0.07, y=-0.01),
+    from_above(0.045, x=0.005, yaw=-0.2),
+    from_above(0.075, x=-0.004, y=0.01),
+]
+
+
+def assert_same(one: TrialResult, other: TrialResult) -> None:
+    assert one.outcome is other.outcome
+    assert one.margins.pad_force == pytest.approx(other.margins.pad_force, rel=1e-3)
+    assert one.margins.slip == pytest.approx(other.margins.slip, abs=2e-4)
+    assert one.margins.tilt == pytest.approx(other.margins.tilt, abs=np.deg2rad(1.0))
+    assert one.margins.lift == pytest.approx(other.margins.lift, abs=2e-3)
+
+
+def test_swapped_fingers_are_the_same_grasp(box_trial: HandTrial) -> None:
+    for X_OG in GRASPS:
+        one, other = (box_trial.run("box", X, friction=0.15) for X in (X_OG, swap_fingers(X_OG)))
+        assert_same(one, other)
+
+
+def test_turned_and_moved_world_is_the_same_world(make_scene, box_trial: HandTrial) -> None:
+    turned = HandTrial(
+        make_scene(("box", 0.3, 0.2, 0.0)),
+        make_station(X_WS=Pose((0.4, -0.1, 0.0), rpy_deg=(0.0, 0.0, 37.0))),
+    )
+    for X_OG in GRASPS:
+        one, other = (t.run("box", X_OG, friction=0.15) for t in (box_trial, turned))
+        assert_same(one, other)
+
+
+def test_bit_identical_in_any_order_and_any_instance(make_scene, box_trial: HandTrial) -> None:
+    first = [box_trial.run("box", X, friction=0.3) for X in GRASPS]
+    box_trial.run("box", CENTRE, friction=0.01)
+    again = [box_trial.run("box", X, friction=0.3) for X in reversed(GRASPS)][::-1]
+    fresh = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
+    anew = [fresh.run("box", X, friction=0.3) for X in GRASPS]
+    for one, two, three in zip(first, again, anew, strict=True):
+        np.testing.assert_array_equal(margins(one), margins(two))
+        np.testing.assert_array_equal(margins(one), margins(three))
+
+
+def test_bystanders_do_not_change_a_trial_and_are_not_moved(make_scene, box_trial) -> None:
+    crowded = HandTrial(
+        make_scene(("box", 0.3, 0.2, 0.0), ("block", 0.55, 0.35, 20.0)), make_station()
+    )
+    alone, watched = box_trial.run("box", CENTRE), crowded.run("box", CENTRE)
+    assert watched.outcome is alone.outcome
+    assert watched.margins.others_moved == 0.0
+    np.testing.assert_allclose(margins(watched)[:5], margins(alone)[:5], atol=1e-4)
+
+
+def test_neighbour_that_leans_on_the_target_is_moved(make_scene) -> None:
+    """A block on top of the box goes up with it."""
+    block = Instance(object="block", X_SO=Pose((0.3, 0.235, BOX[2])))
+    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0), block), make_station())
+    result = trial.run("box", from_above(0.05, y=-0.03), friction=0.8)
+    assert result.outcome is Outcome.LIFTED
+    assert result.margins.others_moved > 0.2
+
+
+def test_clear_errors(box_trial: HandTrial) -> None:
+    with pytest.raises(InvalidInputError, match="'mug' is not a free object of scene 'test'"):
+        box_trial.run("mug", CENTRE)
+    with pytest.raises(InvalidInputError, match="X_OG has NaN"):
+        box_trial.run("box", np.full((4, 4), np.nan))
