@@ -13,14 +13,22 @@ from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 
 
+PRIORITY = (
+    Outcome.COLLISION_TARGET,
+    Outcome.COLLISION_TABLE,
+    Outcome.COLLISION_BACKGROUND,
+    Outcome.COLLISION_CLUTTER,
+)
+
+
 @dataclass(frozen=True)
 class Clearance:
     """Verdict of the screen.
 
     Attributes:
         outcome: one of the `COLLISION_*` outcomes, or None if the hand is clear.
-        blocker: name of the instance, obstacle or `table` that is overlapped most.
-        overlap: depth of the deepest overlap [m]; 0 if clear.
+        blocker: name of the instance, obstacle or `table` that decided the outcome.
+        overlap: depth of the deepest overlap with it [m]; 0 if clear.
     """
 
     outcome: Outcome | None
@@ -53,18 +61,21 @@ class HandClearance:
             X_WG: (4, 4) grasp in the world.
 
         Returns:
-            The verdict; where several bodies are overlapped, the deepest overlap decides.
+            The verdict. Where several bodies are overlapped, the one decides that would be in the
+            way in an emptier scene, too: the target, then the table, then background, then
+            clutter.
         """
         self._hand.place(self._plant_context, X_WG)
         query = self._query_port.Eval(self._graph_context)
-        deepest, name = 0.0, ""
+        overlaps: dict[str, float] = {}
         for pair in query.ComputePointPairPenetration():
-            other = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
-            if (pair.depth, other) > (deepest, name):
-                deepest, name = pair.depth, other
-        if not name:
+            name = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
+            overlaps[name] = max(overlaps.get(name, 0.0), pair.depth)
+        if not overlaps:
             return Clearance(None)
-        return Clearance(self._outcome(instance, name), name, deepest)
+        outcomes = {name: self._outcome(instance, name) for name in overlaps}
+        name = min(overlaps, key=lambda n: (PRIORITY.index(outcomes[n]), n))
+        return Clearance(outcomes[name], name, overlaps[name])
 
     def _outcome(self, instance: str, blocker: str) -> Outcome:
         if blocker == instance:

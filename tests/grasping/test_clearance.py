@@ -1,0 +1,141 @@
+"""The hand screen against an oracle that knows nothing of Drake: points sampled in the hand."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from burg_drake.core.frames import (
+    grasp_from_axes,
+    inverse,
+    make_pose,
+    rotation_from_rpy,
+    swap_fingers,
+    transform_points,
+)
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import Pose
+from burg_drake.grasping.clearance import HandClearance
+from burg_drake.objects.build import build_library
+from burg_drake.objects.source import ObjectSource
+from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.hand import load_hand
+from burg_drake.station.station import Station, StationDocument, Table
+
+SIZES = {"box": (0.05, 0.08, 0.10), "plate": (0.2, 0.2, 0.02)}
+PLACES = {"box": (0.2, 0.2), "plate": (0.38, 0.2)}
+
+
+@pytest.fixture(scope="module")
+def clearance(tmp_path_factory: pytest.TempPathFactory) -> HandClearance:
+    folder = tmp_path_factory.mktemp("clearance")
+    lift = trimesh.transformations.translation_matrix
+    sources = [
+        ObjectSource(name=n, mesh=trimesh.creation.box(s, lift((0, 0, s[2] / 2))), mass=0.2)
+        for n, s in SIZES.items()
+    ]
+    build_library(sources, folder / "library")
+    instances = tuple(Instance(object=n, X_SO=Pose((*PLACES[n], 0.0))) for n in SIZES)
+    document = SceneDocument(name="test", library="library", instances=instances)
+    save_scene(document, folder / "scene.yaml")
+    hand = load_hand("panda_hand")
+    station = Station(
+        StationDocument(name="test", table=Table(center=(0.3, 0.2))),
+        hand,
+        resolve(hand.model),
+        None,
+        Path("test.yaml"),
+    )
+    scene = load_scene(folder / "scene.yaml")
+    return HandClearance(build_station_diagram(scene, station, robot="hand"))
+
+
+def hand_points() -> np.ndarray:
+    """Points that fill the collision boxes of the open hand, in the grasp frame, from the model
+    file alone; boxes written as meshes are taken by their bounds."""
+    hand = load_hand("panda_hand")
+    path = resolve(hand.model)
+    model = ElementTree.parse(path).getroot().find("model")
+    assert model is not None
+    X_HL = {"panda_hand": np.eye(4)}
+    for side, finger in zip((1.0, -1.0), hand.fingers, strict=True):
+        X_HL[finger.body] = make_pose(p_AB=(0.0, side * finger.open, 0.0584))
+    clouds = []
+    for link in model.findall("link"):
+        for collision in link.findall("collision"):
+            numbers = [float(v) for v in (collision.findtext("pose") or "0 0 0 0 0 0").split()]
+            X_LB = make_pose(rotation_from_rpy(numbers[3:]), numbers[:3])
+            size = collision.findtext("geometry/box/size")
+            if size:
+                half = np.array([float(v) for v in size.split()]) / 2
+            else:
+                half = pad_half_size(path.parent / (collision.findtext("geometry/mesh/uri") or ""))
+            grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 12)] * 3), -1).reshape(-1, 3)
+            clouds.append(transform_points(X_HL[link.get("name", "")] @ X_LB, grid * half))
+    return transform_points(inverse(hand.X_HG.matrix()), np.concatenate(clouds))
+
+
+def pad_half_size(vtk: Path) -> np.ndarray:
+    """Half extents of a tetrahedral mesh in VTK's text format."""
+    lines = vtk.read_text().splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("POINTS"))
+    count = int(lines[start].split()[1])
+    points = np.array([[float(v) for v in s.split()] for s in lines[start + 1 : start + 1 + count]])
+    return np.ptp(points, axis=0) / 2
+
+
+def deepest(points_W: np.ndarray) -> dict[str, float]:
+    """How deep points are in the table and in the two boxes [m]; negative outside."""
+    depth = {"table": float(-points_W[:, 2].min())}
+    for name, size in SIZES.items():
+        half = np.array(size) / 2
+        centre = np.array([*PLACES[name], half[2]])
+        depth[name] = float((half - np.abs(points_W - centre)).min(axis=1).max())
+    return depth
+
+
+def random_grasps(n: int) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    position = np.column_stack(
+        [rng.uniform(0.1, 0.5, n), rng.uniform(0.1, 0.3, n), rng.uniform(0.0, 0.15, n)]
+    )
+    approach = rng.normal(size=(n, 3)) - (0, 0, 1.5)
+    return grasp_from_axes(rng.normal(size=(n, 3)), approach, position)
+
+
+def test_agrees_with_points_in_the_hand(clearance: HandClearance) -> None:
+    points_G = hand_points()
+    found = 0
+    for X_WG in random_grasps(400):
+        depth = deepest(transform_points(X_WG, points_G))
+        verdict = clearance.check("box", X_WG)
+        if verdict.outcome is None:
+            assert max(depth.values()) <= 1e-9
+            found += 1
+        elif verdict.overlap < 0.004:
+            continue  # a corner may lie between the points
+        else:
+            assert max(depth.values()) > 0.0
+            assert depth[verdict.blocker] > 0.0
+    assert found > 40
+
+
+def test_swapped_fingers_get_the_same_verdict(clearance: HandClearance) -> None:
+    for X_WG in random_grasps(200):
+        one, other = (clearance.check("box", X) for X in (X_WG, swap_fingers(X_WG)))
+        assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
+        if one.overlap < 0.003:  # the depth of a deep overlap is not unique
+            assert one.overlap == pytest.approx(other.overlap, abs=1e-6)
+
+
+def test_target_and_clutter_are_told_apart(clearance: HandClearance) -> None:
+    down = make_pose(np.diag([1.0, -1.0, -1.0]), (0.2, 0.2, 0.03))
+    assert clearance.check("box", down).outcome is Outcome.COLLISION_TARGET
+    assert clearance.check("plate", down).outcome is Outcome.COLLISION_CLUTTER
+    assert clearance.check("plate", down).blocker == "box"
