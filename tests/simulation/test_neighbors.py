@@ -41,7 +41,7 @@ def test_neighbours_of_neighbours_and_what_hangs_above() -> None:
         "behind": at(0, 0.12),
         "far": at(0, 0.25),
         "above": at(0, 0, z=0.35),
-        "out of the way": at(0, 0, z=0.5),
+        "out of the way": at(0, 0, z=0.6),
     }
     part = taking_part(objects, "target", above(0, 0), 0.3)
     assert part == {"target", "near", "behind", "above"}

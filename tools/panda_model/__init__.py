@@ -1,0 +1,1 @@
+"""Generator of `models/panda` and `models/hands/panda_hand.yaml`: `python -m tools.panda_model`."""
