@@ -12,7 +12,8 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 
-
+TRAVEL_STEP = 0.025
+"""Resolution of `free_travel`: 1 mm a finger of the Panda hand, a fraction of a pad."""
 PRIORITY = (
     Outcome.COLLISION_TARGET,
     Outcome.COLLISION_TABLE,
@@ -65,17 +66,38 @@ class HandClearance:
             way in an emptier scene, too: the target, then the table, then background, then
             clutter.
         """
-        self._hand.place(self._plant_context, X_WG)
-        query = self._query_port.Eval(self._graph_context)
-        overlaps: dict[str, float] = {}
-        for pair in query.ComputePointPairPenetration():
-            name = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
-            overlaps[name] = max(overlaps.get(name, 0.0), pair.depth)
+        overlaps = self._overlaps(X_WG)
         if not overlaps:
             return Clearance(None)
         outcomes = {name: self._outcome(instance, name) for name in overlaps}
         name = min(overlaps, key=lambda n: (PRIORITY.index(outcomes[n]), n))
         return Clearance(outcomes[name], name, overlaps[name])
+
+    def free_travel(self, X_WG: Array) -> float:
+        """How far the fingers can close before anything is touched.
+
+        Args:
+            X_WG: (4, 4) grasp at which the open hand is clear.
+
+        Returns:
+            0 (open) to 1 (pads together), a multiple of `TRAVEL_STEP`; the fingers are clear there
+            and on the way.
+        """
+        steps = round(1.0 / TRAVEL_STEP)
+        for i in range(1, steps + 1):
+            if self._overlaps(X_WG, i * TRAVEL_STEP):
+                return (i - 1) * TRAVEL_STEP
+        return 1.0
+
+    def _overlaps(self, X_WG: Array, closed: float = 0.0) -> dict[str, float]:
+        """Depth of the deepest overlap by the name of what the hand overlaps [m]."""
+        self._hand.place(self._plant_context, X_WG, closed)
+        query = self._query_port.Eval(self._graph_context)
+        overlaps: dict[str, float] = {}
+        for pair in query.ComputePointPairPenetration():
+            name = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
+            overlaps[name] = max(overlaps.get(name, 0.0), pair.depth)
+        return overlaps
 
     def _outcome(self, instance: str, blocker: str) -> Outcome:
         if blocker == instance:

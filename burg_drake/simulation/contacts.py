@@ -1,4 +1,4 @@
-"""Reads from Drake's contact results which finger presses on the target, and how hard."""
+"""Reads Drake's contact results: which bodies touch, and how hard the fingers press."""
 
 from __future__ import annotations
 
@@ -10,6 +10,20 @@ from pydrake.multibody.plant import ContactResults, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core.frames import Array
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Contact between two bodies at one pair of geometries.
+
+    Attributes:
+        body_A, body_B: the bodies.
+        f_B_W: (3,) force on body B in the world [N].
+    """
+
+    body_A: BodyIndex
+    body_B: BodyIndex
+    f_B_W: Array
 
 
 @dataclass(frozen=True)
@@ -36,50 +50,61 @@ class FingerContact:
 
 
 class ContactReader:
-    """Maps contact results to fingers of one hand.
+    """Maps the geometries of contact results to bodies.
 
     Args:
         plant: a finalized plant.
         scene_graph: its scene graph.
-        fingers: bodies of the two fingers.
     """
 
-    def __init__(
-        self, plant: MultibodyPlant, scene_graph: SceneGraph, fingers: tuple[BodyIndex, BodyIndex]
-    ) -> None:
-        self._fingers = {index: i for i, index in enumerate(fingers)}
+    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
         inspector = scene_graph.model_inspector()
         self._body_of = {
             geometry: plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)).index()
             for geometry in inspector.GetAllGeometryIds()
         }
 
-    def read(self, results: ContactResults, target: BodyIndex) -> FingerContact:
-        """Contact of the fingers with one body.
-
-        Args:
-            results: value of the plant's contact results port.
-            target: the body.
-        """
-        force = np.zeros((2, 3))
-        touching = [False, False]
+    def read(self, results: ContactResults) -> list[Contact]:
+        """All contacts of a value of the plant's contact results port."""
+        contacts = []
         for i in range(results.num_hydroelastic_contacts()):
             info = results.hydroelastic_contact_info(i)
             surface = info.contact_surface()
             body_M, body_N = self._body_of[surface.id_M()], self._body_of[surface.id_N()]
-            if target in (body_M, body_N):
-                finger = self._fingers.get(body_N if body_M == target else body_M)
-                if finger is not None:
-                    F_M_W = info.F_Ac_W().translational()
-                    force[finger] += F_M_W if body_M == target else -F_M_W
-                    touching[finger] = True
+            contacts.append(Contact(body_N, body_M, info.F_Ac_W().translational()))
         for i in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(i)
-            body_A, body_B = pair.bodyA_index(), pair.bodyB_index()
-            if target in (body_A, body_B):
-                finger = self._fingers.get(body_B if body_A == target else body_A)
-                if finger is not None:
-                    f_B_W = pair.contact_force()
-                    force[finger] += f_B_W if body_B == target else -f_B_W
-                    touching[finger] = True
-        return FingerContact((touching[0], touching[1]), force)
+            contacts.append(Contact(pair.bodyA_index(), pair.bodyB_index(), pair.contact_force()))
+        return contacts
+
+
+def finger_contact(
+    contacts: list[Contact], fingers: tuple[BodyIndex, BodyIndex], target: BodyIndex
+) -> FingerContact:
+    """Sums the contacts of each finger with the target."""
+    force = np.zeros((2, 3))
+    touching = [False, False]
+    for i, finger in enumerate(fingers):
+        for contact in contacts:
+            if (contact.body_A, contact.body_B) == (finger, target):
+                force[i] += contact.f_B_W
+                touching[i] = True
+            elif (contact.body_A, contact.body_B) == (target, finger):
+                force[i] -= contact.f_B_W
+                touching[i] = True
+    return FingerContact((touching[0], touching[1]), force)
+
+
+def reached(
+    contacts: list[Contact], moving: set[BodyIndex], still: set[BodyIndex]
+) -> set[BodyIndex]:
+    """Those of the bodies in `still` that a body in `moving` touches."""
+    found = set()
+    for contact in contacts:
+        for one, other in (
+            (contact.body_A, contact.body_B),
+            (contact.body_B, contact.body_A),
+        ):
+            if one in moving and other in still:
+                found.add(other)
+    return found

@@ -7,7 +7,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE, SceneIssue, require_sound, validate_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram, instance_pose
+from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram, instance_pose
 from burg_drake.station.station import Station
 
 
@@ -27,7 +27,7 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
         issue = _table_issue(scene, station, name)
         if issue is not None:
             issues.append(issue)
-    robot = "arm" if station.document.arm is not None else "none"
+    robot: Robot = "arm" if station.document.arm is not None else "none"
     station_diagram = build_station_diagram(scene, station, robot=robot)
     for (a, b), depth in overlaps(station_diagram).items():
         if depth <= TOUCH_TOLERANCE or (b == "table" and a in buried):

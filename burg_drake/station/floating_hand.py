@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
-from pydrake.geometry import CalcObb
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
@@ -39,33 +36,17 @@ class FloatingHand:
         self.lift = plant.GetJointByName("lift")
         self._base = plant.GetFrameByName("lift_base")
         self._mount = plant.GetFrameByName("lift_mount")
-        self.bounds = self._bounds(station_diagram)
 
-    def _bounds(self, station_diagram: StationDiagram) -> tuple[Array, Array]:
-        """Corners of the open hand's bounding box in the grasp frame [m]."""
-        context = station_diagram.diagram.CreateDefaultContext()
-        plant_context = self._plant.GetMyMutableContextFromRoot(context)
-        self.place(plant_context, np.eye(4))
-        inspector = station_diagram.scene_graph.model_inspector()
-        corners = []
-        for index in station_diagram.robot_bodies:
-            body = self._plant.get_body(index)
-            X_GB = self._plant.EvalBodyPoseInWorld(plant_context, body)
-            for geometry in self._plant.GetCollisionGeometriesForBody(body):
-                obb = CalcObb(inspector.GetShape(geometry))
-                half = obb.half_width()
-                X_GK = X_GB @ inspector.GetPoseInFrame(geometry) @ obb.pose()
-                signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-                corners.append(X_GK.multiply((signs * half).T).T)
-        points = np.concatenate(corners)
-        return points.min(axis=0), points.max(axis=0)
+    def place(self, plant_context: Context, X_WG: Array, closed: float = 0.0) -> None:
+        """Puts the grasp frame at `X_WG` (4, 4), lift at 0, all at rest.
 
-    def place(self, plant_context: Context, X_WG: Array) -> None:
-        """Puts the grasp frame at `X_WG` (4, 4), fingers open, lift at 0, all at rest.
-
-        The lift joint keeps to world z: its base frame has the world's axes and the hand's
-        position, its mount frame takes up the hand's orientation.
+        Args:
+            plant_context: the plant's part of the Context.
+            X_WG: grasp in the world.
+            closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
         """
+        # The lift joint keeps to world z: its base frame has the world's axes and the hand's
+        # position, its mount frame takes up the hand's orientation.
         X_WH = self.document.X_AH(X_WG)
         R_WH = RotationMatrix(X_WH[:3, :3])
         self._base.SetPoseInParentFrame(plant_context, RigidTransform(X_WH[:3, 3]))
@@ -73,7 +54,8 @@ class FloatingHand:
         self.lift.set_translation(plant_context, 0.0)
         self.lift.set_translation_rate(plant_context, 0.0)
         for joint, finger in zip(self.joints, self.document.fingers, strict=True):
-            joint.set_translation(plant_context, finger.open)
+            q = finger.open + closed * (finger.closed - finger.open)
+            joint.set_translation(plant_context, q)
             joint.set_translation_rate(plant_context, 0.0)
 
     def closing_command(self) -> Array:

@@ -1,0 +1,144 @@
+"""The robot in a plant: the hand on the arm, or hanging on a vertical joint; servos and posture."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    JointActuator,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    RigidBody,
+)
+from pydrake.planning import RobotDiagramBuilder
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array
+from burg_drake.station.station import Station
+
+Robot = Literal["arm", "hand", "none"]
+
+ROBOT_MODELS = ("hand", "arm", "lift")
+"""Names of the robot's model instances in every plant."""
+FINGER_DAMPING = 1000.0
+"""Velocity gain of a finger [N s/m]. Without position gain and with the effort limited, this is a
+servo that moves at the commanded speed and presses with the limit."""
+LIFT_DAMPING = 1e6
+"""Velocity gain of the floating hand's lift joint [N s/m]; holds a speed to 1e-5 m/s."""
+ARM_STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 1000.0])
+"""Position gains of a seven-joint arm [Nm/rad], falling towards the wrist."""
+ARM_DAMPING_TIME = 0.05
+"""Velocity gain over position gain [s]."""
+HOVER = 0.5
+"""Height of the floating hand above the origin of the board in the default context [m]."""
+
+
+def add_robot(
+    builder: RobotDiagramBuilder, station: Station, robot: Robot
+) -> dict[str, ModelInstanceIndex]:
+    """Adds hand and arm with their servos and without gravity.
+
+    Returns:
+        Model instances by role: `hand`, and `arm` or `lift`.
+
+    Raises:
+        InvalidInputError: the station has no arm, or its home posture is not one of this arm.
+    """
+    if robot == "none":
+        return {}
+    plant, parser = builder.plant(), builder.parser()
+    (hand,) = parser.AddModels(str(station.hand_model))
+    body = plant.GetBodyByName(station.hand.body, hand)
+    for finger in station.hand.fingers:
+        actuator = plant.GetJointActuatorByName(finger.joint, hand)
+        actuator.set_controller_gains(PdControllerGains(p=0.0, d=FINGER_DAMPING))
+        actuator.set_effort_limit(station.hand.force)
+    plant.RenameModelInstance(hand, "hand")
+    models = {"hand": hand}
+    if robot == "hand":
+        models["lift"] = _add_lift(plant, body, _hover(station))
+    else:
+        models["arm"] = _add_arm(builder, station, body)
+    for model in models.values():
+        plant.set_gravity_enabled(model, False)
+    return models
+
+
+def _hover(station: Station) -> Array:
+    """`X_WH` (4, 4) of a hand that points down, well above the origin of the board."""
+    X_SG = np.diag([1.0, -1.0, -1.0, 1.0])
+    X_SG[2, 3] = HOVER
+    return station.hand.X_AH(station.document.X_WS.matrix() @ X_SG)
+
+
+def _add_lift(plant: MultibodyPlant, hand: RigidBody, X_WH: Array) -> ModelInstanceIndex:
+    lift = plant.AddModelInstance("lift")
+    at_hand = RigidTransform(X_WH[:3, 3])
+    turned_back = RigidTransform(RotationMatrix(X_WH[:3, :3]).inverse(), np.zeros(3))
+    base = plant.AddFrame(FixedOffsetFrame("lift_base", plant.world_frame(), at_hand, lift))
+    mount = plant.AddFrame(FixedOffsetFrame("lift_mount", hand.body_frame(), turned_back, lift))
+    joint = plant.AddJoint(PrismaticJoint("lift", base, mount, np.array([0.0, 0.0, 1.0])))
+    actuator = plant.AddJointActuator("lift", joint)
+    actuator.set_controller_gains(PdControllerGains(p=0.0, d=LIFT_DAMPING))
+    return lift
+
+
+def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) -> ModelInstanceIndex:
+    arm = station.document.arm
+    if arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section,"
+            " or use the hand alone"
+        )
+    plant = builder.plant()
+    (model,) = builder.parser().AddModels(str(station.arm_model))
+    plant.RenameModelInstance(model, "arm")
+    base = plant.GetFrameByName(arm.base, model)
+    plant.WeldFrames(plant.world_frame(), base, RigidTransform(arm.X_WA.matrix()))
+    flange = plant.GetFrameByName(arm.flange, model)
+    plant.WeldFrames(flange, hand.body_frame(), RigidTransform(arm.X_FH.matrix()))
+    actuators = joint_actuators(plant, model)
+    if len(arm.home) != len(actuators):
+        raise InvalidInputError(
+            f"{station.path}: arm.home has {len(arm.home)} joint angles; the arm has"
+            f" {len(actuators)} joints"
+        )
+    stiffness = np.resize(ARM_STIFFNESS, len(actuators))
+    for actuator, p in zip(actuators, stiffness, strict=True):
+        actuator.set_controller_gains(PdControllerGains(p=p, d=ARM_DAMPING_TIME * p))
+    return model
+
+
+def joint_actuators(plant: MultibodyPlant, model: ModelInstanceIndex) -> list[JointActuator]:
+    """Actuators of a model in the order of its joints; works before Finalize, too."""
+    actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
+    own = [a for a in actuators if a.joint().model_instance() == model]
+    return sorted(own, key=lambda a: int(a.joint().index()))
+
+
+def set_default_posture(
+    plant: MultibodyPlant, station: Station, models: dict[str, ModelInstanceIndex]
+) -> None:
+    """Opens the hand and puts the arm into its home posture in default contexts.
+
+    Raises:
+        InvalidInputError: the home posture is beyond a joint limit.
+    """
+    if "hand" in models:
+        for finger in station.hand.fingers:
+            plant.GetJointByName(finger.joint, models["hand"]).set_default_translation(finger.open)
+    if "arm" in models and station.document.arm is not None:
+        joints = [a.joint() for a in joint_actuators(plant, models["arm"])]
+        for joint, q in zip(joints, station.document.arm.home, strict=True):
+            low, high = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+            if not low <= q <= high:
+                raise InvalidInputError(
+                    f"{station.path}: arm.home puts {joint.name()} at {q:g} rad; its range is"
+                    f" {low:g} to {high:g}"
+                )
+            joint.set_default_positions(np.array([q]))
