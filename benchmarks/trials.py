@@ -51,6 +51,8 @@ def main() -> None:
         )
     rows = (("executed", executed_all, PEER_EXECUTED), ("rejected", rejected_all, PEER_REJECTED))
     for label, seconds, peer in rows:
+        if not seconds:
+            continue
         median = float(np.median(seconds))
         quarters = np.percentile(seconds, (25, 75))
         print(

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
+from pydrake.geometry import (
+    Box,
+    CollisionFilterDeclaration,
+    Convex,
+    GeometryId,
+    GeometrySet,
+    Mesh,
+    PenetrationAsPointPair,
+    QueryObject,
+)
 from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import Context
 
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
+from burg_drake.grasping.penetration import Polytope, penetration_depth
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 
@@ -53,6 +64,7 @@ class HandClearance:
         self._bodies = _filter_scene(station_diagram, self._context)
         self._graph_context = station_diagram.scene_graph.GetMyContextFromRoot(self._context)
         self._station_diagram = station_diagram
+        self._polytopes: dict[GeometryId, Polytope | None] = {}
 
     def check(self, instance: str, X_WG: Array) -> Clearance:
         """Screens one grasp.
@@ -66,12 +78,13 @@ class HandClearance:
             way in an emptier scene, too: the target, then the table, then background, then
             clutter.
         """
-        overlaps = self._overlaps(X_WG)
-        if not overlaps:
+        pairs = self._overlapping(X_WG)
+        if not pairs:
             return Clearance(None)
-        outcomes = {name: self._outcome(instance, name) for name in overlaps}
-        name = min(overlaps, key=lambda n: (PRIORITY.index(outcomes[n]), n))
-        return Clearance(outcomes[name], name, overlaps[name])
+        outcomes = {name: self._outcome(instance, name) for name, _ in pairs}
+        blocker = min(outcomes, key=lambda name: (PRIORITY.index(outcomes[name]), name))
+        overlap = max(self._depth(pair) for name, pair in pairs if name == blocker)
+        return Clearance(outcomes[blocker], blocker, overlap)
 
     def free_travel(self, X_WG: Array) -> float:
         """How far the fingers can close before anything is touched.
@@ -85,19 +98,40 @@ class HandClearance:
         """
         steps = round(1.0 / TRAVEL_STEP)
         for i in range(1, steps + 1):
-            if self._overlaps(X_WG, i * TRAVEL_STEP):
+            if self._overlapping(X_WG, i * TRAVEL_STEP):
                 return (i - 1) * TRAVEL_STEP
         return 1.0
 
-    def _overlaps(self, X_WG: Array, closed: float = 0.0) -> dict[str, float]:
-        """Depth of the deepest overlap by the name of what the hand overlaps [m]."""
+    def _overlapping(
+        self, X_WG: Array, closed: float = 0.0
+    ) -> list[tuple[str, PenetrationAsPointPair]]:
+        """What the hand overlaps: name, and pair of geometries."""
         self._hand.place(self._plant_context, X_WG, closed)
-        query = self._query_port.Eval(self._graph_context)
-        overlaps: dict[str, float] = {}
-        for pair in query.ComputePointPairPenetration():
-            name = self._names.get(self._bodies[pair.id_A]) or self._names[self._bodies[pair.id_B]]
-            overlaps[name] = max(overlaps.get(name, 0.0), pair.depth)
-        return overlaps
+        pairs = self._query().ComputePointPairPenetration()
+        names, bodies = self._names, self._bodies
+        return [(names.get(bodies[p.id_A]) or names[bodies[p.id_B]], p) for p in pairs]
+
+    def _query(self) -> QueryObject:
+        return self._query_port.Eval(self._graph_context)
+
+    def _depth(self, pair: PenetrationAsPointPair) -> float:
+        """Penetration depth of two geometries of the hand's present place [m]."""
+        query = self._query()
+        shapes = [self._polytope(query, geometry) for geometry in (pair.id_A, pair.id_B)]
+        if shapes[0] is None or shapes[1] is None:
+            return pair.depth
+        X_WA, X_WB = query.GetPoseInWorld(pair.id_A), query.GetPoseInWorld(pair.id_B)
+        return penetration_depth(shapes[0], shapes[1], X_WA.InvertAndCompose(X_WB).GetAsMatrix4())
+
+    def _polytope(self, query: QueryObject, geometry: GeometryId) -> Polytope | None:
+        """The polytope of a geometry; None if it is round."""
+        if geometry not in self._polytopes:
+            inspector = query.inspector()
+            flat = isinstance(inspector.GetShape(geometry), (Box, Convex, Mesh))
+            self._polytopes[geometry] = (
+                Polytope.from_geometry(inspector, geometry) if flat else None
+            )
+        return self._polytopes[geometry]
 
     def _outcome(self, instance: str, blocker: str) -> Outcome:
         if blocker == instance:
@@ -115,7 +149,7 @@ def _names(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
     return {index: name for name, index in bodies.items()}
 
 
-def _filter_scene(station_diagram: StationDiagram, context) -> dict:  # type: ignore[no-untyped-def, type-arg]
+def _filter_scene(station_diagram: StationDiagram, context: Context) -> dict[GeometryId, BodyIndex]:
     """Leaves only the pairs hand against scene in the context; returns geometry -> body."""
     plant, scene_graph = station_diagram.plant, station_diagram.scene_graph
     inspector = scene_graph.model_inspector()

@@ -130,8 +130,18 @@ def test_swapped_fingers_get_the_same_verdict(clearance: HandClearance) -> None:
     for X_WG in random_grasps(200):
         one, other = (clearance.check("box", X) for X in (X_WG, swap_fingers(X_WG)))
         assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
-        if one.overlap < 0.003:  # the depth of a deep overlap is not unique
-            assert one.overlap == pytest.approx(other.overlap, abs=1e-6)
+        assert one.overlap == pytest.approx(other.overlap, abs=1e-7)
+
+
+def test_depth_in_the_table_is_that_of_the_lowest_point(clearance: HandClearance) -> None:
+    points_G = hand_points()
+    down = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.45, 0.0))
+    for tilt in (0.0, 0.2, -0.4):
+        X_WG = down @ make_pose(rotation_from_rpy((0.0, tilt, 0.3)), (0.0, 0.0, -0.005))
+        verdict = clearance.check("box", X_WG)
+        assert verdict.outcome is Outcome.COLLISION_TABLE
+        lowest = transform_points(X_WG, points_G)[:, 2].min()
+        assert verdict.overlap == pytest.approx(-lowest, abs=1e-6)
 
 
 def test_target_and_clutter_are_told_apart(clearance: HandClearance) -> None:
