@@ -1,0 +1,178 @@
+"""The grasps that a run judges: which grasp, on which instance of the scene, under which id."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.content import content_hash, rng_from
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.frames import Array
+from burg_drake.core.grasps import GraspSet
+from burg_drake.objects.library import ObjectEntry
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One grasp on one instance.
+
+    Attributes:
+        id: `INSTANCE-GRASP`, unique in a run.
+        instance: name of the placed object.
+        X_OG: (4, 4) grasp in the object frame.
+    """
+
+    id: str
+    instance: str
+    X_OG: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """N grasps on instances of a scene, grouped by instance.
+
+    Attributes:
+        grasps: the grasps in the frames of their objects.
+        instance: (N,) names of the placed objects.
+    """
+
+    grasps: GraspSet
+    instance: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.grasps)
+
+    def __iter__(self) -> Iterator[Candidate]:
+        for id, instance, X_OG in zip(self.id, self.instance, self.grasps.X_OG, strict=True):
+            yield Candidate(id, str(instance), X_OG)
+
+    @cached_property
+    def id(self) -> list[str]:
+        """Identifiers in order: instance and grasp, joined by a hyphen."""
+        return [f"{i}-{g}" for i, g in zip(self.instance, self.grasps.id, strict=True)]
+
+    @cached_property
+    def content(self) -> str:
+        """Hash of poses, widths and instances."""
+        return content_hash(self.grasps.X_OG, self.grasps.width, self.id)
+
+    def save(self, path: Path) -> None:
+        """Writes a grasp file that `load`, and `GraspSet.load`, read back bit for bit."""
+        runs = [[name, len(list(group))] for name, group in groupby(self.instance.tolist())]
+        provenance = {**self.grasps.provenance, "instances": runs}
+        dataclasses.replace(self.grasps, provenance=provenance).save(path)
+
+    @classmethod
+    def load(cls, path: Path) -> Candidates:
+        """Reads a file written by `save`.
+
+        Raises:
+            InvalidInputError: the file is something else.
+        """
+        grasps = GraspSet.load(path)
+        provenance = dict(grasps.provenance)
+        runs = provenance.pop("instances", None)
+        if runs is None or sum(count for _, count in runs) != len(grasps):
+            raise InvalidInputError(f"{path} does not say which instance each grasp belongs to")
+        names = [name for name, count in runs for _ in range(count)]
+        return cls(dataclasses.replace(grasps, provenance=provenance), np.array(names, dtype=str))
+
+
+def sample_candidates(scene: Scene, station: Station, n: int, seed: int) -> Candidates:
+    """Samples antipodal grasps on every free instance.
+
+    The random stream follows from the seed and the object's content alone: all instances of an
+    object get the same grasps, whatever else stands in the scene.
+
+    Args:
+        scene: the scene; its background objects get no grasps.
+        station: gives the opening of the hand.
+        n: grasps for each instance; there are fewer where the object has no more.
+        seed: of the run.
+
+    Raises:
+        InvalidInputError: n is below 1.
+        UnknownNameError: the mesh file of an object is missing.
+    """
+    if n < 1:
+        raise InvalidInputError(f"grasps per object is {n}; give 1 or more")
+    objects = dict.fromkeys(scene.instance(name).object for name in scene.instances)
+    sampled = {name: _sample_object(scene, station, name, n, seed) for name in objects}
+    return _join({name: sampled[scene.instance(name).object] for name in scene.instances})
+
+
+def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates:
+    """Candidates from the user's own grasps.
+
+    Args:
+        scene: the scene.
+        grasps: grasps in the object frame by name of a free instance. Instances that are not
+            named get none; of equal grasps on an instance the first one is kept.
+
+    Raises:
+        UnknownNameError: no free instance goes by such a name.
+        InvalidInputError: a set holds grasps of another object.
+    """
+    for name, grasp_set in grasps.items():
+        if name not in scene.instances:
+            raise UnknownNameError(
+                f"grasps are given for {name!r}, which is not a free instance of scene"
+                f" {scene.name!r}; {nearest(name, scene.instances)}"
+            )
+        expected = scene.instance(name).object
+        others = set(grasp_set.object.tolist()) - {expected, ""}
+        if others:
+            raise InvalidInputError(
+                f"grasps given for {name!r} belong to object {min(others)!r}; the scene has"
+                f" object {expected!r} there"
+            )
+    return _join({name: _distinct(grasps[name]) for name in scene.instances if name in grasps})
+
+
+def _join(by_instance: dict[str, GraspSet]) -> Candidates:
+    if not by_instance:
+        return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
+    names = [name for name, grasps in by_instance.items() for _ in range(len(grasps))]
+    grasps = GraspSet.concatenate(by_instance.values())
+    parts = dict(zip(by_instance, grasps.provenance["parts"], strict=True))
+    return Candidates(
+        dataclasses.replace(grasps, provenance={"parts": parts}), np.array(names, dtype=str)
+    )
+
+
+def _distinct(grasps: GraspSet) -> GraspSet:
+    _, first = np.unique(grasps.id, return_index=True)
+    return grasps.select(np.sort(first))
+
+
+def _sample_object(scene: Scene, station: Station, name: str, n: int, seed: int) -> GraspSet:
+    from burg_drake.grasping.antipodal import sample_antipodal
+
+    entry: ObjectEntry = scene.library.entry(name)
+    return _distinct(
+        sample_antipodal(
+            _load_mesh(scene.library.path(entry.mesh)),
+            n,
+            rng_from("antipodal", seed, entry.build),
+            friction=entry.friction,
+            opening=station.hand.opening,
+            object=name,
+        )
+    )
+
+
+def _load_mesh(path: Path):  # type: ignore[no-untyped-def]
+    import trimesh
+
+    mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    return mesh

@@ -1,0 +1,280 @@
+"""The main job: judges grasps of a scene on a station, stage by stage, and records it all.
+
+Every grasp goes candidate → clear → reachable → executed and ends with exactly one outcome. What
+is judged is on disk at once; the same call on the same folder goes on where an earlier one stopped.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.resources import PACKAGE_URI
+from burg_drake.evaluation.candidates import Candidates, given_candidates, sample_candidates
+from burg_drake.evaluation.executors import default_workers, judge_all
+from burg_drake.evaluation.journal import Journal
+from burg_drake.evaluation.judge import StationJudgeFactory
+from burg_drake.evaluation.progress import Listener, Progress, Reporter
+from burg_drake.evaluation.report import write_report
+from burg_drake.evaluation.run_document import (
+    Grasps,
+    Input,
+    Library,
+    RunDocument,
+    Session,
+    input_reference,
+    numbers,
+    portable_reference,
+    require_same_run,
+    software_versions,
+)
+from burg_drake.evaluation.run_store import (
+    JOURNAL_FILE,
+    RUN_FILE,
+    Run,
+    create_run,
+    load_run,
+    require_run_folder,
+    save_run,
+)
+from burg_drake.evaluation.table import TableFormat, require_writer, write_table
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.engine import ENGINES, Engine, engine_preset
+from burg_drake.station.station import Station, load_station
+
+
+def evaluate(
+    scene: Scene | str | Path,
+    station: Station | str | Path,
+    out: str | Path,
+    *,
+    grasps_per_object: int = 100,
+    grasps: Mapping[str, GraspSet] | None = None,
+    engine: Engine | str = ENGINES["standard"],
+    seed: int = 0,
+    workers: int | None = None,
+    table: TableFormat = "csv",
+    reach: bool = True,
+    progress: bool | Listener = True,
+) -> Run:
+    """Judges grasps and writes a run.
+
+    Results do not depend on the number of workers or on the order in which they finish. A grasp
+    that Drake cannot simulate ends as `simulation_failed`, and the others go on. An interrupted
+    call loses nothing that was judged; the same call goes on from there, and returns at once when
+    nothing is left to do.
+
+    Args:
+        scene, station: as loaded, or references for `load_scene` and `load_station`.
+        out: folder of the run; made if need be.
+        grasps_per_object: antipodal grasps to sample for each free instance.
+        grasps: the user's own grasps in the object frame, by instance; nothing is sampled then.
+        engine: how trials are stepped; an engine or the name of a preset.
+        seed: of the sampling.
+        workers: number of processes; as many as there are processors if None.
+        table: format of the results file.
+        reach: whether to ask if the arm reaches; without an arm in the station it is not asked.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Returns:
+        The complete run. Its `failures` lists grasps that could not be simulated.
+
+    Raises:
+        InvalidInputError: bad argument, unsound scene, unwritable folder, or a folder that holds
+            another run or is being written.
+        UnknownNameError: a reference to something that does not exist.
+        MissingDependencyError: Parquet without pyarrow.
+        SimulationError: the simulation of the scene cannot be built.
+    """
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    station = station if isinstance(station, Station) else load_station(station)
+    engine = engine if isinstance(engine, Engine) else engine_preset(engine)
+    workers = default_workers() if workers is None else workers
+    if workers < 1:
+        raise InvalidInputError(f"workers is {workers}; give 1 or more")
+    require_writer(table)
+    folder = Path(out)
+    require_run_folder(folder)
+    if not (folder / RUN_FILE).exists():
+        _require_sound(scene, station)
+    reach = reach and station.document.arm is not None
+    with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
+        run = _open(
+            folder,
+            scene,
+            station,
+            grasps,
+            grasps_per_object,
+            _document(folder, scene, station, engine, seed=seed, reach=reach, table=table),
+            reporter,
+        )
+        make_judge = StationJudgeFactory(scene, station, engine, reach)
+        run = _judge(run, make_judge, journal, workers, reporter)
+        return _finish(run, table)
+
+
+def _document(
+    folder: Path,
+    scene: Scene,
+    station: Station,
+    engine: Engine,
+    *,
+    seed: int,
+    reach: bool,
+    table: TableFormat,
+) -> RunDocument:
+    """What this call asks for; the grasps are filled in later."""
+    from burg_drake.motion.reach import ReachSettings
+    from burg_drake.simulation.hand_trial import TrialSettings
+
+    instances = [*scene.instances.values(), *scene.background.values()]
+    library = portable_reference(scene.library.root, folder)
+    return RunDocument(
+        command=_command(),
+        scene=Input(
+            name=scene.name, path=input_reference(scene.path, "scenes"), content=scene.content
+        ),
+        station=Input(
+            name=station.name,
+            path=input_reference(station.path, "stations"),
+            content=station.content,
+        ),
+        library=Library(
+            name=scene.library.name,
+            path=library if library.startswith(PACKAGE_URI) else str(scene.library.root.resolve()),
+            objects={i.object: scene.library.entry(i.object).build for i in instances},
+        ),
+        grasps=Grasps(origin="sampled", count=0, objects={}, content=""),
+        engine=engine,
+        trial=numbers(TrialSettings()),
+        reach=reach,
+        arm=numbers(ReachSettings()) if reach else {},
+        seed=seed,
+        table=table,
+        versions=software_versions(),
+    )
+
+
+def _open(
+    folder: Path,
+    scene: Scene,
+    station: Station,
+    grasps: Mapping[str, GraspSet] | None,
+    grasps_per_object: int,
+    document: RunDocument,
+    reporter: Reporter,
+) -> Run:
+    """Goes on with the run in the folder, or begins a new one there."""
+    candidates: Candidates | None = None
+    per_object = None
+    if grasps is not None:
+        candidates = given_candidates(scene, grasps)
+        document = _with_grasps(document, scene, candidates, None, 0.0)
+    else:
+        per_object = grasps_per_object
+        document = replace(document, grasps=replace(document.grasps, per_object=per_object))
+    if (folder / RUN_FILE).exists():
+        run = load_run(folder)
+        require_same_run(folder, run.document, document)
+        return run
+    if candidates is None:
+        reporter.show(Progress("sampling"))
+        start = time.process_time()
+        candidates = sample_candidates(scene, station, grasps_per_object, document.seed)
+        cpu = time.process_time() - start
+        document = _with_grasps(document, scene, candidates, per_object, cpu)
+    return create_run(folder, document, scene, station, candidates)
+
+
+def _with_grasps(
+    document: RunDocument,
+    scene: Scene,
+    candidates: Candidates,
+    per_object: int | None,
+    cpu: float,
+) -> RunDocument:
+    counts = Counter({scene.instance(name).object: 0 for name in scene.instances})
+    counts.update(scene.instance(name).object for name in candidates.instance.tolist())
+    return replace(
+        document,
+        grasps=Grasps(
+            origin="given" if per_object is None else "sampled",
+            per_object=per_object,
+            count=len(candidates),
+            objects=dict(counts),
+            content=candidates.content,
+            cpu=cpu,
+        ),
+    )
+
+
+def _require_sound(scene: Scene, station: Station) -> None:
+    from burg_drake.station.check import require_sound_scene
+
+    require_sound_scene(scene, station)
+
+
+def _judge(
+    run: Run,
+    make_judge: StationJudgeFactory,
+    journal: Journal,
+    workers: int,
+    reporter: Reporter,
+) -> Run:
+    """Judges what is left and keeps each verdict at once; returns the run as it is then."""
+    open_grasps = [c for c in run.candidates if c.id not in run.verdicts]
+    if not open_grasps:
+        return run
+    done, total = len(run.candidates) - len(open_grasps), len(run.candidates)
+    outcomes = Counter(v.outcome for v in run.verdicts.values())
+    event = Progress("starting", done, total, before=done, outcomes=outcomes)
+    reporter.show(event)
+    sessions = run.document.sessions
+    session = Session(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
+    save_run(replace(run, document=replace(run.document, sessions=(*sessions, session))))
+    begun = first = time.monotonic()
+    try:
+        with closing(judge_all(open_grasps, make_judge, workers=workers)) as judged:
+            for candidate, verdict in judged:
+                journal.append(candidate.id, verdict)
+                outcomes[verdict.outcome] += 1
+                done += 1
+                if event.phase == "starting":  # the pace is that of judging alone
+                    event, first = replace(event, phase="judging", before=done), time.monotonic()
+                reporter.show(replace(event, done=done, elapsed=time.monotonic() - first))
+    finally:
+        seconds = round(time.monotonic() - begun, 3)
+        session = replace(session, judged=done - total + len(open_grasps), seconds=seconds)
+        document = replace(run.document, sessions=(*sessions, session))
+        run = save_run(Run(run.path, document))
+    return run
+
+
+def _finish(run: Run, table: TableFormat) -> Run:
+    """Writes table and report, unless they are there already."""
+    if run.document.table != table:
+        run = save_run(Run(run.path, replace(run.document, table=table)))
+    journal = run.path / JOURNAL_FILE
+    for path, write in ((run.table_path, _write_table), (run.report_path, write_report)):
+        if not path.exists() or path.stat().st_mtime_ns < journal.stat().st_mtime_ns:
+            write(run)
+    return run
+
+
+def _write_table(run: Run) -> None:
+    write_table(run.table_path, run.results, asdict(run.document))
+
+
+def _command() -> str:
+    """The command that is running, as one can type it again."""
+    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
+    return shlex.join([program, *sys.argv[1:]])

@@ -1,0 +1,236 @@
+"""Judges candidates in worker processes, in any order, surviving the death of workers.
+
+A grasp that ends its worker (a crash inside Drake) is tried once more, alone, in a fresh process;
+when that dies too, the grasp's outcome is `simulation_failed` and the others go on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, Pipe, wait
+
+from burg_drake.core.errors import InvalidInputError, SimulationError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import Judge, Verdict
+from burg_drake.evaluation.worker import Begins, Dying, Judged, Message, Ready, Task, Unable
+
+TASK_SIZE = 8
+"""Grasps handed out at a time: few enough that workers finish together."""
+HOPELESS = 10
+"""So many deaths in a row, with nothing judged in between, are not the grasps' fault."""
+FAREWELL = 5.0
+"""Time that an idle worker is given to end by itself [s]."""
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
+}
+"""Environment of a worker: parallelism is in the processes, and sums keep their order."""
+
+
+def default_workers() -> int:
+    """Number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def judge_all(
+    candidates: Sequence[Candidate], make_judge: Callable[[], Judge], *, workers: int | None = None
+) -> Generator[tuple[Candidate, Verdict], None, None]:
+    """Judges grasps in parallel.
+
+    Args:
+        candidates: the grasps.
+        make_judge: builds the judge, called once in each worker; pickled by reference, hence an
+            instance of an importable class or an importable function.
+        workers: number of processes; as many as there are processors if None.
+
+    Yields:
+        Each candidate with its verdict, in the order of completion. Closing the iterator ends the
+        workers.
+
+    Raises:
+        InvalidInputError: workers is below 1.
+        BurgError: the judge cannot be built.
+        SimulationError: workers keep dying without having judged anything.
+    """
+    count = default_workers() if workers is None else workers
+    if count < 1:
+        raise InvalidInputError(f"workers is {count}; give 1 or more")
+    pool = _Pool(make_judge, candidates)
+    try:
+        yield from pool.run(min(count, len(pool.todo)))
+    except BaseException:
+        pool.kill()
+        raise
+    pool.dismiss()
+
+
+@dataclass(eq=False)
+class _Worker:
+    """A process, the pipe to it, and what it is at.
+
+    Attributes:
+        process, connection: the process and our end of the pipe.
+        first: task that is kept for it until it is ready, if any.
+        ready: whether its judge is built.
+        task: grasps that it was given and has not judged yet.
+        announces: whether it says which stage begins.
+        stage: the last one that it announced.
+        last_words: why it is about to end.
+    """
+
+    process: subprocess.Popen[bytes]
+    connection: Connection
+    first: Task | None = None
+    ready: bool = False
+    task: deque[Candidate] = field(default_factory=deque)
+    announces: bool = False
+    stage: Stage = Stage.CLEAR
+    last_words: str = ""
+
+    @property
+    def idle(self) -> bool:
+        return self.ready and not self.task
+
+    def give(self, task: Task) -> None:
+        self.task = deque(task.candidates)
+        self.announces = task.announce
+        self.send(task)
+
+    def send(self, message: object) -> None:
+        with contextlib.suppress(OSError):  # it has died; its pipe's end tells the main loop
+            self.connection.send(message)
+
+    def cause_of_death(self) -> str:
+        code = self.process.wait()
+        if code < 0:
+            return f"the worker process was ended by {signal.Signals(-code).name}"
+        return f"the worker process ended: {self.last_words or f'exit code {code}'}"
+
+
+class _Pool:
+    """Open tasks and living workers."""
+
+    def __init__(self, make_judge: Callable[[], Judge], candidates: Sequence[Candidate]) -> None:
+        self.make_judge = make_judge
+        self.todo: deque[Task] = deque(
+            Task(tuple(candidates[i : i + TASK_SIZE])) for i in range(0, len(candidates), TASK_SIZE)
+        )
+        self.workers: dict[object, _Worker] = {}
+        self.deaths_in_a_row = 0
+
+    def run(self, count: int) -> Iterator[tuple[Candidate, Verdict]]:
+        for _ in range(count):
+            self.hire()
+        while self.todo or any(w.task or w.first for w in self.workers.values()):
+            for connection in wait([w.connection for w in self.workers.values()]):
+                worker = self.workers[connection]
+                try:
+                    message: Message = worker.connection.recv()
+                except (EOFError, OSError):
+                    yield from self.bury(worker)
+                else:
+                    yield from self.hear(worker, message)
+            for worker in self.workers.values():
+                if worker.idle and self.todo:
+                    worker.give(self.todo.popleft())
+
+    def hire(self, first: Task | None = None) -> None:
+        worker = _start(self.make_judge, first)
+        self.workers[worker.connection] = worker
+
+    def hear(self, worker: _Worker, message: Message) -> Iterator[tuple[Candidate, Verdict]]:
+        match message:
+            case Unable(error):
+                raise error
+            case Dying(reason):
+                worker.last_words = reason
+            case Begins(stage):
+                worker.stage = stage
+            case Ready():
+                worker.ready = True
+                if worker.first is not None:
+                    worker.give(worker.first)
+                    worker.first = None
+            case Judged(verdict):
+                self.deaths_in_a_row = 0
+                yield worker.task.popleft(), verdict
+
+    def bury(self, worker: _Worker) -> Iterator[tuple[Candidate, Verdict]]:
+        """Deals with the death of a worker: the grasp it was at is suspect, the rest is kept."""
+        del self.workers[worker.connection]
+        worker.connection.close()
+        reason = worker.cause_of_death()
+        if not worker.ready:
+            raise SimulationError(f"cannot build the simulation: {reason}")
+        self.deaths_in_a_row += 1
+        if self.deaths_in_a_row >= HOPELESS:
+            raise SimulationError(f"{HOPELESS} worker processes in a row died: {reason}")
+        if not worker.task:
+            self.hire()
+            return
+        suspect = worker.task.popleft()
+        if worker.task:
+            self.todo.appendleft(Task(tuple(worker.task)))
+        if worker.announces:
+            self.hire()
+            yield suspect, Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
+        else:
+            self.hire(Task((suspect,), announce=True))
+
+    def dismiss(self) -> None:
+        """Lets idle workers end by themselves, and ends those that are still starting."""
+        for worker in self.workers.values():
+            if worker.ready:
+                worker.send(None)
+            else:
+                worker.process.kill()
+        for worker in self.workers.values():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                worker.process.wait(FAREWELL)
+        self.kill()
+
+    def kill(self) -> None:
+        """Ends all workers at once."""
+        for worker in self.workers.values():
+            worker.process.kill()
+        for worker in self.workers.values():
+            worker.process.wait()
+            worker.connection.close()
+        self.workers.clear()
+
+
+def _start(make_judge: Callable[[], Judge], first: Task | None) -> _Worker:
+    """Starts a worker: a fresh interpreter (Drake does not survive a fork) with our import path.
+
+    An interrupt from the keyboard reaches the whole group of processes. Workers start with it
+    blocked: the parent alone decides what it means.
+    """
+    ours, theirs = Pipe()
+    program = (
+        f"import sys; sys.path[:] = {sys.path!r};"
+        f" from burg_drake.evaluation.worker import main; main({theirs.fileno()})"
+    )
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=[theirs.fileno()],
+            env={**os.environ, **ONE_THREAD},
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    theirs.close()
+    worker = _Worker(process, ours, first)
+    worker.send(make_judge)
+    return worker

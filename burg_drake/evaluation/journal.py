@@ -1,0 +1,129 @@
+"""The journal of a run: one line of JSON a judged grasp, appended as it comes.
+
+A line is written by a single call, so that a killed run leaves whole lines and at most one torn
+one at the end, which is cut off when the run goes on.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import math
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.judge import Verdict
+
+
+class Journal:
+    """A journal opened for writing; one process at a time can hold it."""
+
+    def __init__(self, path: Path) -> None:
+        """Opens or creates the file and cuts off a torn last line.
+
+        Raises:
+            InvalidInputError: not writable, or another process is writing it.
+        """
+        self._path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self._file)
+            raise InvalidInputError(
+                f"{path.parent} is being written by another process; wait for it,"
+                " or choose another -o"
+            ) from error
+        content = path.read_bytes()
+        os.ftruncate(self._file, content.rfind(b"\n") + 1)
+
+    def append(self, id: str, verdict: Verdict) -> None:
+        """Adds a verdict.
+
+        Raises:
+            InvalidInputError: the line cannot be written, for example because the disk is full.
+        """
+        line = encode(id, verdict)
+        try:
+            written = os.write(self._file, line)
+            if written != len(line):
+                raise OSError(0, f"{written} of {len(line)} bytes fitted on the disk")
+        except OSError as error:
+            raise InvalidInputError(
+                f"cannot write {self._path}: {error.strerror}; what is in it is kept, and the same"
+                " command goes on from there"
+            ) from error
+
+    def close(self) -> None:
+        """Closes the file and lets others write it."""
+        os.close(self._file)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def read_journal(path: Path) -> dict[str, Verdict]:
+    """Verdicts by grasp id; lines that cannot be read count as not judged."""
+    verdicts: dict[str, Verdict] = {}
+    if path.exists():
+        for line in path.read_bytes().splitlines():
+            try:
+                id, verdict = decode(line)
+            except (ValueError, KeyError, TypeError, AttributeError):
+                continue
+            verdicts[id] = verdict
+    return verdicts
+
+
+def encode(id: str, verdict: Verdict) -> bytes:
+    """One line for one grasp; numbers that are not finite become null."""
+    record = {
+        "id": id,
+        "outcome": verdict.outcome.value,
+        "stage": verdict.stage.value,
+        "blocker": verdict.blocker,
+        "reason": verdict.reason,
+        "margins": {k: _finite(v) for k, v in verdict.margins.items()},
+        "q_grasp": list(verdict.q_grasp),
+        "q_pregrasp": list(verdict.q_pregrasp),
+        "cpu": {stage.value: round(seconds, 6) for stage, seconds in verdict.cpu.items()},
+    }
+    return json.dumps(record, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+def decode(line: bytes) -> tuple[str, Verdict]:
+    """Reads a line.
+
+    Raises:
+        ValueError, KeyError, TypeError, AttributeError: it was not written by `encode`.
+    """
+    record: dict[str, Any] = json.loads(line)
+    return str(record["id"]), Verdict(
+        outcome=Outcome(record["outcome"]),
+        stage=Stage(record["stage"]),
+        blocker=record["blocker"],
+        reason=record["reason"],
+        margins={k: math.nan if v is None else v for k, v in record["margins"].items()},
+        q_grasp=tuple(record["q_grasp"]),
+        q_pregrasp=tuple(record["q_pregrasp"]),
+        cpu={Stage(stage): seconds for stage, seconds in record["cpu"].items()},
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,112 @@
+"""Sections of the report about counts: outcomes by object, stages, cost."""
+
+from __future__ import annotations
+
+import math
+
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.report.charts import Part, funnel, interval_mark, legend, stacked_bar
+from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
+from burg_drake.evaluation.report.style import STYLES
+from burg_drake.evaluation.summary import Group, Summary, duration, percent, rounded
+from burg_drake.visualization.palette import GROUPS
+
+
+def objects_section(summary: Summary) -> Html:
+    """Stacked outcomes and success share of each object."""
+    head = ["object", "grasps", "outcomes", "lifted / executed", "share with 95 % interval"]
+    rows = [_object_row(g, "") for g in summary.objects]
+    if len(summary.objects) > 1:
+        rows.append(_object_row(summary.total, "total"))
+    present = [g for g in GROUPS if any(summary.total.outcomes[o] for o in g.outcomes)]
+    return section(
+        "Outcomes by object",
+        "What became of all grasps. The share counts only grasps whose trial was executed.",
+        table(head, rows, numbers=(1, 3)),
+        legend([(STYLES[g.name], g.name) for g in present]),
+    )
+
+
+def _object_row(group: Group, style: str) -> Html:
+    parts = []
+    for outcomes in GROUPS:
+        inside = {o: group.outcomes[o] for o in outcomes.outcomes if group.outcomes[o]}
+        detail = ", ".join(f"{count} {label(o)}" for o, count in inside.items())
+        tip = f"{outcomes.name}: {detail}"
+        parts.append(Part(sum(inside.values()), STYLES[outcomes.name], tip))
+    share: Child = element("span", "nothing executed", class_="faint")
+    if group.executed:
+        mark = interval_mark(group.lifted / group.executed, *group.interval)
+        share = join(mark, f" {percent(group.lifted / group.executed)}")
+    return element(
+        "tr",
+        element("th", group.name, scope="row"),
+        element("td", group.judged, class_="number"),
+        element("td", stacked_bar(parts, group.judged), class_="wide"),
+        element("td", f"{group.lifted} / {group.executed}", class_="number"),
+        element("td", share, style="white-space:nowrap"),
+        class_=style or None,
+    )
+
+
+def funnel_section(summary: Summary) -> Html:
+    """How many grasps pass each stage."""
+    total = summary.total
+    names = [n for n in total.funnel if summary.reach or n != "reachable"]
+    counts = {name: total.funnel[name] for name in names}
+    why = {
+        "clear": ("collision_",),
+        "reachable": ("no_ik", "arm_collision"),
+        "executed": ("simulation_failed",),
+        "lifted": ("no_contact", "one_finger", "closed_empty", "slipped", "dropped"),
+    }
+    losses = [_loss(total, why[name]) for name in names[1:]]
+    return section(
+        "Stages",
+        "Grasps that pass each stage, and what stopped the others.",
+        funnel(counts, losses),
+    )
+
+
+def _loss(total: Group, prefixes: tuple[str, ...]) -> str:
+    lost = [(o, n) for o, n in total.outcomes.items() if o.value.startswith(prefixes)]
+    return ", ".join(f"{n} {label(o)}" for o, n in sorted(lost, key=lambda pair: -pair[1]))
+
+
+def count_section(summary: Summary) -> Html:
+    """Matrix of objects and outcomes."""
+    seen = [o for o in Outcome if summary.total.outcomes[o]]
+    groups = [*summary.objects, *([summary.total] if len(summary.objects) > 1 else [])]
+    rows = []
+    for group in groups:
+        cells = [
+            element("td", group.outcomes[o] or "·", class_=_count_style(group.outcomes[o]))
+            for o in seen
+        ]
+        style = "total" if group is summary.total else None
+        rows.append(element("tr", element("th", group.name, scope="row"), *cells, class_=style))
+    head = ["object", *(label(o) for o in seen)]
+    matrix = table(head, rows, numbers=tuple(range(1, len(head))), style="matrix")
+    return section("Counts", "Every grasp ends with exactly one outcome.", matrix)
+
+
+def _count_style(count: int) -> str:
+    return "number" if count else "number zero"
+
+
+def cost_section(summary: Summary) -> Html:
+    """CPU time by stage."""
+    head = ["stage", "grasps", "CPU time", "median", "grasps per CPU second"]
+    rows = []
+    for cost in summary.costs:
+        rate = "-" if math.isnan(cost.rate) else rounded(cost.rate)
+        cells: list[Child] = [cost.grasps, duration(cost.seconds), duration(cost.median), rate]
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))
+    text = "CPU time of the worker processes, without their start."
+    return section("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
+
+
+def label(outcome: Outcome) -> str:
+    """An outcome for people."""
+    return outcome.value.replace("_", " ")

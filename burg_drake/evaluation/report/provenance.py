@@ -1,0 +1,99 @@
+"""The report's last section: how to get the same results again, and what made them."""
+
+from __future__ import annotations
+
+import shlex
+
+from burg_drake.evaluation.report.markup import Html, command, element, join
+from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
+from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
+from burg_drake.evaluation.summary import duration
+
+
+def provenance(run: Run) -> Html:
+    """Command, inputs with their hashes, versions, sessions and files."""
+    facts = [*_inputs(run.document), *_settings(run.document), *_sessions(run.document)]
+    return element(
+        "section",
+        element("h2", "How to reproduce"),
+        element("p", _text(run.document)),
+        command(reproduce_command(run)),
+        element(
+            "dl",
+            *(join(element("dt", name), element("dd", fact)) for name, fact in facts),
+            element("dt", "files"),
+            element(
+                "dd",
+                f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
+                f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)",
+            ),
+            class_="facts",
+        ),
+    )
+
+
+def reproduce_command(run: Run) -> str:
+    """The command line that makes this run; for given grasps their file is among the run's."""
+    document = run.document
+    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
+    if document.grasps.per_object is None:
+        words += ["--grasps", str(run.path / GRASPS_FILE)]
+    else:
+        words += ["--grasps-per-object", str(document.grasps.per_object)]
+    words += ["--engine", document.engine.name, "--seed", str(document.seed)]
+    words += [] if document.reach else ["--no-reach"]
+    words += [] if document.table == "csv" else ["--table", document.table]
+    return shlex.join([*words, "-o", str(run.path)])
+
+
+def _text(document: RunDocument) -> str:
+    return (
+        "Results follow from the inputs, the seed and the versions below; not from the number of"
+        " workers or the order of their work. In a folder that is complete the command returns at"
+        " once; give another -o to judge again."
+    )
+
+
+def _inputs(document: RunDocument) -> list[tuple[str, str]]:
+    library = document.library
+    grasps = document.grasps
+    return [
+        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("object library", f"{library.name} ({library.path})"),
+        *(
+            (f"object {name}", f"build {build[:HASH_DIGITS]}")
+            for name, build in library.objects.items()
+        ),
+        ("grasps", f"{grasps.count} {grasps.origin}, content {grasps.content[:HASH_DIGITS]}"),
+    ]
+
+
+def _settings(document: RunDocument) -> list[tuple[str, str]]:
+    engine = document.engine
+    settings = (
+        f"{engine.name}: step {duration(engine.time_step)}, {engine.contact_approximation},"
+        f" {engine.contact_model.replace('_', ' ')}, {engine.contact_surface} surfaces"
+    )
+    return [
+        ("engine", settings),
+        ("trial", _listed(document.trial)),
+        ("arm", _listed(document.arm) if document.reach else "not asked"),
+        ("seed", str(document.seed)),
+        *document.versions.items(),
+    ]
+
+
+def _listed(settings: dict[str, float]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
+
+
+def _sessions(document: RunDocument) -> list[tuple[str, str]]:
+    lines = []
+    for session in document.sessions:
+        judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
+        took = "" if session.seconds is None else f" in {duration(session.seconds)}"
+        plural = "" if session.workers == 1 else "s"
+        text = f"{session.started}: {judged}{took}, {session.workers} worker{plural}"
+        lines.append(("judged", text))
+    return [*lines, ("command", document.command)]

@@ -1,0 +1,208 @@
+"""The document of a run, `run.yaml`: what was judged, how, with which versions, and when."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal
+
+from burg_drake import __version__
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.resources import PACKAGE_URI, data_root
+from burg_drake.evaluation.table import TableFormat
+from burg_drake.station.engine import Engine
+
+HASH_DIGITS = 12
+"""Digits of a hash that people get to see."""
+SHIPPED = ("models", "scenes", "stations")
+"""Folders of the package's data."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Input:
+    """A document that went into the run; a copy lies in the run's folder.
+
+    Attributes:
+        name: its name.
+        path: where it was, or the name of a built-in one.
+        content: hash of all that matters in it and behind it (objects, robot models).
+    """
+
+    name: str
+    path: str
+    content: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Library:
+    """The object library; it is not copied.
+
+    Attributes:
+        name: its name.
+        path: its folder, absolute, or as package://.
+        objects: build hash of each object in the scene.
+    """
+
+    name: str
+    path: str
+    objects: dict[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grasps:
+    """The candidates; they are in grasps.npz.
+
+    Attributes:
+        origin: sampled here, or given by the user.
+        per_object: how many were asked for, if sampled.
+        count: how many there are.
+        objects: how many there are by object; 0 where an object has none.
+        content: hash of them all.
+        cpu: CPU time of the sampling [s].
+    """
+
+    origin: Literal["sampled", "given"]
+    per_object: int | None = None
+    count: int
+    objects: dict[str, int]
+    content: str
+    cpu: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Session:
+    """One call that worked on the run; there are several if it was interrupted.
+
+    Attributes:
+        started: date and time, ISO 8601 with time zone.
+        workers: number of worker processes.
+        judged: grasps judged in it; unknown if it was killed.
+        seconds: wall time it took; unknown if it was killed.
+    """
+
+    started: str
+    workers: int
+    judged: int | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunDocument:
+    """Schema of run.yaml.
+
+    Attributes:
+        command: the command line, or the Python script, that began the run.
+        scene, station, library, grasps: what was judged.
+        engine: how trials were stepped.
+        trial: settings of the trial's phases.
+        reach: whether the arm was asked.
+        arm: settings of the search for arm configurations.
+        seed: of the sampling.
+        table: format of the results file.
+        versions: of the software and the machine.
+        sessions: who worked on it when.
+    """
+
+    version: int = 1
+    command: str = ""
+    scene: Input
+    station: Input
+    library: Library
+    grasps: Grasps
+    engine: Engine
+    trial: dict[str, float] = field(default_factory=dict)
+    reach: bool
+    arm: dict[str, float] = field(default_factory=dict)
+    seed: int
+    table: TableFormat = "csv"
+    versions: dict[str, str] = field(default_factory=dict)
+    sessions: tuple[Session, ...] = ()
+
+
+def software_versions() -> dict[str, str]:
+    """Versions of what decides about results, and of what may."""
+    return {
+        "burg_drake": __version__,
+        "drake": _installed("drake"),
+        "numpy": _installed("numpy"),
+        "trimesh": _installed("trimesh"),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+    }
+
+
+def identity(document: RunDocument) -> dict[str, str]:
+    """What two calls must have in common to work on the same run, in words, by topic."""
+    grasps, engine = document.grasps, document.engine
+    settings = content_hash(vars(engine), document.trial, document.arm)[:HASH_DIGITS]
+    return {
+        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
+        "station": f"content {document.station.content[:HASH_DIGITS]}",
+        "engine": engine.name,
+        "settings of engine, trial and arm": settings,
+        "reach": "on" if document.reach else "off",
+        "grasps": (
+            f"{grasps.per_object} an object"
+            if grasps.origin == "sampled"
+            else f"given, content {grasps.content[:HASH_DIGITS]}"
+        ),
+        "seed": str(document.seed),
+        "burg_drake": document.versions.get("burg_drake", ""),
+        "drake": document.versions.get("drake", ""),
+    }
+
+
+def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> None:
+    """Refuses to go on with a run that is not the one asked for.
+
+    Raises:
+        InvalidInputError: names every difference.
+    """
+    old, new = identity(there), identity(here)
+    if old["engine"] != new["engine"] or old["reach"] != new["reach"]:
+        del old["settings of engine, trial and arm"]  # they differ too, which says nothing more
+    differences = [f"{k} is {old[k]} there, {new[k]} here" for k in old if old[k] != new[k]]
+    if differences:
+        raise InvalidInputError(
+            f"{folder} holds another run ({'; '.join(differences)}); choose another -o, or"
+            " delete it"
+        )
+
+
+def portable_reference(path: Path, folder: Path) -> str:
+    """How a document in `folder` refers to a file or folder: package:// for what the package
+    ships, else the relative path."""
+    path = path.resolve()
+    for name in SHIPPED:
+        shipped = data_root() / name
+        if path.is_relative_to(shipped):
+            return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
+    return os.path.relpath(path, folder.resolve())
+
+
+def input_reference(path: Path, kind: str) -> str:
+    """How a user refers to a document: the bare name of a built-in one, else the path."""
+    builtin = path.resolve().parent == (data_root() / kind).resolve()
+    return path.stem if builtin else str(path)
+
+
+def numbers(settings: object) -> dict[str, float]:
+    """The numbers of a settings dataclass by name; those of a tuple are counted from 1."""
+    found: dict[str, float] = {}
+    for name, value in vars(settings).items():
+        if isinstance(value, tuple):
+            found |= {f"{name}_{k}": float(item) for k, item in enumerate(value, 1)}
+        else:
+            found[name] = float(value)
+    return found
+
+
+def _installed(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:  # a Drake that was built from source has no metadata
+        return "unknown"

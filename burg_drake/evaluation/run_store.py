@@ -1,0 +1,262 @@
+"""The folder of a run: what lies in it, and how to read it back.
+
+run.yaml                     what was judged, how, with which versions, and when
+scene.yaml, station.yaml     copies of the documents
+grasps.npz                   the candidates
+journal.jsonl                one line a judged grasp, as it came; this is the record
+results.csv or .parquet      the table for other tools, made from the journal at the end
+report.html                  the report for people
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import difflib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.files import writable_folder
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import load_document, save_document
+from burg_drake.evaluation.candidates import Candidate, Candidates
+from burg_drake.evaluation.journal import read_journal
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.run_document import RunDocument, portable_reference
+from burg_drake.evaluation.table import Columns, make_columns
+from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.scene.scene import Scene, SceneDocument, save_scene
+from burg_drake.station.station import Station, StationDocument, load_station
+
+RUN_FILE = "run.yaml"
+SCENE_FILE = "scene.yaml"
+STATION_FILE = "station.yaml"
+GRASPS_FILE = "grasps.npz"
+JOURNAL_FILE = "journal.jsonl"
+REPORT_FILE = "report.html"
+FILES = (RUN_FILE, SCENE_FILE, STATION_FILE, GRASPS_FILE, JOURNAL_FILE, REPORT_FILE)
+RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
+
+SLIP_SCALE = 0.005
+TILT_SCALE = 0.1
+PUSH_SCALE = 0.01
+"""A slip of 5 mm, a tilt of 0.1 rad and a push of 10 mm weigh the same in `Run.best`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run on disk, complete or not.
+
+    Attributes:
+        path: its folder.
+        document: contents of run.yaml.
+    """
+
+    path: Path
+    document: RunDocument
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """All grasps of the run."""
+        return Candidates.load(self.path / GRASPS_FILE)
+
+    @cached_property
+    def verdicts(self) -> dict[str, Verdict]:
+        """What the journal holds, by grasp id."""
+        return read_journal(self.path / JOURNAL_FILE)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every grasp is judged."""
+        return all(id in self.verdicts for id in self.candidates.id)
+
+    @property
+    def table_path(self) -> Path:
+        """The results file."""
+        return self.path / f"results.{self.document.table}"
+
+    @property
+    def report_path(self) -> Path:
+        """The report."""
+        return self.path / REPORT_FILE
+
+    @cached_property
+    def results(self) -> Columns:
+        """Judged grasps as columns, see `evaluation.table`, in the order of the candidates."""
+        return make_columns(
+            self.candidates,
+            self.verdicts,
+            joints=self._joints,
+            seed=self.document.seed,
+            engine=self.document.engine.name,
+        )
+
+    @property
+    def failures(self) -> list[str]:
+        """Ids of the grasps that could not be simulated."""
+        return self.results["id"][self.results["outcome"] == Outcome.SIMULATION_FAILED].tolist()
+
+    def row(self, id: str) -> dict[str, Any]:
+        """One row of the results.
+
+        Raises:
+            UnknownNameError: no judged grasp goes by this id; the message names the nearest.
+        """
+        (found,) = np.nonzero(self.results["id"] == id)
+        if not len(found):
+            raise self._unknown(id)
+        return {name: values[found[0]].item() for name, values in self.results.items()}
+
+    def candidate(self, id: str) -> Candidate:
+        """One grasp, judged or not, with its pose as it was judged, bit for bit.
+
+        Raises:
+            UnknownNameError: the run has no such grasp; the message names the nearest.
+        """
+        found = next((c for c in self.candidates if c.id == id), None)
+        if found is None:
+            raise self._unknown(id)
+        return found
+
+    def best(self, count: int = 1) -> list[str]:
+        """Ids of the lifted grasps that disturbed least, best first; fewer if fewer were lifted.
+
+        Ranked by slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm; equal ones by id.
+        """
+        columns = self.results
+        penalty = (
+            columns["slip"] / SLIP_SCALE
+            + columns["tilt"] / TILT_SCALE
+            + columns["others_moved"] / PUSH_SCALE
+        )
+        lifted = columns["outcome"] == Outcome.LIFTED
+        ranked = sorted(zip(np.nan_to_num(penalty[lifted]), columns["id"][lifted], strict=True))
+        return [str(id) for _, id in ranked[:count]]
+
+    def scene(self) -> Scene:
+        """The scene as it was judged.
+
+        Raises:
+            InvalidInputError: the object library is gone, or has changed since.
+        """
+        path = self.path / SCENE_FILE
+        document = load_document(path, SceneDocument)
+        scene = Scene(document, self._library(document.library), path)
+        built = self.document.library.objects
+        changed = [name for name in built if scene.library.content.get(name) != built[name]]
+        if changed or scene.content != self.document.scene.content:
+            what = f"{', '.join(changed)} in library {scene.library.root}" if changed else path
+            raise InvalidInputError(
+                f"{what} changed since {self.path} was judged; restore it, or evaluate again"
+            )
+        return scene
+
+    def station(self) -> Station:
+        """The station as it was judged.
+
+        Raises:
+            BurgError: a file that it needs is gone, or has changed since.
+        """
+        station = load_station(self.path / STATION_FILE)
+        if station.content != self.document.station.content:
+            raise InvalidInputError(
+                f"{self.path / STATION_FILE}, its hand or a robot model changed since the run;"
+                " restore it, or evaluate again"
+            )
+        return station
+
+    @property
+    def _joints(self) -> int:
+        """Number of the arm's joints, if it was asked."""
+        arm = load_document(self.path / STATION_FILE, StationDocument).arm
+        return len(arm.home) if self.document.reach and arm is not None else 0
+
+    def _library(self, reference: str) -> ObjectLibrary:
+        """The library, relative to the run's folder, or where it was then."""
+        recorded = self.document.library.path
+        for place, base in ((reference, self.path), (recorded, None)):
+            with contextlib.suppress(UnknownNameError):
+                return load_library(place, base)
+        raise InvalidInputError(
+            f"{self.path / SCENE_FILE}: the object library {reference} is gone, and is not at"
+            f" {recorded} either; write where it is into this file"
+        )
+
+    def _unknown(self, id: str) -> UnknownNameError:
+        close = difflib.get_close_matches(id, self.candidates.id, n=3, cutoff=0.3)
+        hint = f"did you mean {' or '.join(close)}? " if close else ""
+        return UnknownNameError(
+            f"{self.path} has no judged grasp {id!r}; {hint}All ids are in {self.table_path.name}"
+        )
+
+
+def load_run(path: str | Path) -> Run:
+    """Reads a run, complete or not.
+
+    Args:
+        path: its folder.
+
+    Raises:
+        InvalidInputError: there is no run.
+        DocumentError: its run.yaml does not fit the schema.
+    """
+    path = Path(path)
+    if not (path / RUN_FILE).exists():
+        raise InvalidInputError(
+            f"{path} holds no run ({RUN_FILE} is missing); burg-drake evaluate writes runs"
+        )
+    return Run(path, load_document(path / RUN_FILE, RunDocument))
+
+
+def create_run(
+    folder: Path, document: RunDocument, scene: Scene, station: Station, candidates: Candidates
+) -> Run:
+    """Writes a new run without results; run.yaml comes last and makes it one.
+
+    Raises:
+        InvalidInputError: the folder cannot be written.
+    """
+    writable_folder(folder)
+    library = portable_reference(scene.library.root, folder)
+    save_scene(dataclasses.replace(scene.document, library=library), folder / SCENE_FILE)
+    save_document(portable_station(station, folder), folder / STATION_FILE)
+    candidates.save(folder / GRASPS_FILE)
+    return save_run(Run(folder, document))
+
+
+def save_run(run: Run) -> Run:
+    """Writes run.yaml."""
+    save_document(run.document, run.path / RUN_FILE, RUN_HEADER)
+    return run
+
+
+def require_run_folder(folder: Path) -> None:
+    """Refuses a folder with other people's files in it.
+
+    Raises:
+        InvalidInputError: it cannot be written, or something else is in it.
+    """
+    writable_folder(folder)
+    own = {*FILES, "results.csv", "results.parquet"}
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    foreign = sorted(names - own)
+    if foreign and not (folder / RUN_FILE).exists():
+        raise InvalidInputError(
+            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another -o"
+        )
+
+
+def portable_station(station: Station, folder: Path) -> StationDocument:
+    """The station's document for a copy in `folder`: references that hold there, too."""
+    document = station.document
+    hand = resolve(document.hand, "models/hands", station.path.parent)
+    arm = document.arm
+    if arm is not None and station.arm_model is not None:
+        arm = dataclasses.replace(arm, model=portable_reference(station.arm_model, folder))
+    return dataclasses.replace(document, hand=portable_reference(hand, folder), arm=arm)

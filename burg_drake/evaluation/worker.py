@@ -1,0 +1,103 @@
+"""The main loop of a worker process: build a judge once, then judge what comes.
+
+Workers are plain interpreters that talk over a pipe (see `executors`): unlike multiprocessing's
+they never import the user's main module, so that scripts and notebooks need no special guard.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+from burg_drake.core.errors import BurgError, SimulationError
+from burg_drake.core.outcome import Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import Judge, Verdict, judge_grasp, one_line
+
+
+@dataclass(frozen=True)
+class Task:
+    """Work for a worker.
+
+    Attributes:
+        candidates: to be judged in this order.
+        announce: say which stage begins, so that its death can be told from the last word.
+    """
+
+    candidates: tuple[Candidate, ...]
+    announce: bool = False
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The judge is built."""
+
+
+@dataclass(frozen=True)
+class Unable:
+    """The judge cannot be built; no other worker could."""
+
+    error: BurgError
+
+
+@dataclass(frozen=True)
+class Begins:
+    """A stage begins."""
+
+    stage: Stage
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The next grasp of the task is judged."""
+
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Dying:
+    """Last words."""
+
+    reason: str
+
+
+Message = Ready | Unable | Begins | Judged | Dying
+
+
+def main(handle: int) -> None:
+    """Runs a worker until the parent closes the pipe.
+
+    Args:
+        handle: file descriptor of this end of the pipe.
+    """
+    # A filter, because importing pydrake sets the logger's level back.
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
+    connection = Connection(handle)
+    try:
+        _serve(connection)
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        pass  # the parent is gone, and nobody is left to tell
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        connection.send(Dying(one_line(error)))
+    # Destructors of large diagrams take time and nothing is left to be written.
+    os._exit(0)
+
+
+def _serve(connection: Connection) -> None:
+    make_judge: Callable[[], Judge] = connection.recv()
+    try:
+        judge = make_judge()
+    except BurgError as error:
+        connection.send(Unable(error))
+        return
+    except Exception as error:
+        connection.send(Unable(SimulationError(f"cannot build the simulation: {one_line(error)}")))
+        return
+    connection.send(Ready())
+    while (task := connection.recv()) is not None:
+        for candidate in task.candidates:
+            announce = (lambda s: connection.send(Begins(s))) if task.announce else None
+            connection.send(Judged(judge_grasp(judge, candidate, announce)))

@@ -1,0 +1,131 @@
+"""Judges at the seam of the simulation: verdicts follow from the grasp's id alone.
+
+They live in a module of their own because worker processes import them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import Decision
+
+
+def number(id: str) -> int:
+    """A number in [0, 100) that follows from an id."""
+    return int(hashlib.md5(id.encode()).hexdigest(), 16) % 100
+
+
+def expected(id: str) -> Outcome:
+    """The outcome that `KnownJudge` gives."""
+    n = number(id)
+    if n < 30:
+        return Outcome.COLLISION_TABLE
+    if n < 45:
+        return Outcome.NO_IK
+    return Outcome.SLIPPED if n < 60 else Outcome.LIFTED
+
+
+@dataclass(frozen=True)
+class KnownJudge:
+    """Judges by `expected`; writes a line to `log` for each grasp it is asked about."""
+
+    log: Path | None = None
+    pause: float = 0.0
+
+    @property
+    def stages(self) -> Sequence[tuple[Stage, Callable[[Candidate], Decision]]]:
+        return (
+            (Stage.CLEAR, self.clear),
+            (Stage.REACHABLE, self.reach),
+            (Stage.EXECUTED, self.execute),
+        )
+
+    def clear(self, grasp: Candidate) -> Decision:
+        time.sleep(self.pause)
+        if self.log is not None:
+            with self.log.open("a") as file:
+                file.write(f"{grasp.id}\n")
+        outcome = expected(grasp.id)
+        if outcome is Outcome.COLLISION_TABLE:
+            return Decision(outcome, "table", margins={"overlap": number(grasp.id) / 3e3})
+        return Decision(margins={"overlap": 0.0})
+
+    def reach(self, grasp: Candidate) -> Decision:
+        if expected(grasp.id) is Outcome.NO_IK:
+            return Decision(Outcome.NO_IK)
+        q = tuple(number(f"{grasp.id}{k}") / 33 for k in range(7))
+        return Decision(q_grasp=q, q_pregrasp=q)
+
+    def execute(self, grasp: Candidate) -> Decision:
+        n = number(grasp.id)
+        margins = {"slip": n / 7e4, "tilt": n / 900, "pad_force": 40 - n / 30, "others_moved": 0.0}
+        return Decision(expected(grasp.id), margins=margins)
+
+
+@dataclass(frozen=True)
+class CrashingJudge(KnownJudge):
+    """Ends its process on some grasps, in the stage `executed`.
+
+    Attributes:
+        how: by grasp id: `segfault`, `exit`, `error`, or `once`, which crashes only as long as the
+            file `log` does not exist.
+    """
+
+    how: tuple[tuple[str, str], ...] = ()
+
+    def execute(self, grasp: Candidate) -> Decision:
+        match dict(self.how).get(grasp.id):
+            case "segfault":
+                os.kill(os.getpid(), signal.SIGSEGV)
+            case "exit":
+                raise SystemExit("a condition of Drake failed")
+            case "error":
+                raise RuntimeError("the solver\ndid not converge")
+            case "once" if self.log is not None and not self.log.exists():
+                self.log.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+        return super().execute(grasp)
+
+    def clear(self, grasp: Candidate) -> Decision:
+        return Decision()
+
+    def reach(self, grasp: Candidate) -> Decision:
+        return Decision()
+
+
+@dataclass(frozen=True)
+class Make:
+    """A factory as `judge_all` takes it."""
+
+    judge: Any
+
+    def __call__(self) -> Any:
+        return self.judge
+
+
+def refuse() -> KnownJudge:
+    """A factory that cannot build its judge."""
+    raise InvalidInputError("no such model")
+
+
+def die() -> KnownJudge:
+    """A factory that ends the process."""
+    os.kill(os.getpid(), signal.SIGSEGV)
+    raise AssertionError
+
+
+def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause: float = 0) -> None:
+    """Replaces the simulation of `evaluate` in this process by `KnownJudge`."""
+    judge = Make(KnownJudge(log, pause))
+    setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
+    setattr("burg_drake.evaluation.cascade._require_sound", lambda *_: None)

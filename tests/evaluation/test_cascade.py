@@ -1,0 +1,249 @@
+"""`evaluate` around a known judge: the same table on any number of workers and after kills."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from known_judge import KnownJudge, Make, expected, install
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.journal import read_journal
+from burg_drake.evaluation.progress import Progress
+from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.table import read_table
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+
+def same_results(a: Run, b: Run) -> bool:
+    """Whether two tables agree in everything but time."""
+    assert list(a.results) == list(b.results)
+    names = [name for name in a.results if not name.startswith("cpu_")]
+    return all(np.array_equal(a.results[n], b.results[n], equal_nan=n not in TEXT) for n in names)
+
+
+TEXT = {"id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine"}
+
+
+def test_results_do_not_depend_on_workers(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    options = {"grasps_per_object": 20, "progress": False}
+    one = evaluate(scene, station, tmp_path / "one", workers=1, **options)
+    two = evaluate(scene, station, tmp_path / "two", workers=2, **options)
+    assert same_results(one, two)
+    assert one.complete and one.failures == []
+    assert one.results["id"].tolist() == one.candidates.id
+    assert one.results["outcome"].tolist() == [expected(id) for id in one.candidates.id]
+    other = evaluate(scene, station, tmp_path / "other", seed=1, workers=1, **options)
+    assert not same_results(one, other)
+
+
+def test_a_complete_run_returns_at_once(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    first = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
+    again = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    assert same_results(first, again)
+    assert len(again.document.sessions) == 1
+    pytest.importorskip("pyarrow")
+    parquet = evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=5, progress=False, table="parquet"
+    )
+    assert parquet.table_path.suffix == ".parquet"
+    assert read_table(parquet.table_path)["id"].tolist() == first.results["id"].tolist()
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import known_judge
+def patch(name, value):
+    module, _, attribute = name.rpartition(".")
+    __import__(module)
+    setattr(sys.modules[module], attribute, value)
+known_judge.install(patch, Path(sys.argv[2]), pause=0.02)
+from burg_drake.evaluation.cascade import evaluate
+evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, workers=2)
+"""
+
+
+def start(scene: Scene, run: Path, log: Path) -> subprocess.Popen[str]:
+    """Another process that evaluates slowly, without a guard around its main module."""
+    arguments = [Path(__file__).parent, log, scene.path, run]
+    return subprocess.Popen(
+        [sys.executable, "-c", SCRIPT, *map(str, arguments)],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for_lines(path: Path, count: int) -> None:
+    deadline = time.monotonic() + 60
+    while not path.exists() or path.read_bytes().count(b"\n") < count:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_a_killed_run_goes_on_where_it_was(
+    scene: Scene, station: Station, tmp_path: Path, monkeypatch
+) -> None:
+    journal = tmp_path / "run" / "journal.jsonl"
+    process = start(scene, tmp_path / "run", tmp_path / "first.log")
+    wait_for_lines(journal, 20)
+    process.kill()
+    process.communicate()
+    time.sleep(0.5)  # the workers find out by themselves
+    with journal.open("ab") as file:
+        file.write(b'{"id":"left-torn","outc')
+    before = set(read_journal(journal))
+    assert 20 <= len(before) < 120
+    partial = load_run(tmp_path / "run")
+    assert not partial.complete and set(partial.results["id"]) == before
+    assert partial.document.sessions[0].judged is None
+
+    install(monkeypatch.setattr, tmp_path / "second.log")
+    events: list[Progress] = []
+    run = evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=40, workers=2, progress=events.append
+    )
+    again = (tmp_path / "second.log").read_text().split()
+    assert len(again) == len(set(again)) == 120 - len(before)
+    assert not before & set(again)
+    assert events[0].done == events[0].before == len(before) and events[-1].done == 120
+    assert [s.judged for s in run.document.sessions] == [None, len(again)]
+
+    fresh = evaluate(
+        scene, station, tmp_path / "fresh", grasps_per_object=40, workers=1, progress=False
+    )
+    assert same_results(run, fresh)
+    assert read_table(run.table_path)["id"].tolist() == run.candidates.id
+
+
+def test_an_interrupt_keeps_what_is_done(scene: Scene, tmp_path: Path) -> None:
+    process = start(scene, tmp_path / "run", tmp_path / "log")
+    wait_for_lines(tmp_path / "run" / "journal.jsonl", 10)
+    os.killpg(process.pid, signal.SIGINT)  # as the terminal does
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGINT and errors.count("Traceback") == 1
+    run = load_run(tmp_path / "run")
+    assert run.document.sessions[0].judged == len(run.results["id"]) >= 10
+    assert not run.report_path.exists()
+
+
+def test_another_run_is_not_mixed_in(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    run = tmp_path / "run"
+    evaluate(scene, station, run, grasps_per_object=5, workers=1, progress=False)
+    with pytest.raises(InvalidInputError) as error:
+        evaluate(scene, station, run, grasps_per_object=6, engine="reference", progress=False)
+    assert str(error.value) == (
+        f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object"
+        " there, 6 an object here); choose another -o, or delete it"
+    )
+    with pytest.raises(InvalidInputError, match="reach is on there, off here"):
+        evaluate(scene, station, run, grasps_per_object=5, reach=False, progress=False)
+    grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
+    with pytest.raises(InvalidInputError, match="5 an object there, given, content"):
+        evaluate(scene, station, run, grasps=grasps, progress=False)
+
+
+def test_given_grasps_are_judged_in_place_of_sampled_ones(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
+    run = evaluate(scene, station, tmp_path / "run", grasps=grasps, workers=1, progress=False)
+    assert run.candidates.id == [f"bar-{grasps['bar'].id[0]}"]
+    assert run.document.grasps.objects == {"cube": 0, "bar": 1}
+    np.testing.assert_array_equal(run.candidate(run.candidates.id[0]).X_OG, np.eye(4))
+
+
+def test_no_grasps_are_a_complete_run(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    run = evaluate(scene, station, tmp_path / "run", grasps={}, progress=False)
+    assert run.complete and run.report_path.exists() and run.best() == []
+
+
+def test_failures_are_reported_and_the_others_go_on(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    from known_judge import CrashingJudge
+
+    id = evaluate(
+        scene, station, tmp_path / "a", grasps_per_object=2, workers=1, progress=False
+    ).candidates.id[0]
+    judge = Make(CrashingJudge(how=((id, "segfault"),)))
+    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
+    run = evaluate(scene, station, tmp_path / "b", grasps_per_object=2, workers=1, progress=False)
+    assert run.complete and run.failures == [id]
+    assert run.row(id)["reason"] == "the worker process was ended by SIGSEGV"
+
+
+def test_bad_input_is_said_before_any_work(
+    scene: Scene, station: Station, tmp_path: Path, monkeypatch
+) -> None:
+    def evaluate_in(folder: str, **options: object) -> None:
+        evaluate(scene, station, tmp_path / folder, progress=False, **options)  # type: ignore[arg-type]
+
+    install(monkeypatch.setattr)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidInputError, match=r"cannot write to folder .*file"):
+        evaluate_in("file")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.tex").write_text("")
+    with pytest.raises(InvalidInputError, match=r"is not empty and holds no run .*thesis.tex"):
+        evaluate_in("full")
+    with pytest.raises(InvalidInputError, match="workers is 0"):
+        evaluate_in("run", workers=0)
+    with pytest.raises(InvalidInputError, match="'xlsx' does not exist"):
+        evaluate_in("run", table="xlsx")
+    with pytest.raises(UnknownNameError, match="engine 'standart' does not exist; did you mean"):
+        evaluate_in("run", engine="standart")
+    with pytest.raises(InvalidInputError, match="grasps per object is 0"):
+        evaluate_in("run", grasps_per_object=0)
+    assert not (tmp_path / "run" / "run.yaml").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_without_permission_is_said(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    (tmp_path / "locked").mkdir(mode=0o500)
+    with pytest.raises(InvalidInputError, match="Permission denied; choose a writable place"):
+        evaluate(scene, station, tmp_path / "locked" / "run", progress=False)
+
+
+def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: Path) -> None:
+    def refuse(scene: Scene, station: Station) -> None:
+        raise InvalidInputError("'left' and 'right' overlap")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("burg_drake.station.check.require_sound_scene", refuse)
+        with pytest.raises(InvalidInputError, match="overlap"):
+            evaluate(scene, station, tmp_path / "run", progress=False)
+
+
+def test_judges_are_pickled_with_all_they_need(scene: Scene, station: Station) -> None:
+    import pickle
+
+    from burg_drake.evaluation.judge import StationJudgeFactory
+    from burg_drake.station.engine import ENGINES
+
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], True)
+    assert pickle.loads(pickle.dumps(factory)).scene.content == scene.content
+    assert pickle.loads(pickle.dumps(Make(KnownJudge()))) == Make(KnownJudge())

@@ -1,0 +1,104 @@
+"""Worker processes: same verdicts for any number of them, and what happens when they die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from contextlib import closing
+
+import numpy as np
+import pytest
+from known_judge import CrashingJudge, KnownJudge, Make, die, expected, refuse
+
+from burg_drake.core.errors import InvalidInputError, SimulationError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executors import judge_all
+
+
+def grasps(n: int) -> list[Candidate]:
+    return [Candidate(f"cube-{i:04d}", "cube", np.eye(4)) for i in range(n)]
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_every_grasp_is_judged_once(workers: int) -> None:
+    judged = list(judge_all(grasps(50), Make(KnownJudge()), workers=workers))
+    assert sorted(c.id for c, _ in judged) == [c.id for c in grasps(50)]
+    for candidate, verdict in judged:
+        assert verdict.outcome is expected(candidate.id)
+        assert verdict.stage is verdict.outcome.stage
+        assert set(verdict.cpu) == set(list(Stage)[: list(Stage).index(verdict.stage) + 1])
+
+
+def test_no_grasps_need_no_workers() -> None:
+    assert list(judge_all([], die)) == []
+
+
+def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
+    how = {"cube-0003": "segfault", "cube-0004": "exit", "cube-0017": "error"}
+    make = Make(CrashingJudge(how=tuple(how.items())))
+    judged = {c.id: v for c, v in judge_all(grasps(30), make, workers=2)}
+    assert len(judged) == 30
+    failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
+    assert {id: v.reason for id, v in failed.items()} == {
+        "cube-0003": "the worker process was ended by SIGSEGV",
+        "cube-0004": "the worker process ended: SystemExit: a condition of Drake failed",
+        "cube-0017": "RuntimeError: the solver did not converge",
+    }
+    assert {v.stage for v in failed.values()} == {Stage.EXECUTED}
+
+
+def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
+    make = Make(CrashingJudge(log=tmp_path / "crashed", how=(("cube-0002", "once"),)))
+    judged = {c.id: v.outcome for c, v in judge_all(grasps(10), make, workers=1)}
+    assert (tmp_path / "crashed").exists()
+    assert judged == {c.id: expected(c.id) for c in grasps(10)}
+
+
+def test_deaths_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.executors.HOPELESS", 5)
+    make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
+    with pytest.raises(SimulationError, match=r"5 worker processes in a row died: .*SIGSEGV"):
+        list(judge_all(grasps(40), make, workers=2))
+
+
+def test_what_cannot_be_built_is_said_as_it_is() -> None:
+    with pytest.raises(InvalidInputError, match=r"^no such model$"):
+        list(judge_all(grasps(3), refuse, workers=2))
+    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* ended by SIGSEGV"):
+        list(judge_all(grasps(3), die, workers=1))
+    with pytest.raises(InvalidInputError, match="workers is 0; give 1 or more"):
+        list(judge_all(grasps(3), refuse, workers=0))
+
+
+def children() -> set[int]:
+    pid = os.getpid()
+    return {int(p) for p in open(f"/proc/{pid}/task/{pid}/children").read().split()}
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="looks for children in /proc")
+def test_leaving_early_leaves_no_process_behind() -> None:
+    before = children()
+    with closing(judge_all(grasps(500), Make(KnownJudge(pause=0.01)), workers=2)) as judged:
+        next(judged)
+        assert len(children() - before) == 2
+    assert children() <= before
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="looks for children in /proc")
+def test_an_interrupt_reaches_the_caller_alone(capfd: pytest.CaptureFixture[str]) -> None:
+    before = children()
+
+    def interrupt() -> None:
+        for pid in (*(children() - before), os.getpid()):
+            os.kill(pid, signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        for k, _ in enumerate(judge_all(grasps(500), Make(KnownJudge(pause=0.01)), workers=2)):
+            if k == 0:
+                threading.Timer(0.2, interrupt).start()
+        time.sleep(1.0)
+    assert children() <= before
+    assert "Traceback" not in capfd.readouterr().err

@@ -1,0 +1,76 @@
+"""The journal: lossless lines, torn ends, one writer at a time."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.journal import Journal, decode, encode, read_journal
+from burg_drake.evaluation.judge import Verdict
+
+LIFTED = Verdict(
+    Outcome.LIFTED,
+    Stage.EXECUTED,
+    margins={"slip": 0.1 + 0.2, "tilt": 1e-300, "pad_force": math.nan},
+    q_grasp=(0.1, -2.0 / 3.0),
+    q_pregrasp=(1.0, math.pi),
+    cpu={Stage.CLEAR: 0.0002, Stage.REACHABLE: 0.01, Stage.EXECUTED: 0.25},
+)
+BLOCKED = Verdict(
+    Outcome.COLLISION_CLUTTER, Stage.CLEAR, blocker='a "quoted"\nname', reason="Ä → ö"
+)
+
+
+@pytest.mark.parametrize("verdict", [LIFTED, BLOCKED])
+def test_a_line_gives_back_what_went_in(verdict: Verdict) -> None:
+    line = encode("mug-1", verdict)
+    assert line.count(b"\n") == 1 and line.endswith(b"\n")
+    assert b"NaN" not in line  # JSON has no such number
+    id, back = decode(line)
+    assert id == "mug-1"
+    assert repr(back) == repr(verdict)  # equality would fail on NaN
+
+
+def test_a_torn_line_is_cut_off_and_the_rest_is_kept(tmp_path) -> None:
+    path = tmp_path / "journal.jsonl"
+    whole = encode("a", LIFTED) + encode("b", BLOCKED)
+    for cut in range(len(encode("a", LIFTED)), len(whole)):
+        path.write_bytes(whole[:cut])
+        with Journal(path) as journal:
+            journal.append("c", BLOCKED)
+        assert list(read_journal(path)) == ["a", "c"], cut
+
+
+def test_a_damaged_line_counts_as_not_judged(tmp_path) -> None:
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(encode("a", LIFTED) + b'{"id": "b"}\n\x00\xff\n[]\n' + encode("c", BLOCKED))
+    assert list(read_journal(path)) == ["a", "c"]
+
+
+def test_two_cannot_write_at_once(tmp_path) -> None:
+    with Journal(tmp_path / "j"), pytest.raises(InvalidInputError, match="by another process"):
+        Journal(tmp_path / "j")
+    Journal(tmp_path / "j").close()
+
+
+def test_no_journal_means_nothing_judged(tmp_path) -> None:
+    assert read_journal(tmp_path / "none") == {}
+    with pytest.raises(InvalidInputError, match=r"cannot write .*: Is a directory"):
+        Journal(tmp_path)
+
+
+def test_a_full_disk_is_said_in_one_line() -> None:
+    from pathlib import Path
+
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full")
+    journal = object.__new__(Journal)
+    import os
+
+    journal._path, journal._file = Path("run/journal.jsonl"), os.open("/dev/full", os.O_WRONLY)
+    with pytest.raises(InvalidInputError, match="No space left on device; what is in it is kept"):
+        journal.append("a", LIFTED)
+    journal.close()

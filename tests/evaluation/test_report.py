@@ -1,0 +1,137 @@
+"""The report: one file, nothing from elsewhere, nothing unescaped, numbers of the run."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from known_judge import CrashingJudge, Make
+
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.charts import Series, histogram, nice_step
+from burg_drake.evaluation.report.markup import Html, element, join
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.summary import summarize
+
+VOID = {"meta", "br", "hr"}
+
+
+class Checker(HTMLParser):
+    """Checks that elements nest and collects what a browser would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        self.links += [str(v) for k, v in attrs if k in ("src", "href", "srcset", "data")]
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def check(page: str) -> Checker:
+    checker = Checker()
+    checker.feed(page)
+    assert checker.open == [] and checker.links == []
+    assert "@import" not in page and "url(" not in page and "<script" not in page
+    assert not re.search(r"https?://", page)
+    return checker
+
+
+@pytest.fixture
+def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
+    return evaluate(scene, station, tmp_path / "run", grasps_per_object=30, progress=False)
+
+
+def test_the_page_is_whole_and_stands_alone(run: Run) -> None:
+    page = run.report_path.read_text()
+    text = " ".join(check(page).text)
+    assert page == report_page(run)
+    total = summarize(run).total
+    for expected in (
+        "three on panda_tabletop",
+        f"of {total.executed} executed",
+        run.best()[0],
+        f"--seed 0 -o {run.path}",
+        run.document.scene.content[:12],
+        "drake",
+    ):
+        assert expected in " ".join(text.split()), expected
+    assert "not complete" not in text
+
+
+def test_the_command_is_the_one_that_was_run(run: Run) -> None:
+    code = re.findall(r"<pre><code[^>]*>(.*?)</code></pre>", run.report_path.read_text())[-1]
+    words = html.unescape(re.sub(r"<[^>]+>", "", code)).split()
+    assert words == [
+        *("burg-drake", "evaluate", run.document.scene.path, "--station", "panda_tabletop"),
+        *("--grasps-per-object", "30", "--engine", "standard", "--seed", "0"),
+        *("-o", str(run.path)),
+    ]
+
+
+def test_failures_are_listed_and_escaped(
+    scene, station, tmp_path: Path, known_judge: None, monkeypatch, run: Run
+) -> None:
+    judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
+    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
+    name = "<script>alert(1)</script> & co"
+    named = dataclasses.replace(scene, document=dataclasses.replace(scene.document, name=name))
+    failed = evaluate(named, station, tmp_path / "f", grasps_per_object=30, progress=False)
+    text = " ".join(check(failed.report_path.read_text()).text)
+    assert name in text
+    assert "RuntimeError: the solver did not converge" in text
+
+
+def test_an_unfinished_run_says_so(run: Run) -> None:
+    journal = run.path / "journal.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:10]))
+    text = " ".join(check(report_page(Run(run.path, run.document))).text)
+    assert "not complete: 10 of 90 grasps are judged" in text
+    journal.write_bytes(b"")
+    check(report_page(Run(run.path, run.document)))
+
+
+def test_histogram_bars_hold_every_value() -> None:
+    rng = np.random.default_rng(0)
+    values = np.concatenate([rng.exponential(2.0, 500), [1e3, 1e4]])
+    chart = histogram([Series(values, "g0", "all")], title="x", unit="mm", focus=values[:500])
+    counts = [int(n) for n in re.findall(r"<title>all: (\d+),", chart)]
+    assert sum(counts) == 502
+    heights = [float(h) for h in re.findall(r'height="([\d.]+)" class="g0"', chart)]
+    inside = slice(0, len(counts) - 1)  # the bar beyond the axis has a scale of its own
+    np.testing.assert_allclose(
+        np.array(heights)[inside] / max(heights[inside]),
+        np.array(counts)[inside] / max(counts[inside]),
+        atol=2e-4,
+    )
+    empty = histogram([Series(np.empty(0), "g0", "all")], title="x", unit="", focus=np.empty(0))
+    assert "NaN" not in empty and "<rect" not in empty
+
+
+def test_axis_steps_are_round() -> None:
+    assert [nice_step(v) for v in (0.011, 0.2, 3.0, 7.0)] == [0.02, 0.2, 5.0, 10.0]
+
+
+def test_texts_are_escaped_and_markup_is_not() -> None:
+    assert element("p", "a < b", element("b", "&"), None, 3, class_='"') == (
+        '<p class="&quot;">a &lt; b<b>&amp;</b>3</p>'
+    )
+    assert join("<", Html("<i>")) == "&lt;<i>"

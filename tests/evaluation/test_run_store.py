@@ -1,0 +1,129 @@
+"""Runs on disk: what is read back, what moves along, and what has changed since."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run_document import RunDocument, portable_reference
+from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.table import read_table
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station, load_station
+
+
+@pytest.fixture
+def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
+    return evaluate(scene, station, tmp_path / "run", grasps_per_object=10, progress=False)
+
+
+def test_a_run_is_read_back_as_it_was(run: Run) -> None:
+    back = load_run(run.path)
+    assert back.document == run.document and back.complete
+    table = read_table(run.table_path)
+    assert list(table) == list(back.results)
+    for name, values in back.results.items():
+        np.testing.assert_array_equal(values, table[name], err_msg=name)
+    assert {f"q_grasp_{k}" for k in range(1, 8)} <= set(table)
+
+
+def test_rows_and_candidates_go_by_id(run: Run) -> None:
+    id = run.candidates.id[7]
+    assert run.row(id)["id"] == id == run.candidate(id).id
+    np.testing.assert_array_equal(run.candidate(id).X_OG, run.candidates.grasps.X_OG[7])
+    for look_up in (run.row, run.candidate):
+        with pytest.raises(UnknownNameError, match=f"did you mean.* {id}"):
+            look_up(id[:-1] + "x")
+
+
+def test_the_best_grasp_is_lifted_and_disturbs_least(run: Run) -> None:
+    best = run.best(3)
+    lifted = [id for id in run.candidates.id if run.row(id)["outcome"] == Outcome.LIFTED]
+    assert set(best) <= set(lifted)
+    slips = [run.row(id)["slip"] for id in best]
+    assert slips == sorted(slips)
+    assert slips[0] == min(run.row(id)["slip"] for id in lifted)
+    assert len(run.best(10_000)) == len(lifted)
+
+
+def test_scene_and_station_are_those_that_were_judged(
+    run: Run, scene: Scene, station: Station
+) -> None:
+    assert run.scene().content == scene.content
+    assert run.station().content == station.content
+    assert list(run.scene().instances) == list(scene.instances)
+
+
+def test_a_run_moves_with_its_library_or_without(run: Run, tmp_path: Path) -> None:
+    content = run.document.scene.content
+    (tmp_path / "elsewhere" / "deep").mkdir(parents=True)
+    alone = tmp_path / "elsewhere" / "deep" / "run"
+    shutil.copytree(run.path, alone)
+    assert load_run(alone).scene().content == content  # the library is where it was
+    shutil.move(tmp_path / "shapes", tmp_path / "elsewhere" / "deep" / "shapes")
+    assert load_run(alone).scene().content == content  # beside the run, as it was
+    with pytest.raises(InvalidInputError, match=r"library ../shapes is gone, .* not at .*shapes"):
+        run.scene()
+
+
+def test_a_changed_object_is_named(run: Run, scene: Scene) -> None:
+    library = scene.library.document
+    changed = dataclasses.replace(library.objects["bar"], build="another")
+    objects = {**library.objects, "bar": changed}
+    document = dataclasses.replace(library, objects=objects)
+    dataclasses.replace(scene.library, document=document).save()
+    with pytest.raises(InvalidInputError, match=r"^bar in library .* changed since .* was judged"):
+        load_run(run.path).scene()
+    del objects["bar"]
+    dataclasses.replace(scene.library, document=document).save()
+    with pytest.raises(InvalidInputError, match=r"^bar in library"):
+        load_run(run.path).scene()
+
+
+def test_a_changed_copy_is_noticed(run: Run) -> None:
+    for name, old, new, load in (
+        ("scene.yaml", "0.35", "0.36", run.scene),
+        ("station.yaml", "0.24", "0.25", run.station),
+    ):
+        path = run.path / name
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InvalidInputError, match=f"{name}.* changed since"):
+            load()
+
+
+def test_what_is_no_run_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="nowhere holds no run"):
+        load_run(tmp_path / "nowhere")
+    (tmp_path / "run.yaml").write_text("version: 1\nsceen: {}\n")
+    with pytest.raises(DocumentError, match=r"run.yaml:2: sceen: unknown key|unknown key 'sceen'"):
+        load_run(tmp_path)
+
+
+def test_provenance_says_what_made_the_results(run: Run) -> None:
+    document = run.document
+    assert document.versions["burg_drake"] and document.versions["drake"] != "unknown"
+    assert document.library.objects == {"cube": "build of cube", "bar": "build of bar"}
+    assert document.grasps.objects == {"cube": 20, "bar": 10}
+    assert document.grasps.content == run.candidates.content
+    assert document.engine.name == "standard" and document.trial["lift_height"] == 0.3
+    assert document.station.path == "panda_tabletop"
+    assert sum(s.judged or 0 for s in document.sessions) == 30
+    assert RunDocument.__dataclass_fields__["version"].default == 1
+
+
+def test_references_of_copies_hold_everywhere(tmp_path: Path) -> None:
+    station = load_station("panda_tabletop")
+    assert portable_reference(station.hand_model, tmp_path) == (
+        "package://burg_drake/models/panda/panda_hand.sdf"
+    )
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    assert portable_reference(tmp_path / "lib", tmp_path / "a" / "b") == "../../lib"

@@ -1,0 +1,123 @@
+"""The results table: what other tools see, and that numbers survive the way there and back."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError, MissingDependencyError
+from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates import Candidates
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.table import (
+    METADATA_KEY,
+    Columns,
+    make_columns,
+    read_table,
+    require_writer,
+    write_table,
+)
+
+
+def candidates() -> Candidates:
+    rng = np.random.default_rng(4)
+    X_OG = make_pose(rotation_from_rpy(rng.uniform(-3, 3, (4, 3))), rng.normal(size=(4, 3)))
+    grasps = GraspSet.create(
+        X_OG, object=["mug", "mug", "box", "box"], width=0.1 + 0.2, score=1 / 3
+    )
+    return Candidates(grasps, np.array(["mug_1", "mug_1", "box", "box"]))
+
+
+def columns() -> Columns:
+    ids = candidates().id
+    verdicts = {
+        ids[3]: Verdict(Outcome.COLLISION_TABLE, Stage.CLEAR, "table", cpu={Stage.CLEAR: 1e-4}),
+        ids[0]: Verdict(
+            Outcome.LIFTED,
+            Stage.EXECUTED,
+            reason='comma, "quote", Ä',
+            margins={"slip": 2.0 / 3.0, "tilt": math.nan},
+            q_grasp=(0.1,) * 7,
+            q_pregrasp=(math.pi,) * 7,
+            cpu={Stage.CLEAR: 1e-4, Stage.EXECUTED: 0.2},
+        ),
+    }
+    return make_columns(candidates(), verdicts, joints=7, seed=2**40, engine="standard")
+
+
+def test_rows_are_the_judged_grasps_in_the_order_of_the_candidates() -> None:
+    table, ids = columns(), candidates().id
+    assert table["id"].tolist() == [ids[0], ids[3]]
+    assert table["instance"].tolist() == ["mug_1", "box"]
+    assert table["outcome"].tolist() == ["lifted", "collision_table"]
+    assert table["cpu_reach"].tolist() == [pytest.approx(math.nan, nan_ok=True)] * 2
+    assert {len(values) for values in table.values()} == {2}
+
+
+def test_position_and_quaternion_are_the_grasp_frame() -> None:
+    table = columns()
+    wxyz = np.stack([table[name] for name in ("qw", "qx", "qy", "qz")], axis=-1)
+    position = np.stack([table[name] for name in "xyz"], axis=-1)
+    X_OG = make_pose(rotation_from_quaternion(wxyz), position)
+    np.testing.assert_allclose(X_OG, candidates().grasps.X_OG[[0, 3]], atol=1e-14)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_file_gives_back_every_bit(tmp_path: Path, suffix: str) -> None:
+    table = columns()
+    write_table(tmp_path / f"results.{suffix}", table)
+    back = read_table(tmp_path / f"results.{suffix}")
+    assert list(back) == list(table)
+    for name in table:
+        assert back[name].dtype.kind == table[name].dtype.kind, name
+        np.testing.assert_array_equal(back[name], table[name], err_msg=name)
+
+
+def test_csv_is_plain(tmp_path: Path) -> None:
+    write_table(tmp_path / "results.csv", columns())
+    with (tmp_path / "results.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert first["slip"] == repr(2.0 / 3.0)
+    assert first["reason"] == 'comma, "quote", Ä'
+    assert first["tilt"] == second["slip"] == second["q_grasp_7"] == ""
+    assert first["seed"] == "1099511627776"
+
+
+def test_parquet_has_nulls_and_metadata(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    write_table(tmp_path / "results.parquet", columns(), {"seed": 3, "versions": {"a": "1"}})
+    table = parquet.read_table(tmp_path / "results.parquet")
+    assert table.column("slip").to_pylist() == [2.0 / 3.0, None]
+    metadata = json.loads(table.schema.metadata[METADATA_KEY])
+    assert metadata == {"seed": 3, "versions": {"a": "1"}}
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_no_rows_are_a_table_too(tmp_path: Path, suffix: str) -> None:
+    table = make_columns(candidates(), {}, joints=0, seed=0, engine="standard")
+    write_table(tmp_path / f"r.{suffix}", table)
+    assert [len(v) for v in read_table(tmp_path / f"r.{suffix}").values()] == [0] * len(table)
+
+
+def test_without_pyarrow_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    require_writer("csv")
+    with pytest.raises(MissingDependencyError, match=r"pip install 'burg-drake\[parquet\]'"):
+        require_writer("parquet")
+
+
+def test_bad_files_and_formats_are_named(tmp_path: Path) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    for name in ("empty.csv", "none.csv", "none.parquet"):
+        with pytest.raises(InvalidInputError, match=f"{name} is not a results table"):
+            read_table(tmp_path / name)
+    with pytest.raises(InvalidInputError, match="'xlsx' does not exist; give csv or parquet"):
+        require_writer("xlsx")
