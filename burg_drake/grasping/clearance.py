@@ -23,8 +23,8 @@ from burg_drake.grasping.penetration import Polytope, penetration_depth
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 
-TRAVEL_STEP = 0.025
-"""Resolution of `free_travel`: 1 mm a finger of the Panda hand, a fraction of a pad."""
+TRAVEL_STEPS = (0.125, 0.025)
+"""Steps of `free_travel`: 5 and 1 mm a finger of the Panda hand, both a fraction of a pad."""
 PRIORITY = (
     Outcome.COLLISION_TARGET,
     Outcome.COLLISION_TABLE,
@@ -93,14 +93,14 @@ class HandClearance:
             X_WG: (4, 4) grasp at which the open hand is clear.
 
         Returns:
-            0 (open) to 1 (pads together), a multiple of `TRAVEL_STEP`; the fingers are clear there
-            and on the way.
+            0 (open) to 1 (pads together), to within the last of `TRAVEL_STEPS`; the fingers are
+            clear there and on the way.
         """
-        steps = round(1.0 / TRAVEL_STEP)
-        for i in range(1, steps + 1):
-            if self._overlapping(X_WG, i * TRAVEL_STEP):
-                return (i - 1) * TRAVEL_STEP
-        return 1.0
+        closed = 0.0
+        for step in TRAVEL_STEPS:
+            while closed + step <= 1.0 and not self._overlapping(X_WG, closed + step):
+                closed += step
+        return closed
 
     def _overlapping(
         self, X_WG: Array, closed: float = 0.0
