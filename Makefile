@@ -1,0 +1,53 @@
+# make help lists the targets. make demo and make test set up everything that they need.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.set-up
+N ?= 200
+DEMO := runs/demo$(if $(filter-out 200,$(N)),_$(N))
+EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint rules format types examples clean distclean
+.DELETE_ON_ERROR:
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
+	@echo "  variables: PYTHON=python3.12 (interpreter of the set-up), N=200 (grasps per object of the demo)"
+
+setup: $(STAMP)  ## create .venv with everything in it; system libraries too, where allowed
+
+$(STAMP): pyproject.toml tools/setup/set_up.sh
+	@tools/setup/set_up.sh $(VENV)
+	@touch $@
+
+demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
+	$(BIN)/burg-drake evaluate tabletop_six --station panda_tabletop --grasps-per-object $(N) -o $(DEMO)
+	$(BIN)/burg-drake replay $(DEMO) --best --html $(DEMO)/replay.html
+	@echo
+	@echo "Files to open:"
+	@find $(DEMO) -maxdepth 1 -type f \( -name '*.html' -o -name '*.csv' -o -name '*.parquet' -o -name '*.md' \) | sort | sed 's/^/  /'
+
+test: $(STAMP)  ## build the wheel, install it, test the installed wheel (ARGS=... go to pytest)
+	@tools/setup/test_wheel.sh $(VENV) $(ARGS)
+
+lint: rules format types  ## ruff and mypy
+
+rules: $(STAMP)
+	$(BIN)/ruff check
+
+format: $(STAMP)
+	$(BIN)/ruff format --check
+
+types: $(STAMP)
+	$(BIN)/mypy
+
+examples: $(STAMP)  ## run every example without a window
+	@tools/setup/run_examples.sh $(BIN)/python $(EXAMPLES)
+
+clean:  ## remove what builds and tests leave behind (not .venv, not runs)
+	rm -rf build dist $(VENV)-wheel .pytest_cache .mypy_cache .ruff_cache
+	find . -path './.venv*' -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean  ## remove the virtual environments as well
+	rm -rf .venv*

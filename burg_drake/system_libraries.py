@@ -1,0 +1,139 @@
+"""Which system libraries Drake and its renderer lack on this machine, and how to get them.
+
+Drake's wheel brings everything but a few libraries of the operating system. Without GLib pydrake
+cannot be imported; without Mesa's driver a first rendering ends the process with a segmentation
+fault, hence the look beforehand. Only the standard library is imported here: the set-up runs this
+file before anything else is known to work.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+GLIB = "libglib-2.0.so.0"
+EGL = "libEGL.so.1"
+MESA_EGL = "libEGL_mesa.so.0"
+MESA_DRIVER = "swrast_dri.so"
+
+# Debian's and Ubuntu's package for each of them.
+_PACKAGES = {
+    GLIB: "libglib2.0-0",
+    EGL: "libegl1",
+    MESA_EGL: "libegl-mesa0",
+    MESA_DRIVER: "libgl1-mesa-dri",
+}
+# Releases with at least this glibc (Ubuntu 24.04, Debian 13) have the 64-bit time_t names.
+_T64_GLIBC = (2, 39)
+_T64_PACKAGES = _PACKAGES | {GLIB: "libglib2.0-0t64"}
+
+# EGL implementations of graphics drivers that need nothing of Mesa.
+_VENDOR_EGL = ("libEGL_nvidia.so.0",)
+
+
+def missing_import_libraries() -> list[str]:
+    """System libraries without which `import pydrake` fails; empty if all is well."""
+    if sys.platform != "linux" or _loads(GLIB):
+        return []
+    return [GLIB]
+
+
+def missing_render_libraries() -> list[str]:
+    """System libraries without which Drake cannot render; empty if all is well.
+
+    Looks for what Drake itself opens by name at run time: GLib, EGL, and under it the EGL of a
+    graphics driver or Mesa's with its software renderer. Empty on other systems than Linux,
+    where Drake's wheel is complete.
+    """
+    if sys.platform != "linux":
+        return []
+    missing = missing_import_libraries()
+    if not _loads(EGL):
+        missing.append(EGL)
+    if any(_loads(vendor) for vendor in _VENDOR_EGL):
+        return missing
+    if not _loads(MESA_EGL):
+        missing.append(MESA_EGL)
+    if not _has_mesa_driver():
+        missing.append(MESA_DRIVER)
+    return missing
+
+
+def apt_packages(missing: Sequence[str]) -> list[str]:
+    """Debian and Ubuntu packages, named as in this release, that bring the `missing` libraries."""
+    version = platform.libc_ver()[1] or "0"
+    glibc = tuple(int(part) for part in version.split(".")[:2])
+    names = _T64_PACKAGES if glibc >= _T64_GLIBC else _PACKAGES
+    return [names[library] for library in missing]
+
+
+def apt_command(missing: Sequence[str] | None = None) -> str:
+    """Command that installs what is missing.
+
+    Args:
+        missing: names from `missing_render_libraries`, which is called if None.
+
+    Returns:
+        The command line; empty if nothing is missing.
+    """
+    packages = apt_packages(missing_render_libraries() if missing is None else missing)
+    return f"sudo apt-get install {' '.join(packages)}" if packages else ""
+
+
+def describe_missing(missing: Sequence[str]) -> str:
+    """One line: which libraries are missing, what cannot be done without them, what to run."""
+    effect = "pydrake cannot be imported" if GLIB in missing else "Drake cannot render images"
+    pronoun = "it" if len(missing) == 1 else "them"
+    remedy = (
+        f"run: {apt_command(missing)}"
+        if shutil.which("apt-get")
+        else f"install {pronoun} with the package manager of this system"
+    )
+    return f"{effect} without {', '.join(missing)}; {remedy}"
+
+
+def _loads(soname: str) -> bool:
+    """Whether the dynamic linker finds and opens a shared library."""
+    try:
+        ctypes.CDLL(soname)
+    except OSError:
+        return False
+    return True
+
+
+def _has_mesa_driver() -> bool:
+    """Whether Mesa finds its software renderer.
+
+    Up to Mesa 24.1 that is a file which libEGL_mesa opens when a context is made; since then it
+    is libgallium, which libEGL_mesa is linked against.
+    """
+    folders = [Path(p) for p in os.environ.get("LIBGL_DRIVERS_PATH", "").split(":") if p]
+    for root in (Path("/usr/lib"), Path("/usr/lib64")):
+        if any(root.glob("libgallium-*.so")) or any(root.glob("*/libgallium-*.so")):
+            return True
+        folders += [root / "dri", *root.glob("*/dri")]
+    return any((folder / MESA_DRIVER).exists() for folder in folders)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Says what is missing; with `--packages` prints Debian package names only.
+
+    Returns:
+        0 if nothing is missing, 1 if images cannot be rendered, 2 if pydrake cannot be imported.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    missing = missing_render_libraries()
+    if not missing:
+        return 0
+    names_only = "--packages" in arguments
+    print(" ".join(apt_packages(missing)) if names_only else describe_missing(missing))
+    return 2 if GLIB in missing else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,26 @@
+"""What all tests share: one thread a process, and the generators under `tools/`.
+
+The tests run against a checkout (editable install) and against an installed wheel alike
+(`make test`). `tools/` is in no wheel, and putting the root of the checkout on `sys.path` would
+shadow the wheel; therefore the package `tools`, and nothing else, is announced by hand.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
+
+# pytest-xdist fills the cores with processes; read by OpenMP and OpenBLAS when they are loaded.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def _announce_tools(folder: Path) -> None:
+    tools = ModuleType("tools")
+    tools.__path__ = [str(folder)]
+    sys.modules["tools"] = tools
+
+
+_announce_tools(Path(__file__).resolve().parents[1] / "tools")

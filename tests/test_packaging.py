@@ -1,0 +1,139 @@
+"""What is installed is complete, declares what it imports, and is light to import."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.metadata
+import json
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+import burg_drake
+from burg_drake.core.resources import data_root
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+PACKAGE = Path(burg_drake.__file__).parent
+HEAVY = {
+    "coacd",
+    "cv2",
+    "embreex",
+    "matplotlib",
+    "networkx",
+    "pyarrow",
+    "pydrake",
+    "scipy",
+    "trimesh",
+}
+# Distributions whose import name is another one.
+IMPORT_NAMES = {"drake": "pydrake", "opencv-python-headless": "cv2", "pyyaml": "yaml"}
+
+try:
+    importlib.metadata.distribution("burg-drake")
+    INSTALLED = True
+except importlib.metadata.PackageNotFoundError:
+    INSTALLED = False
+
+installed_only = pytest.mark.skipif(not INSTALLED, reason="reads the metadata of an installation")
+wheel_only = pytest.mark.skipif(
+    os.environ.get("BURG_TEST_WHEEL") != "1", reason="checks an installed wheel; see `make test`"
+)
+
+
+def run_python(code: str, **options: object) -> str:
+    finished = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, **options
+    )
+    assert finished.returncode == 0, finished.stderr
+    return finished.stdout
+
+
+def files_below(folder: Path) -> set[str]:
+    return {
+        str(path.relative_to(folder))
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and path.name != ".DS_Store"
+    }
+
+
+@wheel_only
+def test_the_wheel_is_tested_and_not_the_checkout() -> None:
+    site_packages = Path(sysconfig.get_path("purelib"))
+    assert site_packages / "burg_drake" == PACKAGE
+    located = run_python("import burg_drake; print(burg_drake.__file__)", cwd=CHECKOUT)
+    assert Path(located.strip()).parent == PACKAGE
+    assert data_root() == PACKAGE / "_data"
+
+
+@wheel_only
+def test_wheel_holds_every_file_of_the_checkout() -> None:
+    for folder in ("models", "scenes", "stations"):
+        assert files_below(data_root() / folder) == files_below(CHECKOUT / folder)
+    data = {name for name in files_below(PACKAGE) if name.startswith("_data")}
+    assert files_below(PACKAGE) - data == files_below(CHECKOUT / "burg_drake")
+
+
+@installed_only
+def test_metadata() -> None:
+    metadata = importlib.metadata.metadata("burg-drake")
+    assert metadata["Version"] == burg_drake.__version__
+    assert metadata["License-Expression"] == "MIT"
+    assert metadata["Requires-Python"] == ">=3.11"
+    assert (PACKAGE / "py.typed").exists()
+
+
+@installed_only
+def test_every_import_is_a_declared_dependency() -> None:
+    declared = set()
+    for requirement in importlib.metadata.requires("burg-drake") or []:
+        name = re.match(r"[A-Za-z0-9_.-]+", requirement)[0].lower()
+        if "extra ==" not in requirement or "extra == 'parquet'" in requirement:
+            declared.add(IMPORT_NAMES.get(name, name))
+    for path in PACKAGE.rglob("*.py"):
+        imported = top_level_imports(path)
+        foreign = imported - set(sys.stdlib_module_names) - {"burg_drake"}
+        assert foreign <= declared, path
+
+
+def top_level_imports(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names.add(node.module.partition(".")[0])
+    return names
+
+
+def test_every_module_can_be_imported() -> None:
+    for module in pkgutil.walk_packages([str(PACKAGE)], "burg_drake."):
+        importlib.import_module(module.name)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import burg_drake.apps.cli",
+        "from burg_drake.apps.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass",
+    ],
+)
+def test_light_imports(statement: str) -> None:
+    listing = "\nimport json, sys; print(); print(json.dumps(sorted(sys.modules)))"
+    modules = json.loads(run_python(statement + listing).splitlines()[-1])
+    assert {name.partition(".")[0] for name in modules} & HEAVY == set()
+
+
+@installed_only
+def test_console_script() -> None:
+    script = Path(sysconfig.get_path("scripts")) / "burg-drake"
+    finished = subprocess.run([script, "--help"], capture_output=True, text=True, timeout=60)
+    assert finished.returncode == 0, finished.stderr
+    for verb in ("library", "scene", "evaluate", "replay"):
+        assert verb in finished.stdout

@@ -1,0 +1,104 @@
+#!/usr/bin/env bash
+# Creates the virtual environment VENV (first argument) and installs burg_drake in it, editable,
+# with the development tools. Uses apt for what the system lacks if that needs no password.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+venv=${1:?usage: set_up.sh VENV}
+
+say() { printf 'set-up: %s\n' "$*"; }
+fail() { printf 'set-up: %s\n' "$*" >&2; exit 2; }
+
+# apt_install PACKAGE...: true if they are installed now; false if this user may not, or apt failed.
+apt_install() {
+  local as_root=() output
+  command -v apt-get > /dev/null || return 1
+  if [ "$(id -u)" -ne 0 ]; then
+    sudo -n true 2> /dev/null || return 1
+    as_root=(sudo -n)
+  fi
+  say "apt-get install $*"
+  ${as_root[@]+"${as_root[@]}"} apt-get update > /dev/null 2>&1 || true
+  output=$(${as_root[@]+"${as_root[@]}"} env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y --no-install-recommends "$@" 2>&1) && return
+  printf '%s\n' "$output" | grep '^E:' >&2 || true
+  return 1
+}
+
+# Drake publishes wheels for macOS from Python 3.13 on.
+if [ "$(uname -s)" = Darwin ]; then oldest=13; else oldest=11; fi
+
+recent_enough() {
+  "$1" -c "import sys; sys.exit(sys.version_info < (3, $oldest))" 2> /dev/null
+}
+
+pick_python() {
+  local candidate
+  if [ -n "${PYTHON:-}" ]; then
+    recent_enough "$PYTHON" || fail "PYTHON=$PYTHON is not a Python 3.$oldest or later"
+    echo "$PYTHON"
+    return
+  fi
+  for candidate in python3 python3.13 python3.12 python3.11; do
+    if recent_enough "$candidate"; then
+      echo "$candidate"
+      return
+    fi
+  done
+  fail "no Python 3.$oldest or later found (tried python3, python3.13, python3.12, python3.11);" \
+    "install one, or name it: make setup PYTHON=/path/to/python3"
+}
+
+has_pip() { "$venv/bin/python" -c 'import pip' 2> /dev/null; }
+
+# Debian and Ubuntu ship python3 without ensurepip, hence these several ways.
+create_venv() {
+  local python=$1 package
+  rm -rf "$venv"
+  if ! "$python" -c 'import ensurepip, venv' 2> /dev/null; then
+    package=$("$python" -c 'import sys; print("python3.%d-venv" % sys.version_info[1])')
+    if ! apt_install "$package"; then
+      create_venv_without_ensurepip "$python" && return
+      fail "$python cannot create virtual environments; run: sudo apt-get install $package"
+    fi
+  fi
+  "$python" -m venv "$venv" || fail "$python -m venv $venv failed"
+}
+
+create_venv_without_ensurepip() {
+  local python=$1
+  if "$python" -m virtualenv --version > /dev/null 2>&1; then
+    "$python" -m virtualenv -q "$venv" && return
+  fi
+  "$python" -m venv --without-pip "$venv" 2> /dev/null || return 1
+  if "$python" -m pip --version > /dev/null 2>&1; then
+    "$python" -m pip --python "$venv/bin/python" install -q pip && return
+  fi
+  rm -rf "$venv"
+  return 1
+}
+
+# Only rendering needs most of them: what stays missing is named in one line, and set-up goes on.
+# Without GLib pydrake cannot even be imported (exit code 2): that ends it.
+install_system_libraries() {
+  local packages status=0
+  packages=$("$venv/bin/python" -m burg_drake.system_libraries --packages) || true
+  [ -z "$packages" ] && return
+  # shellcheck disable=SC2086
+  apt_install $packages || true
+  "$venv/bin/python" -m burg_drake.system_libraries >&2 || status=$?
+  [ "$status" -ne 2 ] || exit 2
+}
+
+if ! { recent_enough "$venv/bin/python" && has_pip; }; then
+  python=$(pick_python)
+  say "creating $venv with $("$python" --version)"
+  create_venv "$python"
+fi
+
+say "installing burg_drake and what it needs into $venv (Drake is large: this takes a minute or more)"
+quiet=(-qq)
+[ -t 1 ] && quiet=()
+"$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check -e '.[dev]'
+
+install_system_libraries
+say "done: $("$venv/bin/python" -c 'import importlib.metadata as m; print("drake", m.version("drake"))') in $venv"
