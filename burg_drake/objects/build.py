@@ -1,0 +1,227 @@
+"""Builds object libraries: mesh -> surface -> convex pieces -> mass, stable poses, SDF, entry.
+
+Each object is built in a hidden folder and moved into place when it is whole; `library.yaml` is
+written after each object, so that a killed build keeps what it finished. What has not changed is
+not built again: see `burg_drake.objects.stages`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.files import writable_folder
+from burg_drake.objects.library import (
+    LIBRARY_FILE,
+    LibraryDocument,
+    ObjectEntry,
+    ObjectLibrary,
+    load_library,
+)
+from burg_drake.objects.source import ObjectSource, object_name
+from burg_drake.objects.stages import Built, StageKeys, build_object, is_current, stage_keys
+
+Progress = Callable[[str, str, int, int], None]
+"""Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
+objects done and the number of all."""
+
+Work = tuple[ObjectSource, StageKeys]
+
+
+@dataclass(frozen=True)
+class BuildReport:
+    """What a build did.
+
+    Attributes:
+        library: the library as it is now, with the objects of earlier builds.
+        built: names of the objects that were built or updated.
+        cached: names of the objects that were up to date.
+        failed: one line for each object that could not be built.
+        notes: remarks by object, such as a mass that came from a default density.
+        seconds: CPU time by object and stage, of what was really built [s].
+    """
+
+    library: ObjectLibrary
+    built: tuple[str, ...] = ()
+    cached: tuple[str, ...] = ()
+    failed: dict[str, str] = field(default_factory=dict)
+    notes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    seconds: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+def build_library(
+    sources: Iterable[ObjectSource | str | Path],
+    out: str | Path,
+    *,
+    name: str | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> BuildReport:
+    """Builds or updates a library.
+
+    Args:
+        sources: objects; a path stands for `ObjectSource.from_file(path)`.
+        out: the library's folder; objects in it that are not among the sources stay.
+        name: the library's name; by default what it has, or else the folder's name.
+        workers: number of objects to work on at a time; threads, as the long part of the work, the
+            convex decomposition, is done in processes of its own.
+        progress: called after each object.
+
+    Returns:
+        The library and what was done; an object that cannot be built is in `failed`, and its
+        earlier version, if there was one, stays.
+
+    Raises:
+        InvalidInputError: `out` cannot be written to, or two sources have the same name.
+        DocumentError: `out` holds a `library.yaml` that cannot be read.
+    """
+    named = [s if isinstance(s, ObjectSource) else ObjectSource.from_file(s) for s in sources]
+    _check_names(named)
+    root = writable_folder(out).resolve()
+    _clear_abandoned(root)
+    tally = _Tally(_open(root, name), len(named), progress)
+    work: list[Work] = []
+    for source in named:
+        try:
+            keys = stage_keys(source)
+        except BurgError as error:
+            tally.fail(source.name, error)
+            continue
+        entry = tally.entries.get(source.name)
+        if entry is not None and is_current(entry, keys, source, root):
+            tally.count(source.name, "cached")
+        else:
+            work.append((source, keys))
+    with tempfile.TemporaryDirectory(dir=root, prefix=f"{SCRATCH}{os.getpid()}-") as scratch:
+        for source, outcome in _outcomes(work, root, Path(scratch), workers):
+            if isinstance(outcome, Built):
+                tally.publish(source, outcome, Path(scratch))
+            else:
+                tally.fail(source.name, outcome)
+    return tally.report(named)
+
+
+SCRATCH = ".building-"
+
+
+class _Tally:
+    """The library while it grows, and the report."""
+
+    def __init__(self, library: ObjectLibrary, total: int, progress: Progress | None) -> None:
+        self.library = library
+        self.entries: dict[str, ObjectEntry] = dict(library.objects)
+        self.total = total
+        self.progress = progress
+        self.state: dict[str, str] = {}
+        self.failed: dict[str, str] = {}
+        self.notes: dict[str, tuple[str, ...]] = {}
+        self.seconds: dict[str, dict[str, float]] = {}
+
+    def count(self, name: str, state: str) -> None:
+        self.state[name] = state
+        if self.progress is not None:
+            self.progress(name, state, len(self.state), self.total)
+
+    def fail(self, name: str, error: BaseException) -> None:
+        text = str(error).strip().splitlines() or [""]
+        expected = isinstance(error, BurgError)
+        self.failed[name] = text[0] if expected else f"{type(error).__name__}: {text[0]}"
+        self.count(name, "failed")
+
+    def publish(self, source: ObjectSource, built: Built, scratch: Path) -> None:
+        """Moves an object's folder into place and writes the library with it."""
+        if built.folder is not None:
+            home = self.library.root / source.name
+            if home.exists():
+                home.rename(scratch / f"{source.name}.before")
+            built.folder.rename(home)
+        self.entries[source.name] = built.entry
+        self.library = _with_entries(self.library, self.entries)
+        self.library.save()
+        self.notes[source.name] = built.notes
+        self.seconds[source.name] = built.seconds
+        self.count(source.name, "built")
+
+    def report(self, sources: Sequence[ObjectSource]) -> BuildReport:
+        names = [s.name for s in sources]
+        if not (self.library.root / LIBRARY_FILE).exists():
+            self.library.save()
+        return BuildReport(
+            self.library,
+            tuple(n for n in names if self.state[n] == "built"),
+            tuple(n for n in names if self.state[n] == "cached"),
+            {n: self.failed[n] for n in names if n in self.failed},
+            {n: self.notes[n] for n in names if self.notes.get(n)},
+            {n: self.seconds[n] for n in names if n in self.seconds},
+        )
+
+
+def _check_names(sources: Sequence[ObjectSource]) -> None:
+    for name, count in Counter(s.name for s in sources).items():
+        if count > 1:
+            files = ", ".join(str(s.mesh) for s in sources if s.name == name)
+            raise InvalidInputError(f"{count} meshes make the same object {name!r}: {files}")
+
+
+def _open(root: Path, name: str | None) -> ObjectLibrary:
+    if (root / LIBRARY_FILE).exists():
+        library = load_library(root)
+        if name is not None and name != library.name:
+            library = ObjectLibrary(replace(library.document, name=name), root)
+            library.save()
+        return library
+    return ObjectLibrary(LibraryDocument(name=name or object_name(root.name)), root)
+
+
+def _with_entries(library: ObjectLibrary, entries: dict[str, ObjectEntry]) -> ObjectLibrary:
+    ordered = {name: entries[name] for name in sorted(entries)}
+    return ObjectLibrary(replace(library.document, objects=ordered), library.root)
+
+
+def _clear_abandoned(root: Path) -> None:
+    """Removes the scratch folders of builds that were killed."""
+    for folder in root.glob(f"{SCRATCH}*"):
+        owner = folder.name.removeprefix(SCRATCH).split("-")[0]
+        if not (owner.isdigit() and _alive(int(owner))):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return process != os.getpid()
+
+
+def _outcomes(
+    work: Sequence[Work], root: Path, scratch: Path, workers: int
+) -> Iterator[tuple[ObjectSource, Built | BaseException]]:
+    """Built objects or the reason why not, in the order in which they finish."""
+    with ThreadPoolExecutor(max(1, workers)) as pool:
+        futures = {pool.submit(_attempt, s, k, root, scratch): s for s, k in work}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _attempt(
+    source: ObjectSource, keys: StageKeys, root: Path, scratch: Path
+) -> Built | BaseException:
+    folder = scratch / source.name
+    folder.mkdir()
+    try:
+        return build_object(source, keys, root, folder)
+    except Exception as error:  # one broken mesh is one failure, whatever it broke
+        return error

@@ -1,0 +1,113 @@
+"""What an object is built from: a mesh, and what the mesh cannot tell."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import trimesh
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.objects.decompose import Decomposition
+from burg_drake.objects.library import DEFAULT_FRICTION
+from burg_drake.objects.obj_file import Rgba
+
+NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ObjectSource:
+    """An object to build.
+
+    Attributes:
+        name: of the library entry: lower-case letters, digits and underscores.
+        mesh: mesh file, or a mesh in memory.
+        mass: [kg]; computed from the density if None.
+        density: [kg/m^3]; `mass.DEFAULT_DENSITY` if None.
+        friction: coefficient; `library.DEFAULT_FRICTION` if None.
+        scale: factor from the mesh's unit to metres.
+        pieces: convex pieces in O [m]; made by `decompose` if None.
+        rgba: colour, 0 to 1 each; by default what the mesh file says.
+        description: for people.
+        decomposition: parameters of the convex decomposition.
+    """
+
+    name: str
+    mesh: str | Path | trimesh.Trimesh
+    mass: float | None = None
+    density: float | None = None
+    friction: float | None = None
+    scale: float = 1.0
+    pieces: tuple[trimesh.Trimesh, ...] | None = None
+    rgba: Rgba | None = None
+    description: str = ""
+    decomposition: Decomposition = Decomposition()
+
+    @classmethod
+    def from_file(
+        cls,
+        mesh: str | Path,
+        *,
+        mass: float | None = None,
+        density: float | None = None,
+        friction: float | None = None,
+        scale: float = 1.0,
+        description: str = "",
+    ) -> ObjectSource:
+        """A mesh file under the name of its stem, such as `003_cracker_box.obj`."""
+        return cls(
+            name=object_name(Path(mesh).stem),
+            mesh=Path(mesh),
+            mass=mass,
+            density=density,
+            friction=friction,
+            scale=scale,
+            description=description,
+        )
+
+    @property
+    def coefficient(self) -> float:
+        """The friction coefficient that the object gets."""
+        return DEFAULT_FRICTION if self.friction is None else self.friction
+
+
+def object_name(text: str) -> str:
+    """A valid object name: `Bleach Cleanser (2)` becomes `bleach_cleanser_2`.
+
+    Raises:
+        InvalidInputError: no letter or digit is left.
+    """
+    name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+    if not name:
+        raise InvalidInputError(f"{text!r} makes no object name; use letters or digits a-z, 0-9")
+    return name
+
+
+def check_source(source: ObjectSource) -> None:
+    """Checks the numbers that come with a mesh.
+
+    Raises:
+        InvalidInputError: a name, mass, density, friction or colour that no object can have.
+    """
+    if not NAME_PATTERN.fullmatch(source.name):
+        raise InvalidInputError(
+            f"{source.name!r} is no object name; use a-z, 0-9 and underscores, such as"
+            f" {object_name(source.name + '_0').removesuffix('_0') or 'mug'!r}"
+        )
+    for label, value, unit in (
+        ("mass", source.mass, " kg"),
+        ("density", source.density, " kg/m^3"),
+        ("scale", source.scale, ""),
+    ):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InvalidInputError(
+                f"{source.name}: {label} is {value:g}{unit}; it must be above 0"
+                + (" (leave it out to use a density)" if label == "mass" else "")
+            )
+    if not 0.0 <= source.coefficient < float("inf"):
+        raise InvalidInputError(
+            f"{source.name}: friction is {source.coefficient:g}; it must be 0 or more"
+        )
+    if source.rgba is not None and not all(0.0 <= c <= 1.0 for c in source.rgba):
+        raise InvalidInputError(f"{source.name}: rgba is {source.rgba}; each must be in [0, 1]")
