@@ -24,12 +24,15 @@ from burg_drake.system_libraries import apt_command, missing_render_libraries
 RENDERER = "burg_drake"
 LIGHTS = [
     LightParameter(
-        type="directional", frame="world", direction=np.array(direction), intensity=intensity
+        type="directional", frame=frame, direction=np.array(direction), intensity=intensity
     )
-    for direction, intensity in (((-0.3, 0.4, -1.0), 0.85), ((-0.8, 0.6, -0.3), 0.35))
+    for frame, direction, intensity in (
+        ("world", (-0.3, 0.3, -1.0), 0.6),
+        ("camera", (0.2, 0.1, 1.0), 0.65),
+    )
 ]
-"""Room light: strong from above, weaker from the side; without shadows, which cost three times the
-rendering."""
+"""Room light from above, and a weaker light that goes with the camera, so that nothing is black.
+Without shadows, which cost three times the rendering."""
 HALF_PIXEL = 0.5
 """Drake puts pixel edges at integers, OpenCV pixel centres; intrinsics differ by half a pixel."""
 

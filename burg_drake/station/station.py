@@ -124,6 +124,17 @@ class StationDocument:
     cameras: dict[str, Camera] = field(default_factory=dict)
     background: dict[str, Obstacle] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        if self.arm is None:
+            return
+        x, y, z = self.arm.X_WA.translation
+        (cx, cy), (sx, sy, _) = self.table.center, self.table.size
+        if z < 0.0 and abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2:
+            raise InvalidInputError(
+                f"arm.X_WA puts the arm's base {-z:g} m below the table top; z has to be at least"
+                " 0 over the table"
+            )
+
 
 @dataclass(frozen=True, eq=False)
 class Station:

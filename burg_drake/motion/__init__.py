@@ -1,0 +1,1 @@
+"""Whether the arm can bring the hand to a grasp."""

@@ -1,0 +1,42 @@
+"""The scenes that the package installs are at rest: nothing moves when time starts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from burg_drake.core.frames import inverse, rotation_angle, transform_points
+from burg_drake.core.resources import builtin_names
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.check import check_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import load_station
+
+SECONDS = 1.0
+MOVED = 1e-4
+TURNED = np.deg2rad(0.1)
+
+
+@pytest.mark.parametrize("name", builtin_names("scenes"))
+def test_nothing_moves(name: str) -> None:
+    scene, station = load_scene(name), load_station("panda_tabletop")
+    built = build_station_diagram(scene, station, robot="none")
+    simulator = Simulator(built.diagram)
+    context = built.plant.GetMyContextFromRoot(simulator.get_context())
+    for time in np.linspace(0.0, SECONDS, 11)[1:]:
+        simulator.AdvanceTo(time)
+        for instance, index in built.free.items():
+            body = built.plant.get_body(index)
+            X_WO = built.plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+            X_OO = inverse(built.X_WO(instance)) @ X_WO
+            p_OOcm = np.array(scene.entry(instance).mass_properties.center_of_mass)
+            moved = np.linalg.norm(transform_points(X_OO, p_OOcm[None])[0] - p_OOcm)
+            assert moved < MOVED, (instance, time)
+            assert rotation_angle(X_OO[:3, :3]) < TURNED, (instance, time)
+
+
+@pytest.mark.parametrize("station", builtin_names("stations"))
+@pytest.mark.parametrize("name", builtin_names("scenes"))
+def test_every_scene_is_sound_on_every_station(name: str, station: str) -> None:
+    assert check_scene(load_scene(name), load_station(station)) == ()

@@ -1,0 +1,113 @@
+"""Overlaps by closed form: boxes that stand into each other by a known amount."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.objects.build import build_library
+from burg_drake.objects.source import ObjectSource
+from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.scene.validate import SceneIssue
+from burg_drake.station.check import check_scene, require_sound_scene
+from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
+
+EDGE = 0.06
+HEIGHT = EDGE / 2
+"""Of a cube's centre above the board [m]."""
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cubes")
+    cube = ObjectSource(name="cube", mesh=trimesh.creation.box((EDGE, EDGE, EDGE)), mass=0.2)
+    assert not build_library([cube], out).failed
+    return out
+
+
+@pytest.fixture(scope="module")
+def panda() -> Station:
+    return load_station("panda_tabletop")
+
+
+def bare_station(panda: Station, **changes: object) -> Station:
+    """A table without an arm; the board lies at the world's origin."""
+    document = StationDocument(name="bare", table=Table(size=(2.0, 2.0, 0.1)), **changes)  # type: ignore[arg-type]
+    return Station(document, panda.hand, panda.hand_model, None, Path("bare.yaml"))
+
+
+def scene_of(library: Path, folder: Path, *centres: tuple[float, float, float]) -> Scene:
+    instances = tuple(
+        Instance(name=f"cube_{i}", object="cube", X_SO=Pose(p)) for i, p in enumerate(centres)
+    )
+    document = SceneDocument(name="cubes", library=str(library), instances=instances)
+    save_scene(document, folder / "scene.yaml")
+    return load_scene(folder / "scene.yaml")
+
+
+def only(issues: tuple[SceneIssue, ...]) -> SceneIssue:
+    (issue,) = issues
+    return issue
+
+
+def test_two_boxes_that_overlap_by_3_mm(library: Path, panda: Station, tmp_path: Path) -> None:
+    apart = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT), (0.2 + EDGE + 1e-4, 0.2, HEIGHT))
+    assert check_scene(apart, panda) == ()
+    scene = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT), (0.2 + EDGE - 0.003, 0.2, HEIGHT))
+    issue = only(check_scene(scene, panda))
+    assert (issue.instance, issue.kind) == ("cube_0", "overlap")
+    assert issue.amount == pytest.approx(0.003, abs=1e-6)
+    assert issue.message == "'cube_0' and 'cube_1' overlap by 3.0 mm; move them apart"
+
+
+def test_touching_by_less_than_a_millimetre_is_fine(
+    library: Path, panda: Station, tmp_path: Path
+) -> None:
+    scene = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT), (0.2, 0.2 + EDGE - 9e-4, HEIGHT))
+    assert check_scene(scene, panda) == ()
+
+
+def test_obstacle_of_the_station(library: Path, panda: Station, tmp_path: Path) -> None:
+    wall = Obstacle(X_WB=Pose((0.25, 0.2, 0.1)), size=(0.02, 0.3, 0.2))
+    scene = scene_of(library, tmp_path, (0.215, 0.2, HEIGHT))
+    issue = only(check_scene(scene, bare_station(panda, background={"wall": wall})))
+    assert issue.message == "'cube_0' and 'wall' overlap by 5.0 mm; move them apart"
+
+
+def test_buried_is_said_once(library: Path, panda: Station, tmp_path: Path) -> None:
+    issue = only(check_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT - 0.01)), panda))
+    assert issue.kind == "in_ground"
+
+
+def test_board_below_the_table_top(library: Path, panda: Station, tmp_path: Path) -> None:
+    sunk = bare_station(panda, X_WS=Pose((0.0, 0.0, -0.004)))
+    issue = only(check_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), sunk))
+    assert issue.message == "'cube_0' and 'table' overlap by 4.0 mm; move them apart"
+
+
+def test_beside_the_table(library: Path, panda: Station, tmp_path: Path) -> None:
+    moved = bare_station(panda, X_WS=Pose((0.85, 0.0, 0.0)))
+    issue = only(check_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), moved))
+    assert issue.kind == "out_of_bounds"
+    assert issue.amount == pytest.approx(0.05)
+    assert "stands 50 mm beside the table of station 'bare'" in issue.message
+
+
+def test_the_arm_at_home_is_in_the_way(library: Path, panda: Station, tmp_path: Path) -> None:
+    # The arm's base is at the world's origin, behind the board's lower edge: out of bounds, too.
+    x, y = panda.document.X_WS.translation[1], -panda.document.X_WS.translation[0]
+    kinds = {i.kind for i in check_scene(scene_of(library, tmp_path, (x, y, HEIGHT)), panda)}
+    assert kinds == {"out_of_bounds", "overlap"}
+
+
+def test_require_sound_scene(library: Path, panda: Station, tmp_path: Path) -> None:
+    require_sound_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), panda)
+    overlapping = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT), (0.2, 0.21, HEIGHT))
+    with pytest.raises(
+        InvalidInputError, match=r"scene\.yaml: 'cube_0' and 'cube_1' overlap by 50"
+    ):
+        require_sound_scene(overlapping, panda)

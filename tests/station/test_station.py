@@ -1,0 +1,145 @@
+"""The station document, and the stations that the package installs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import DocumentError, UnknownNameError
+from burg_drake.core.frames import inverse
+from burg_drake.core.resources import builtin_names, resolve
+from burg_drake.station.station import Camera, Station, load_station
+
+A2 = np.array([[0, 0, 0], [0.594, 0, 0], [0.594, 0.42, 0], [0, 0.42, 0]])
+"""Corners of the sheet in the scene frame [m]."""
+
+STATION = """\
+version: 1
+name: mine
+hand: panda_hand
+arm:
+  X_WA: {translation: [0.0, 0.0, 0.0]}
+  home: [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+table: {center: [0.3, 0.0], size: [1.2, 1.4, 0.1]}
+cameras:
+  top: {X_WC: {translation: [0.4, 0.0, 1.0], rpy_deg: [180.0, 0.0, 0.0]}}
+background:
+  wall: {X_WB: {translation: [0.9, 0.0, 0.2]}, size: [0.02, 1.0, 0.4]}
+"""
+
+
+def station_file(folder: Path, *replaced: tuple[str, str]) -> Path:
+    text = STATION
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "mine.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(params=builtin_names("stations"))
+def builtin(request: pytest.FixtureRequest) -> Station:
+    return load_station(request.param)
+
+
+def board_corners(station: Station) -> np.ndarray:
+    X_WS = station.document.X_WS.matrix()
+    return A2 @ X_WS[:3, :3].T + X_WS[:3, 3]
+
+
+def test_the_sheet_lies_on_the_table(builtin: Station) -> None:
+    corners = board_corners(builtin)
+    table = builtin.document.table
+    np.testing.assert_allclose(corners[:, 2], 0.0, atol=1e-12)
+    assert (np.abs(corners[:, :2] - table.center) < np.array(table.size[:2]) / 2).all()
+
+
+def test_the_sheet_is_in_front_of_the_arm(builtin: Station) -> None:
+    assert builtin.document.arm is not None
+    X_WA = builtin.document.arm.X_WA.matrix()
+    centre = inverse(X_WA) @ [*board_corners(builtin).mean(axis=0), 1.0]
+    assert 0.4 < centre[0] < 0.55 and abs(centre[1]) < 0.2
+
+
+def test_cameras_see_the_whole_sheet(builtin: Station) -> None:
+    assert builtin.document.cameras
+    for name, camera in builtin.document.cameras.items():
+        X_CW = inverse(camera.X_WC.matrix())
+        p = board_corners(builtin) @ X_CW[:3, :3].T + X_CW[:3, 3]
+        assert (p[:, 2] > 0.3).all(), name
+        pixels = p[:, :2] / p[:, 2:] * camera.focal + camera.principal_point
+        assert (pixels > 0).all() and (pixels < (camera.width, camera.height)).all(), name
+        up_C = X_CW[:3, 2]
+        assert up_C[1] < -0.5, f"{name} does not stand upright"
+
+
+def test_names_are_those_of_the_files(builtin: Station) -> None:
+    assert builtin.name == builtin.path.stem
+
+
+def test_a_station_of_ones_own(tmp_path: Path) -> None:
+    station = load_station(station_file(tmp_path))
+    assert station.hand.name == "panda_hand"
+    assert station.hand_model == resolve("package://burg_drake/models/panda/panda_hand.sdf")
+    assert station.arm_model == resolve("package://burg_drake/models/panda/panda_arm.sdf")
+    assert station.document.background["wall"].size == (0.02, 1.0, 0.4)
+
+
+def test_content_is_that_of_what_is_placed(tmp_path: Path) -> None:
+    plain = load_station(station_file(tmp_path)).content
+    assert load_station(station_file(tmp_path, ("name: mine", "name: yours"))).content == plain
+    for old, new in (
+        ("X_WA: {translation: [0.0", "X_WA: {translation: [0.01"),
+        ("-0.785", "-0.786"),
+        ("size: [0.02", "size: [0.03"),
+    ):
+        assert load_station(station_file(tmp_path, (old, new))).content != plain
+
+
+def test_principal_point() -> None:
+    pose = load_station("panda_tabletop").document.cameras["board"].X_WC
+    assert Camera(X_WC=pose).principal_point == (319.5, 239.5)
+    assert Camera(X_WC=pose, center=(300.0, 200.0)).principal_point == (300.0, 200.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("hand: panda_hand", "hand: panda_hnd", r"panda_hnd .*did you mean 'panda_hand'"),
+        ("table:", "tabel:", r"mine\.yaml:7: unknown key 'tabel'; did you mean 'table'"),
+        (
+            "X_WA: {translation: [0.0, 0.0, 0.0]}",
+            "X_WA: {translation: [0.0, 0.0, -0.05]}",
+            r"mine\.yaml:1: arm\.X_WA puts the arm's base 0\.05 m below the table top; z has",
+        ),
+        ("size: [1.2, 1.4, 0.1]", "size: [1.2, 0.0, 0.1]", r"mine\.yaml:7: .*table size must be p"),
+        ("size: [0.02", "size: [-0.02", r"mine\.yaml:11: background\.wall: obstacle size \[-0"),
+        ("[180.0, 0.0, 0.0]}", "[180.0, .nan, 0.0]}", r"mine\.yaml:9: cameras\.top\.X_WC\.rpy_deg"),
+        (
+            "[180.0, 0.0, 0.0]}}",
+            "[180.0, 0.0, 0.0]}, depth_range: [1.0, 0.5]}",
+            r"cameras\.top: camera depth_range must rise",
+        ),
+        (
+            "X_WA: {translation",
+            "model: package://burg_drake/models/panda/ur5.urdf\n  X_WA: {translation",
+            r"package://burg_drake/models/panda/ur5\.urdf does not exist",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises((DocumentError, UnknownNameError), match=message):
+        load_station(station_file(tmp_path, (old, new)))
+
+
+def test_a_base_beside_the_table_may_be_lower(tmp_path: Path) -> None:
+    low = ("X_WA: {translation: [0.0, 0.0, 0.0]}", "X_WA: {translation: [-0.5, 0.0, -0.2]}")
+    assert load_station(station_file(tmp_path, low)).document.arm is not None
+
+
+def test_unknown_station() -> None:
+    with pytest.raises(UnknownNameError, match=r"panda_tabeltop .*did you mean 'panda_tabletop'"):
+        load_station("panda_tabeltop")
