@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,13 +14,16 @@ from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, dump_document, load_document, save_document
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary, load_library
 
+NAME_PATTERN = re.compile(r"[\w.-]+")
+"""Names of instances are parts of grasp ids, of file names and of paths in Meshcat."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Instance:
     """A placed object.
 
     Attributes:
-        name: unique in the scene; the object's name if empty.
+        name: unique in the scene; the object's name if empty. Letters, digits, `_`, `-` and `.`.
         object: name in the library.
         X_SO: pose of the object frame in the scene frame.
     """
@@ -27,6 +31,13 @@ class Instance:
     name: str = ""
     object: str
     X_SO: Pose = Pose()
+
+    def __post_init__(self) -> None:
+        if not NAME_PATTERN.fullmatch(self.name or self.object):
+            raise InvalidInputError(
+                f"name {self.name or self.object!r} cannot be used in paths;"
+                " give letters, digits, '_', '-' and '.'"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +157,10 @@ def load_scene(reference: str | Path) -> Scene:
     """
     path = resolve(reference, "scenes")
     document = load_document(path, SceneDocument)
-    library = load_library(document.library, path.parent)
+    try:
+        library = load_library(document.library, path.parent)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path}: library: {error}") from error
     seen: set[str] = set()
     for key, instances in (("instances", document.instances), ("background", document.background)):
         for i, instance in enumerate(instances):

@@ -136,7 +136,7 @@ def _ground_issue(name: str, p_SV: Array, others: list[Array]) -> SceneIssue | N
             instance=name,
             kind="in_ground",
             amount=-lowest,
-            message=f"{name!r} is in the ground: its lowest point is {_mm(-lowest)} below the board",
+            message=f"{name!r} is in the ground: it reaches {_mm(-lowest)} below the board",
         )
     if lowest > HOVER_TOLERANCE and not any(_may_support(other, p_SV) for other in others):
         return SceneIssue(
