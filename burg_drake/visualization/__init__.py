@@ -1,0 +1,1 @@
+"""Meshcat views: scenes, grasps coloured by outcome, replays."""

@@ -1,0 +1,65 @@
+"""Colours of outcomes: a few groups that stay apart for colour-blind eyes.
+
+The hues are those of Okabe and Ito, "Color Universal Design" (2008).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from burg_drake.core.outcome import Outcome
+
+Rgba = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Outcomes that share a colour.
+
+    Attributes:
+        name: for legends.
+        rgba: colour; grasps that ended early are fainter, as they are many.
+        outcomes: the members.
+    """
+
+    name: str
+    rgba: Rgba
+    outcomes: tuple[Outcome, ...]
+
+    @property
+    def hex(self) -> str:
+        """The colour as HTML has it, without its opacity."""
+        return "#" + "".join(f"{round(255 * c):02x}" for c in self.rgba[:3])
+
+
+GROUPS = (
+    Group("lifted", (0.0, 0.62, 0.45, 1.0), (Outcome.LIFTED,)),
+    Group("lost during lift or hold", (0.90, 0.62, 0.0, 1.0), (Outcome.SLIPPED, Outcome.DROPPED)),
+    Group(
+        "never held",
+        (0.80, 0.47, 0.65, 1.0),
+        (Outcome.NO_CONTACT, Outcome.ONE_FINGER, Outcome.CLOSED_EMPTY),
+    ),
+    Group("arm cannot reach", (0.0, 0.45, 0.70, 0.6), (Outcome.NO_IK, Outcome.ARM_COLLISION)),
+    Group(
+        "hand collides",
+        (0.45, 0.45, 0.45, 0.4),
+        (
+            Outcome.COLLISION_TARGET,
+            Outcome.COLLISION_TABLE,
+            Outcome.COLLISION_CLUTTER,
+            Outcome.COLLISION_BACKGROUND,
+        ),
+    ),
+    Group("simulation failed", (0.0, 0.0, 0.0, 1.0), (Outcome.SIMULATION_FAILED,)),
+)
+"""All groups, best outcome first; every outcome is in exactly one."""
+
+UNJUDGED = Group("not judged", (0.34, 0.71, 0.91, 1.0), ())
+
+
+def group_of(outcome: Outcome | None) -> Group:
+    """The group of an outcome; None stands for a grasp that nobody judged."""
+    if outcome is None:
+        return UNJUDGED
+    return next((g for g in GROUPS if outcome in g.outcomes), UNJUDGED)

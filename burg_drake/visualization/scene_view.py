@@ -1,0 +1,148 @@
+"""A scene on its station in Meshcat: objects with their names, board, table, robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import Meshcat, MeshcatParams, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, transform_points
+from burg_drake.scene.scene import Scene
+from burg_drake.scene.validate import placed_vertices
+from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
+from burg_drake.station.station import Station
+from burg_drake.visualization.text import text_triangles
+
+SKY_COLOR = (0.93, 0.95, 0.97)
+FLOOR_COLOR = (0.76, 0.79, 0.82)
+LIGHTS = {
+    "AmbientLight": 1.3,
+    "FillLight": 0.5,
+    "PointLightNegativeX": 9.0,
+    "PointLightPositiveX": 9.0,
+    "SpotLight": 22.0,
+}
+"""Intensities of Meshcat's lights: soft, and one that casts shadows."""
+SHADOW = {"mapSize.width": 2048.0, "mapSize.height": 2048.0, "normalBias": 0.004, "radius": 3.0}
+"""Settings of the shadow, in three.js' terms, so that it is sharp without stripes."""
+INK = Rgba(0.25, 0.27, 0.30, 1.0)
+LABEL_HEIGHT = 0.011
+"""Capital letters of the names on the board [m]."""
+LABEL_GAP = 0.012
+"""Between an object's footprint and its name [m]."""
+LABEL_LIFT = 1e-3
+"""Height of names and outline above the board, against flicker [m]."""
+FIELD_OF_VIEW_DEG = 45.0
+
+LABELS_PATH = "/drake/labels"
+
+
+def open_meshcat(port: int | None = None) -> Meshcat:
+    """A Meshcat server with a quiet page: light background, no grid, no axes.
+
+    Args:
+        port: where to listen on localhost; the first free one from 7000 if None.
+
+    Raises:
+        InvalidInputError: the port is taken.
+    """
+    try:
+        meshcat = Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
+    except RuntimeError as error:
+        raise InvalidInputError(f"cannot listen on port {port}: {error}; choose another") from error
+    meshcat.SetProperty("/Grid", "visible", False)
+    meshcat.SetProperty("/Axes", "visible", False)
+    meshcat.SetProperty("/Background/<object>", "top_color", list(SKY_COLOR))
+    meshcat.SetProperty("/Background/<object>", "bottom_color", list(FLOOR_COLOR))
+    for light, intensity in LIGHTS.items():
+        meshcat.SetProperty(f"/Lights/{light}", "visible", intensity > 0.0)
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", intensity)
+    lamp = "/Lights/SpotLight/<object>"
+    meshcat.SetProperty(lamp, "castShadow", True)
+    for key, value in SHADOW.items():
+        meshcat.SetProperty(lamp, f"shadow.{key}", value)
+    meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW_DEG)
+    return meshcat
+
+
+def show_scene(
+    scene: Scene,
+    station: Station,
+    meshcat: Meshcat,
+    *,
+    robot: Robot = "arm",
+    labels: bool = True,
+) -> StationDiagram:
+    """Shows a scene as its document places it, the robot at home, and aims the camera.
+
+    Args:
+        scene: what stands on the board.
+        station: where.
+        meshcat: where to show it.
+        robot: as for `build_station_diagram`.
+        labels: write the instances' names on the board.
+
+    Returns:
+        The diagram that was shown.
+    """
+    station_diagram = build_station_diagram(scene, station, robot=robot, meshcat=meshcat)
+    station_diagram.diagram.ForcedPublish(station_diagram.diagram.CreateDefaultContext())
+    draw_board(scene, station, meshcat, labels=labels)
+    aim_camera(scene, station, meshcat, robot=robot)
+    return station_diagram
+
+
+def draw_board(scene: Scene, station: Station, meshcat: Meshcat, *, labels: bool = True) -> None:
+    """Draws the outline of the board and, beside each object, the name of the instance.
+
+    With an arm the names read from the side across from it, where the camera is; without one
+    they read from the board's lower edge.
+    """
+    X_WS = station.document.X_WS.matrix()
+    (x, y), z = scene.board.size, LABEL_LIFT
+    corners = transform_points(X_WS, [[0, 0, z], [x, 0, z], [x, y, z], [0, y, z], [0, 0, z]]).T
+    meshcat.SetLine("/drake/board", np.asfortranarray(corners), 2.0, INK)
+    meshcat.Delete(LABELS_PATH)
+    across = station.document.arm is not None
+    for name in scene.instances if labels else ():
+        points = placed_vertices(scene, name)
+        lower, upper = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        below = LABEL_GAP + LABEL_HEIGHT
+        p_SL = np.array([(lower[0] + upper[0]) / 2, lower[1] - below, LABEL_LIFT])
+        if across:
+            p_SL[1] = upper[1] + below
+        X_SL = RigidTransform(RotationMatrix.MakeZRotation(np.pi if across else 0.0), p_SL)
+        vertices, faces = text_triangles(name, LABEL_HEIGHT)
+        path = f"{LABELS_PATH}/{name}"
+        meshcat.SetTriangleMesh(path, vertices, faces, INK)
+        meshcat.SetTransform(path, RigidTransform(X_WS) @ X_SL)
+
+
+def aim_camera(scene: Scene, station: Station, meshcat: Meshcat, *, robot: Robot = "arm") -> None:
+    """Looks at the board: across it towards the arm if there is one, else from its lower edge."""
+    across = robot == "arm" and station.document.arm is not None
+    size = np.array(scene.board.size)
+    p_ST, p_SC = camera_placement(size, across)
+    if not across and station.document.arm is not None:  # the names read from the other side
+        p_SC = np.array([*(size - p_SC[:2]), p_SC[2]])
+        p_ST = np.array([*(size - p_ST[:2]), p_ST[2]])
+    p_WT, p_WC = transform_points(station.document.X_WS.matrix(), [p_ST, p_SC])
+    meshcat.SetCameraPose(p_WC, p_WT)
+
+
+def camera_placement(board_size: Array, across: bool) -> tuple[Array, Array]:
+    """Target and camera (3,) in the scene frame [m].
+
+    Args:
+        board_size: (2,) [m].
+        across: look over the board at an arm behind its lower edge; else at the board alone.
+    """
+    diagonal = float(np.hypot(*board_size))
+    center = np.array([*(board_size / 2), 0.0])
+    if across:
+        target = center + np.array([0.0, -0.2 * diagonal, 0.40 * diagonal])
+        return target, target + diagonal * np.array([1.05, 1.63, 0.72])
+    return center + np.array([0.0, 0.0, 0.11 * diagonal]), center + diagonal * np.array(
+        [0.3, -0.95, 0.85]
+    )

@@ -1,0 +1,121 @@
+"""Replays: the same outcome as without a picture, an animation, and a camera with a clear view."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
+from burg_drake.core.outcome import Outcome
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.result import Margins, TrialResult
+from burg_drake.station.station import Station, load_station
+from burg_drake.visualization.replay import CLEAR_VIEW, VIEW, camera_offset, describe, record_trial
+from burg_drake.visualization.scene_view import open_meshcat
+
+X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the box, from above."""
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("tabletop_six")
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station("panda_tabletop")
+
+
+def messages(meshcat: Meshcat) -> bytes:
+    """All that a saved page would send to the viewer."""
+    found = re.findall(r"base64,([A-Za-z0-9+/=]+)", meshcat.StaticHtml())
+    return b"".join(base64.b64decode(part) for part in found)
+
+
+def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station: Station) -> None:
+    meshcat = open_meshcat()
+    result = record_trial(scene, station, "box", X_OG, meshcat)
+    assert result == HandTrial(scene, station).run("box", X_OG)
+    assert result.outcome is Outcome.LIFTED
+    recording = meshcat.get_mutable_recording()
+    assert recording.autoplay()
+    assert recording.loop_mode() == type(recording).LoopMode.kLoopRepeat
+    assert b"set_animation" in messages(meshcat)
+
+
+def test_a_collision_is_a_still_picture(scene: Scene, station: Station) -> None:
+    meshcat = open_meshcat()
+    result = record_trial(scene, station, "box", X_OG @ make_pose(p_AB=(0, 0, 0.1)), meshcat)
+    assert result.outcome is Outcome.COLLISION_TARGET
+    assert b"set_animation" not in messages(meshcat)
+    assert meshcat.HasPath("/drake/visualizer/hand/panda_hand")
+
+
+def test_unknown_target(scene: Scene, station: Station) -> None:
+    with pytest.raises(InvalidInputError, match=r"'table' is not a free object.*mug"):
+        record_trial(scene, station, "table", X_OG, open_meshcat())
+
+
+@pytest.mark.parametrize("yaw", np.deg2rad([0, 35, 90, 200]))
+def test_the_camera_looks_across_the_fingers(yaw: float) -> None:
+    X_WG = make_pose(rotation_from_rpy([np.pi, 0.0, yaw]), (0.4, 0.1, 0.2))
+    offset = camera_offset(X_WG, np.empty((0, 3)))
+    heading = offset[:2] / np.linalg.norm(offset[:2])
+    assert abs(heading @ X_WG[:2, 0]) < 0.5  # at least 60 degrees from the closing direction
+    assert heading @ VIEW > 0.0
+    assert offset[2] > 0.0
+
+
+def test_the_camera_avoids_what_is_in_the_way() -> None:
+    X_WG = make_pose(rotation_from_rpy([np.pi, 0.0, 0.3]), (0.4, 0.1, 0.2))
+    free = camera_offset(X_WG, np.empty((0, 3)))
+    behind = X_WG[:3, 3] - 0.3 * free
+    assert np.allclose(camera_offset(X_WG, behind[None]), free)
+    obstacle = X_WG[:3, 3] + 0.3 * free
+    around = camera_offset(X_WG, obstacle[None])
+    flat = (1.0, 1.0, 0.0)
+    beside = np.linalg.norm(np.cross(around * flat, 0.3 * free * flat)) / np.linalg.norm(around[:2])
+    assert beside > CLEAR_VIEW or around[:2] @ free[:2] < 0.0
+
+
+@pytest.mark.parametrize("yaw", np.deg2rad([0, 80, 160, 250, 330]))
+def test_the_camera_is_not_behind_a_hand_that_comes_from_the_side(yaw: float) -> None:
+    approach = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    X_WG = grasp_from_axes((-np.sin(yaw), np.cos(yaw), 0.0), approach, (0.4, 0.1, 0.2))
+    heading = camera_offset(X_WG, np.empty((0, 3)))[:2] / 0.8
+    assert heading @ approach[:2] > -0.3
+
+
+def test_a_vertical_closing_axis_has_a_camera() -> None:
+    X_WG = grasp_from_axes((0, 0, 1), (1, 0, 0), (0.4, 0.1, 0.2))
+    assert np.isfinite(camera_offset(X_WG, np.empty((0, 3)))).all()
+
+
+def test_describe() -> None:
+    lifted = TrialResult(
+        outcome=Outcome.LIFTED,
+        margins=Margins(
+            overlap=0.0,
+            slip=0.0012,
+            tilt=np.deg2rad(2.0),
+            pad_force=39.96,
+            lift=0.2996,
+            others_moved=0.0,
+            end_time=2.5,
+        ),
+    )
+    assert describe(lifted) == [
+        "lifted",
+        "lift 300 mm, slip 1.2 mm, tilt 2.0 deg, pad force 40.0 N, others moved 0.0 mm",
+    ]
+    blocked = TrialResult(
+        outcome=Outcome.COLLISION_CLUTTER, margins=Margins(overlap=0.0034), blocker="mug"
+    )
+    assert describe(blocked) == ["collision clutter (mug, 3.4 mm deep)"]
