@@ -1,0 +1,163 @@
+"""Arguments that several verbs share, and what values they accept."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import textwrap
+from typing import Any, NoReturn
+
+DEFAULT_STATION = "panda_tabletop"
+# Kept in step with station.engine, which imports too much for a help text; a test compares them.
+ENGINE_NAMES = ("reference", "standard", "screening")
+DEFAULT_ENGINE = "standard"
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports an error in one line, and shows epilogs as they are written."""
+
+    def __init__(self, **options: Any) -> None:
+        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        options.setdefault("allow_abbrev", False)
+        super().__init__(**options)
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the program with exit code 2."""
+        self.exit(2, f"burg-drake: error: {message} (see {self.prog} --help)\n")
+
+
+def examples(*lines: str) -> str:
+    """Epilog of a verb's help."""
+    return "examples:\n" + textwrap.indent("\n".join(lines), "  ")
+
+
+def add_verb(verbs: Any, name: str, run: Any, summary: str, *lines: str) -> Parser:
+    """Adds a verb.
+
+    Args:
+        verbs: what `add_subparsers` returned.
+        name: of the verb.
+        run: called with the parsed arguments; returns the exit code.
+        summary: one sentence.
+        lines: examples.
+    """
+    parser: Parser = verbs.add_parser(
+        name,
+        help=summary,
+        description=_sentence(summary),
+        epilog=examples(*lines),
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_group(verbs: Any, name: str, summary: str) -> Any:
+    """Adds a verb that has verbs of its own; returns what those are added to."""
+    parser = verbs.add_parser(name, help=summary, description=_sentence(summary))
+    return parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+
+
+def _sentence(summary: str) -> str:
+    return f"{summary[0].upper()}{summary[1:]}."
+
+
+def add_scene(parser: Parser) -> None:
+    """The argument SCENE."""
+    parser.add_argument(
+        "scene", metavar="SCENE", help="scene file, or name of a built-in one: tabletop_six"
+    )
+
+
+def add_station(parser: Parser) -> None:
+    """The option --station."""
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        default=DEFAULT_STATION,
+        help="station file or built-in name (default: %(default)s)",
+    )
+
+
+def add_view(parser: Parser) -> None:
+    """The options of verbs that show something."""
+    parser.add_argument(
+        "--html", metavar="FILE", help="write one self-contained page instead of a live view"
+    )
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="where the live view listens (default: first free)"
+    )
+    parser.add_argument(
+        "--no-wait", action="store_true", help="do not keep the live view open until Ctrl-C"
+    )
+
+
+def positive_int(text: str) -> int:
+    """A whole number from 1."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
+    return value
+
+
+def seed(text: str) -> int:
+    """A whole number from 0."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0")
+    return value
+
+
+def port(text: str) -> int:
+    """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if not 1024 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1024 to 65535")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return value
+
+
+def named_positive(text: str) -> tuple[str, float]:
+    """`NAME=VALUE` with a value above 0."""
+    name, equals, value = text.rpartition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as mug=0.118")
+    try:
+        return name, positive(value)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{name}: {error}") from error
+
+
+def friction(text: str) -> tuple[str, float]:
+    """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
+    name, _, value = text.rpartition("=")
+    mu = number(value)
+    if mu < 0.0:
+        raise argparse.ArgumentTypeError(f"{value} is not a friction coefficient from 0")
+    return name, mu

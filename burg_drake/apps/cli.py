@@ -1,0 +1,85 @@
+"""The command `burg-drake`: its parser, and how it ends.
+
+Exit codes: 0 all went well; 1 finished, with failures to report; 2 the input cannot be used;
+130 interrupted by Ctrl-C. Everything heavy is imported by the verbs when they run, so that
+`burg-drake --help` answers in a moment.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+from burg_drake import __version__
+from burg_drake.apps import evaluate, grasps, library, replay, report, scene
+from burg_drake.apps.arguments import Parser, examples
+from burg_drake.core.errors import BurgError
+
+INPUT_ERROR = 2
+INTERRUPTED = 130
+DEBUG_VARIABLE = "BURG_DEBUG"
+
+VERBS = (library, scene, evaluate, replay, grasps, report)
+
+
+def build_parser() -> Parser:
+    """The parser of the whole command."""
+    parser = Parser(
+        prog="burg-drake",
+        description="Reproducible robot-grasping scenes and grasp evaluation on Drake.",
+        epilog=examples(
+            "burg-drake scene show tabletop_six",
+            "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
+            "burg-drake replay runs/first --best",
+            "burg-drake library build scans/*.obj -o my_library",
+        )
+        + f"\n\nSet {DEBUG_VARIABLE}=1 to see where an error came from.",
+    )
+    parser.add_argument("--version", action="version", version=f"burg-drake {__version__}")
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+    for module in VERBS:
+        module.add_to(verbs)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs a command line and returns its exit code.
+
+    Args:
+        argv: arguments without the program's name; those of the process if None.
+    """
+    arguments = build_parser().parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except KeyboardInterrupt:
+        return _end("interrupted" + getattr(arguments, "after_interrupt", ""), INTERRUPTED)
+    except BurgError as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        return _end(f"error: {' '.join(str(error).split())}", INPUT_ERROR)
+    except ImportError as error:
+        if os.environ.get(DEBUG_VARIABLE) or "cannot open shared object file" not in str(error):
+            raise
+        return _end(f"error: {_missing_library(error)}", INPUT_ERROR)
+    except BrokenPipeError:  # the reader of our output is gone: `burg-drake ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _end(message: str, code: int) -> int:
+    sys.stdout.flush()
+    print(f"burg-drake: {message}", file=sys.stderr)
+    return code
+
+
+def _missing_library(error: ImportError) -> str:
+    """What to do about a system library that a package could not load."""
+    from burg_drake.system_libraries import describe_missing, missing_render_libraries
+
+    missing = missing_render_libraries()
+    return describe_missing(missing) if missing else str(error)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,142 @@
+"""`burg-drake evaluate`: the main job, from a scene to judged grasps."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import (
+    DEFAULT_ENGINE,
+    ENGINE_NAMES,
+    add_scene,
+    add_station,
+    add_verb,
+    positive_int,
+    seed,
+)
+from burg_drake.core.errors import UnknownNameError, nearest
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.run_store import Run
+    from burg_drake.scene.scene import Scene
+
+DEFAULT_OUTPUT = "runs"
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "evaluate",
+        run_evaluate,
+        "judge grasps of a scene on a station: clear, reachable, executed",
+        "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
+        "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
+        "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --no-reach",
+        "",
+        "The same command goes on where an interrupted one stopped.",
+    )
+    add_scene(parser)
+    add_station(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="RUN",
+        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE)",
+    )
+    parser.add_argument(
+        "--grasps-per-object",
+        metavar="N",
+        type=positive_int,
+        default=100,
+        help="grasps sampled for each object (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--grasps", metavar="FILE", help="judge these grasps (.npz of a GraspSet); sample none"
+    )
+    parser.add_argument(
+        "--engine",
+        choices=ENGINE_NAMES,
+        default=DEFAULT_ENGINE,
+        help="how time is stepped: for truth, for results, for a first look (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+    )
+    parser.add_argument(
+        "--table",
+        choices=("csv", "parquet"),
+        default="csv",
+        help="format of the table of results (default: %(default)s)",
+    )
+    parser.add_argument("--no-reach", action="store_true", help="do not ask if the arm reaches")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def run_evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluates; 1 if some grasps could not be simulated."""
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.cascade import evaluate
+    from burg_drake.scene.scene import load_scene
+    from burg_drake.station.station import load_station
+
+    scene = load_scene(arguments.scene)
+    station = load_station(arguments.station)
+    given = arguments.grasps
+    run = evaluate(
+        scene,
+        station,
+        arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
+        grasps_per_object=arguments.grasps_per_object,
+        grasps=None if given is None else by_instance(scene, GraspSet.load(given), given),
+        engine=arguments.engine,
+        seed=arguments.seed,
+        workers=arguments.workers,
+        table=arguments.table,
+        reach=not arguments.no_reach,
+        progress=not arguments.quiet,
+    )
+    print_summary(run)
+    print(f"table   {run.table_path}")
+    print(f"report  {run.report_path}")
+    if run.failures:
+        print(
+            f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
+            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path}",
+            file=sys.stderr,
+        )
+        return 1
+    return 0
+
+
+def print_summary(run: Run) -> None:
+    """Prints the tables of a run."""
+    from rich.console import Console
+
+    from burg_drake.evaluation.summary import summarize, summary_view
+
+    Console().print(summary_view(summarize(run)))
+
+
+def by_instance(scene: Scene, grasps: GraspSet, source: str) -> dict[str, GraspSet]:
+    """The grasps of a file for all instances of their objects.
+
+    Raises:
+        UnknownNameError: grasps of an object that the scene does not have.
+    """
+    objects = {scene.instance(name).object for name in scene.instances}
+    unknown = sorted(set(grasps.object.tolist()) - objects)
+    if unknown:
+        raise UnknownNameError(
+            f"{source} has grasps of object {unknown[0]!r}, which is not in scene {scene.name!r};"
+            f" {nearest(unknown[0], objects)}"
+        )
+    sets = {name: scene.instance(name).object for name in scene.instances}
+    members = {name: grasps.object == object for name, object in sets.items()}
+    return {name: grasps.select(mask) for name, mask in members.items() if mask.any()}

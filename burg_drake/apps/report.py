@@ -1,0 +1,35 @@
+"""`burg-drake report`: what a run found, as tables and as a page, complete or not."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from burg_drake.apps.arguments import add_verb
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "report",
+        run_report,
+        "print what a run found so far, and write its report again",
+        "burg-drake report runs/first",
+    )
+    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    """Prints the tables of a run and writes its report."""
+    from burg_drake.apps.evaluate import print_summary
+    from burg_drake.evaluation.report import write_report
+    from burg_drake.evaluation.run_store import load_run
+
+    run = load_run(arguments.run_folder)
+    write_report(run)
+    print_summary(run)
+    if not run.complete:
+        print(f"{len(run.verdicts)} of {len(run.candidates)} grasps are judged; evaluate goes on")
+    print(f"report  {run.report_path}")
+    return 0

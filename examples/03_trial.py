@@ -1,0 +1,24 @@
+"""One grasp trial: sample grasps on an object, execute one that is clear, read the outcome."""
+
+from __future__ import annotations
+
+import trimesh
+
+from burg_drake import HandTrial, load_scene, load_station, sample_antipodal
+from burg_drake.core.content import rng_from
+
+scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+mesh = trimesh.load_mesh(scene.library.path(scene.entry("box").mesh))
+grasps = sample_antipodal(
+    mesh, 500, rng_from("example"), opening=station.hand.opening, object="box"
+)
+
+trial = HandTrial(scene, station)  # one diagram for all trials of the scene
+X_WG = trial.diagram.X_WO("box") @ grasps.X_OG
+clear = [i for i, X in enumerate(X_WG) if trial.clearance.check("box", X).outcome is None]
+print(f"the open hand is clear at {len(clear)} of {len(grasps)} sampled grasps")
+
+result = trial.run("box", grasps.X_OG[clear[0]])
+print(f"outcome: {result.outcome}")
+print(f"slip {1e3 * result.margins.slip:.2f} mm, pad force {result.margins.pad_force:.1f} N")
+print("with oil on the box:", trial.run("box", grasps.X_OG[clear[0]], friction=0.02).outcome)

@@ -1,0 +1,22 @@
+"""The main job on a small scale: judge grasps of a scene in parallel, read the results."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from burg_drake import evaluate
+from burg_drake.evaluation.run_store import load_run
+
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder) / "run"
+    evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=10, progress=False)
+
+    run = load_run(path)  # as one would at any later time, on any machine
+    print(f"{len(run.verdicts)} grasps, judged with Drake {run.document.versions['drake']}")
+    for outcome in sorted(set(run.results["outcome"])):
+        print(f"{(run.results['outcome'] == outcome).sum():4d} {outcome}")
+    for id in run.best(3):
+        row = run.row(id)
+        print(f"{id}: slip {1e3 * row['slip']:.2f} mm, held with {row['pad_force']:.1f} N")
+    print(f"table: {run.table_path.name}, report: {run.report_path.name}")

@@ -1,0 +1,62 @@
+"""A mesh, a scene and a finished run for the verbs to work on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from burg_drake.core.frames import grasp_from_axes, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run_store import Run
+
+SCENE = """\
+version: 1
+name: two
+library: household
+board: {size: [0.594, 0.420]}
+instances:
+  - object: mug
+    X_SO: {translation: [0.12, 0.11, 0.0]}
+  - object: bottle
+    X_SO: {translation: [0.29, 0.11, 0.0]}
+"""
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p_AB=(0, 0, -0.1))])
+"""One that lifts the box, one that collides with it, one in thin air."""
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    """A block of 50 x 40 x 60 mm, in metres."""
+    path = tmp_path / "block.ply"
+    trimesh.creation.box((0.05, 0.04, 0.06)).export(path)
+    return path
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    """A sound scene, to be spoilt."""
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Three grasps on the box with known outcomes; the arm is not asked."""
+    folder = tmp_path_factory.mktemp("run") / "box"
+    grasps = GraspSet.create(X_OG, object="box", width=0.06)
+    return evaluate(
+        "tabletop_six",
+        "panda_tabletop",
+        folder,
+        grasps={"box": grasps},
+        workers=1,
+        reach=False,
+        progress=False,
+    )

@@ -1,0 +1,165 @@
+"""The command as a whole: help, version, exit codes, errors in one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from burg_drake import __version__
+from burg_drake.apps import cli
+from burg_drake.apps.arguments import DEFAULT_ENGINE, DEFAULT_STATION, ENGINE_NAMES
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.resources import builtin_names
+from burg_drake.station.engine import ENGINES
+
+HELP = (
+    [],
+    ["library"],
+    ["library", "build"],
+    ["library", "list"],
+    ["scene"],
+    ["scene", "show"],
+    ["scene", "validate"],
+    ["evaluate"],
+    ["replay"],
+    ["grasps"],
+    ["grasps", "show"],
+    ["report"],
+)
+LEAVES = ("build", "list", "show", "validate", "evaluate", "replay", "report")
+
+
+@pytest.mark.parametrize("verb", HELP, ids=" ".join)
+def test_help(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([*verb, "--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    assert text.startswith(f"usage: burg-drake {' '.join(verb)}".strip())
+    if not verb or verb[-1] in LEAVES:
+        assert "examples:\n  burg-drake " in text
+
+
+def test_examples_of_the_help_can_be_parsed(capsys: pytest.CaptureFixture[str]) -> None:
+    for verb in HELP:
+        with pytest.raises(SystemExit):
+            cli.main([*verb, "--help"])
+        for line in capsys.readouterr().out.splitlines():
+            if line.startswith("  burg-drake "):
+                cli.build_parser().parse_args(line.split()[1:])
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, json\nfrom burg_drake.apps.cli import main\n"
+        "try: main(['evaluate', '--help'])\nexcept SystemExit: pass\n"
+        "print('MODULES', json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = json.loads(done.stdout.split("MODULES ")[1])
+    heavy = ("pydrake", "trimesh", "scipy", "numpy", "rich", "cv2", "coacd", "embreex", "yaml")
+    assert [name for name in heavy if name in modules] == []
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"burg-drake {__version__}\n"
+
+
+def test_as_a_process() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "burg_drake.apps.cli", "scene", "validate", "nowhere"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert done.stdout == ""
+    names = ", ".join(builtin_names("scenes"))
+    assert done.stderr == f"burg-drake: error: nowhere does not exist; Known: {names}\n"
+
+
+@pytest.mark.parametrize("arguments", [[], ["scene"], ["nonsense"], ["evaluate", "--sead", "1"]])
+def test_usage_errors_are_one_line(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        cli.main(arguments)
+    assert ended.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("burg-drake: error: ")
+    assert error.count("\n") == 1
+
+
+def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
+    """Exit code of a verb that ends with an error."""
+
+    def fail(arguments: object) -> int:
+        raise error
+
+    monkeypatch.setattr("burg_drake.apps.report.run_report", fail)
+    return cli.main(["report", "somewhere"])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (InvalidInputError("two\nlines"), 2, "burg-drake: error: two lines"),
+        (UnknownNameError("no 'x' here"), 2, "burg-drake: error: no 'x' here"),
+        (KeyboardInterrupt(), 130, "burg-drake: interrupted"),
+    ],
+)
+def test_how_it_ends(
+    error: BaseException,
+    code: int,
+    line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delenv("BURG_DEBUG", raising=False)
+    assert run_with(monkeypatch, error) == code
+    assert capsys.readouterr().err == f"{line}\n"
+
+
+def test_debug_shows_where_an_error_came_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BURG_DEBUG", "1")
+    with pytest.raises(InvalidInputError):
+        run_with(monkeypatch, InvalidInputError("x"))
+
+
+def test_bugs_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ZeroDivisionError):
+        run_with(monkeypatch, ZeroDivisionError())
+
+
+def test_a_missing_system_library_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("BURG_DEBUG", raising=False)
+    gone = ImportError("libX.so.1: cannot open shared object file: No such file or directory")
+    assert run_with(monkeypatch, gone) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    with pytest.raises(ImportError):
+        run_with(monkeypatch, ImportError("No module named 'x'"))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m burg_drake.apps.cli library list household | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_defaults_are_those_of_the_library() -> None:
+    assert set(ENGINE_NAMES) == set(ENGINES)
+    assert DEFAULT_ENGINE in ENGINES
+    assert DEFAULT_STATION in builtin_names("stations")

@@ -1,0 +1,158 @@
+"""`burg-drake library`: what is built, and one line for each thing that is wrong."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from burg_drake.apps.cli import main
+from burg_drake.objects.library import load_library
+
+Capture = pytest.CaptureFixture[str]
+
+
+def build(*arguments: object) -> int:
+    return main(["library", "build", *map(str, arguments), "--workers", "1"])
+
+
+def test_build_and_list(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
+    library = tmp_path / "library"
+    assert build(mesh, "-o", library, "--mass", "block=0.2", "--friction", "0.5") == 0
+    entry = load_library(library).entry("block")
+    assert (entry.mass, entry.friction) == (0.2, 0.5)
+    assert "1 built, 0 up to date, 0 failed" in capsys.readouterr().out
+    assert build(mesh, "-o", library, "--mass", "block=0.2", "--friction", "0.5") == 0
+    assert "0 built, 1 up to date, 0 failed" in capsys.readouterr().out
+    assert main(["library", "list", str(library)]) == 0
+    listing = capsys.readouterr().out
+    assert "50 x 40 x 60" in listing and "200.0" in listing and "1 object in" in listing
+
+
+def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:
+    shutil.copy(mesh, tmp_path / "Other-Block.ply")
+    masses = tmp_path / "masses.yaml"
+    masses.write_text("block: 0.1\nOther-Block: 0.3\n")
+    arguments = ("--masses", masses, "--friction", "0.3", "--friction", "block=0.6")
+    assert build(tmp_path, "-o", tmp_path / "library", *arguments) == 0
+    objects = load_library(tmp_path / "library").objects
+    assert {n: (o.mass, o.friction) for n, o in objects.items()} == {
+        "block": (0.1, 0.6),
+        "other_block": (0.3, 0.3),
+    }
+
+
+def test_scale_and_density(tmp_path: Path) -> None:
+    trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
+    arguments = ("--scale", "0.001", "--density", "1000")
+    assert build(tmp_path / "block.stl", "-o", tmp_path / "library", *arguments) == 0
+    assert load_library(tmp_path / "library").entry("block").mass == pytest.approx(0.12, rel=1e-6)
+
+
+def test_one_broken_mesh_is_one_failure(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "broken.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert build(mesh, tmp_path / "broken.obj", "-o", tmp_path / "library") == 1
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith("burg-drake: error: ")
+    assert "broken.obj: 1 of 3 vertices are NaN or infinite" in line
+    assert list(load_library(tmp_path / "library").objects) == ["block"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "the mesh file does not exist"),
+        ("", "the mesh file is empty"),
+        ("hello\n", "no triangles"),
+    ],
+)
+def test_nothing_could_be_built(
+    content: str | None, message: str, tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "mesh.obj"
+    if content is not None:
+        path.write_text(content)
+    assert build(path, "-o", tmp_path / "library") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"burg-drake: error: {path}: ") and message in line
+
+
+def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
+    trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
+    assert build(tmp_path / "block.stl", "-o", tmp_path / "library") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "looks like millimetres" in line and "0.001" in line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--mass", "block=0"], "argument --mass: block: 0 is not above 0"),
+        (["--mass", "block=-2"], "argument --mass: block: -2 is not above 0"),
+        (["--mass", "block=nan"], "argument --mass: block: 'nan' is not a finite number"),
+        (["--mass", "block"], "argument --mass: 'block' is not NAME=VALUE, such as mug=0.118"),
+        (["--mass", "blok=1"], "--mass blok: no such mesh; did you mean 'block'? Known: block"),
+        (["--friction", "-0.1"], "-0.1 is not a friction coefficient from 0"),
+        (["--friction", "blok=1"], "--friction blok: no such mesh; did you mean 'block'?"),
+        (["--scale", "0"], "argument --scale: 0 is not above 0"),
+        (["--density", "inf"], "argument --density: 'inf' is not a finite number"),
+    ],
+)
+def test_bad_numbers(
+    arguments: list[str], message: str, mesh: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    try:
+        code = build(mesh, "-o", tmp_path / "library", *arguments)
+    except SystemExit as ended:
+        code = ended.code  # type: ignore[assignment]
+    assert code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("burg-drake: error: ") and message in line
+    assert not (tmp_path / "library").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("block: 0\n", "masses.yaml: block: mass is 0; give kilograms above 0"),
+        ("block: heavy\n", "masses.yaml: block: mass is 'heavy'; give kilograms above 0"),
+        ("- block\n", "masses.yaml: expected lines 'NAME: KG', such as 'mug: 0.118'"),
+        ("block: [\n", "masses.yaml: not valid YAML"),
+        (None, "masses.yaml: No such file or directory"),
+    ],
+)
+def test_bad_masses(
+    text: str | None, message: str, mesh: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    masses = tmp_path / "masses.yaml"
+    if text is not None:
+        masses.write_text(text)
+    assert build(mesh, "-o", tmp_path / "library", "--masses", masses) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_mass_0_in_a_library(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
+    library = tmp_path / "library"
+    assert build(mesh, "-o", library, "--mass", "block=0.25") == 0
+    text = (library / "library.yaml").read_text()
+    (library / "library.yaml").write_text(text.replace("mass: 0.25", "mass: 0"))
+    capsys.readouterr()
+    assert main(["library", "list", str(library)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "objects.block.mass_properties: mass is 0 kg; a free object needs a mass above 0" in line
+
+
+def test_unwritable_output(mesh: Path, capsys: Capture) -> None:
+    assert build(mesh, "-o", mesh) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"burg-drake: error: cannot write to folder {mesh}: ")
+
+
+def test_folder_without_meshes(tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "empty").mkdir()
+    assert build(tmp_path / "empty", "-o", tmp_path / "library") == 2
+    assert "holds no mesh (.obj, .ply, .stl, .glb, .gltf)" in capsys.readouterr().err

@@ -1,0 +1,218 @@
+"""`evaluate`, `replay`, `grasps show` and `report` on grasps whose outcomes are known."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.core.errors import UnknownNameError
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.run_store import Run, load_run
+
+Capture = pytest.CaptureFixture[str]
+
+
+def test_the_run_has_the_outcomes_that_its_grasps_must_have(run: Run) -> None:
+    assert run.results["outcome"].tolist() == ["lifted", "collision_target", "no_contact"]
+
+
+def test_evaluate_given_grasps(tmp_path: Path, capsys: Capture) -> None:
+    above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.3))
+    GraspSet.create(above, object="box").save(tmp_path / "grasps.npz")
+    arguments = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--no-reach"]
+    arguments += ["--grasps", str(tmp_path / "grasps.npz"), "--engine", "screening", "--quiet"]
+    assert main([*arguments, "--workers", "1", "--seed", "3"]) == 0
+    out = capsys.readouterr().out
+    assert f"table   {tmp_path / 'run' / 'results.csv'}" in out
+    assert "no_contact" in out
+    run = load_run(tmp_path / "run")
+    assert (run.document.engine.name, run.document.seed, run.document.reach) == (
+        "screening",
+        3,
+        False,
+    )
+    assert main([*arguments, "--workers", "1", "--seed", "4"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "holds another run (seed is 3 there, 4 here)" in line
+
+
+def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) -> None:
+    GraspSet.create(np.eye(4), object="scissors").save(tmp_path / "grasps.npz")
+    arguments = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]
+    assert main([*arguments, "--grasps", str(tmp_path / "grasps.npz")]) == 2
+    assert "has grasps of object 'scissors', which is not in scene 'tabletop_six'" in (
+        capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--grasps-per-object", "0"], "'0' is not a whole number from 1"),
+        (["--grasps-per-object", "many"], "'many' is not a whole number from 1"),
+        (["--seed", "-1"], "'-1' is not a whole number from 0"),
+        (["--workers", "0"], "'0' is not a whole number from 1"),
+        (["--engine", "fast"], "invalid choice: 'fast'"),
+        (["--station", "nowhere"], "nowhere does not exist"),
+        (["--grasps", "nowhere.npz"], "nowhere.npz: No such file"),
+        (["-o", "/dev/null"], "cannot write to folder /dev/null"),
+    ],
+)
+def test_bad_arguments(arguments: list[str], message: str, tmp_path: Path, capsys: Capture) -> None:
+    output = [] if "-o" in arguments else ["-o", str(tmp_path / "run")]
+    try:
+        code = main(["evaluate", "tabletop_six", *output, *arguments])
+    except SystemExit as ended:
+        code = ended.code  # type: ignore[assignment]
+    assert code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("burg-drake: error: ") and message in line
+
+
+def test_failures_to_report_end_with_1(
+    run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture
+) -> None:
+    failed = run.results["id"][:2].tolist()
+    monkeypatch.setattr(Run, "failures", failed)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", lambda *a, **k: run)
+    assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"burg-drake: 2 of 3 grasps could not be simulated, such as {failed[0]}")
+
+
+def test_interrupted_evaluation_says_how_to_go_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Capture
+) -> None:
+    def interrupt(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", interrupt)
+    assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 130
+    assert capsys.readouterr().err == (
+        "burg-drake: interrupted; the same command goes on from here\n"
+    )
+
+
+def self_contained(page: Path) -> bool:
+    return not re.search(r"<(script|img|link)[^>]*(src|href)=", page.read_text())
+
+
+def test_replay_of_the_best(run: Run, tmp_path: Path, capsys: Capture) -> None:
+    page = tmp_path / "replay.html"
+    assert main(["replay", str(run.path), "--best", "--html", str(page)]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[0] == "lifted"
+    assert out[1].startswith("lift 300 mm, slip ")
+    assert out[-1] == f"wrote {page}"
+    assert self_contained(page)
+    assert f"<title>tabletop_six: {run.best()[0]}</title>" in page.read_text()
+
+
+def test_replay_live(run: Run, capsys: Capture) -> None:
+    collides = str(run.results["id"][1])
+    assert main(["replay", str(run.path), "--grasp", collides, "--no-wait"]) == 0
+    captured = capsys.readouterr()
+    assert re.match(r"collision target \(box, \d+\.\d mm deep\)\n", captured.out)
+    assert captured.err == "nothing moves: the trial ended at its start\n"
+
+
+def test_replay_of_an_unknown_grasp(run: Run, capsys: Capture) -> None:
+    known = str(run.results["id"][0])
+    assert main(["replay", str(run.path), "--grasp", known[:-1] + "x"]) == 2
+    assert f"did you mean {known}" in capsys.readouterr().err
+
+
+def test_replay_needs_a_choice(run: Run, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["replay", str(run.path)])
+    assert ended.value.code == 2
+    assert "one of the arguments --grasp --best is required" in capsys.readouterr().err
+
+
+def test_replay_of_the_best_where_nothing_was_lifted(
+    run: Run, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.setattr(Run, "best", lambda self: [])
+    assert main(["replay", str(run.path), "--best"]) == 2
+    assert "no grasp was lifted; choose one with --grasp ID" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", [["replay", "--best"], ["grasps", "show"], ["report"]])
+def test_no_run_there(verb: list[str], tmp_path: Path, capsys: Capture) -> None:
+    assert main([*verb, str(tmp_path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"burg-drake: error: {tmp_path} holds no run (run.yaml is missing)")
+
+
+def test_grasps_in_colour(run: Run, tmp_path: Path, capsys: Capture) -> None:
+    page = tmp_path / "grasps.html"
+    assert main(["grasps", "show", str(run.path), "--html", str(page)]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "■ lifted (1)",
+        "■ never held (1)",
+        "■ hand collides (1)",
+        f"wrote {page}",
+    ]
+    assert self_contained(page)
+    text = page.read_text()
+    assert "3 of 3 grasps" in text
+    assert 'data-paths="/drake/grasps/lifted"' in text
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--outcome", "lifted,dropped"], "■ lifted (1)"),
+        (["--instance", "box", "--limit", "1"], "■ lifted (1)"),
+    ],
+)
+def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Capture) -> None:
+    assert main(["grasps", "show", str(run.path), "--no-wait", *options]) == 0
+    shown = [text for text in capsys.readouterr().out.splitlines() if text.startswith("■")]
+    assert shown == [line]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--instance", "bux"], "has no grasps on 'bux'; did you mean 'box'? Known: box"),
+        (["--outcome", "dropped"], "has no such grasps; choose other outcomes"),
+        (["--outcome", "lifte"], "'lifte' is no outcome; did you mean 'lifted'? Known: "),
+    ],
+)
+def test_bad_choice_of_grasps(run: Run, options: list[str], message: str, capsys: Capture) -> None:
+    try:
+        code = main(["grasps", "show", str(run.path), *options])
+    except SystemExit as ended:
+        code = ended.code  # type: ignore[assignment]
+    assert code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_every_outcome_can_be_chosen(run: Run, capsys: Capture) -> None:
+    arguments = ["grasps", "show", str(run.path), "--no-wait", "--outcome", ",".join(Outcome)]
+    assert main(arguments) == 0
+
+
+def test_report(run: Run, capsys: Capture) -> None:
+    run.report_path.unlink()
+    assert main(["report", str(run.path)]) == 0
+    out = capsys.readouterr().out
+    assert "collision_target" in out
+    assert out.endswith(f"report  {run.report_path}\n")
+    assert run.report_path.exists()
+
+
+def test_a_changed_library_is_noticed(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def changed(self: Run) -> None:
+        raise UnknownNameError("the library changed")
+
+    monkeypatch.setattr(Run, "scene", changed)
+    assert main(["replay", str(run.path), "--best"]) == 2
