@@ -30,7 +30,7 @@ from burg_drake.evaluation.run_document import (
     Input,
     Library,
     RunDocument,
-    Session,
+    Stretch,
     input_reference,
     numbers,
     portable_reference,
@@ -238,9 +238,9 @@ def _judge(
     outcomes = Counter(v.outcome for v in run.verdicts.values())
     event = Progress("starting", done, total, before=done, outcomes=outcomes)
     reporter.show(event)
-    sessions = run.document.sessions
-    session = Session(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
-    save_run(replace(run, document=replace(run.document, sessions=(*sessions, session))))
+    stretches = run.document.stretches
+    stretch = Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
+    save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = first = time.monotonic()
     try:
         with closing(judge_all(open_grasps, make_judge, workers=workers)) as judged:
@@ -253,8 +253,8 @@ def _judge(
                 reporter.show(replace(event, done=done, elapsed=time.monotonic() - first))
     finally:
         seconds = round(time.monotonic() - begun, 3)
-        session = replace(session, judged=done - total + len(open_grasps), seconds=seconds)
-        document = replace(run.document, sessions=(*sessions, session))
+        stretch = replace(stretch, judged=done - total + len(open_grasps), seconds=seconds)
+        document = replace(run.document, stretches=(*stretches, stretch))
         run = save_run(Run(run.path, document))
     return run
 

@@ -74,7 +74,7 @@ class Grasps:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Session:
+class Stretch:
     """One call that worked on the run; there are several if it was interrupted.
 
     Attributes:
@@ -104,7 +104,7 @@ class RunDocument:
         seed: of the sampling.
         table: format of the results file.
         versions: of the software and the machine.
-        sessions: who worked on it when.
+        stretches: who worked on it when.
     """
 
     version: int = 1
@@ -120,7 +120,7 @@ class RunDocument:
     seed: int
     table: TableFormat = "csv"
     versions: dict[str, str] = field(default_factory=dict)
-    sessions: tuple[Session, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
 
 
 def software_versions() -> dict[str, str]:

@@ -55,7 +55,7 @@ def test_a_complete_run_returns_at_once(
     monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
     again = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
     assert same_results(first, again)
-    assert len(again.document.sessions) == 1
+    assert len(again.document.stretches) == 1
     pytest.importorskip("pyarrow")
     parquet = evaluate(
         scene, station, tmp_path / "run", grasps_per_object=5, progress=False, table="parquet"
@@ -112,7 +112,7 @@ def test_a_killed_run_goes_on_where_it_was(
     assert 20 <= len(before) < 120
     partial = load_run(tmp_path / "run")
     assert not partial.complete and set(partial.results["id"]) == before
-    assert partial.document.sessions[0].judged is None
+    assert partial.document.stretches[0].judged is None
 
     install(monkeypatch.setattr, tmp_path / "second.log")
     events: list[Progress] = []
@@ -123,7 +123,7 @@ def test_a_killed_run_goes_on_where_it_was(
     assert len(again) == len(set(again)) == 120 - len(before)
     assert not before & set(again)
     assert events[0].done == events[0].before == len(before) and events[-1].done == 120
-    assert [s.judged for s in run.document.sessions] == [None, len(again)]
+    assert [s.judged for s in run.document.stretches] == [None, len(again)]
 
     fresh = evaluate(
         scene, station, tmp_path / "fresh", grasps_per_object=40, workers=1, progress=False
@@ -139,7 +139,7 @@ def test_an_interrupt_keeps_what_is_done(scene: Scene, tmp_path: Path) -> None:
     _, errors = process.communicate(timeout=30)
     assert process.returncode == -signal.SIGINT and errors.count("Traceback") == 1
     run = load_run(tmp_path / "run")
-    assert run.document.sessions[0].judged == len(run.results["id"]) >= 10
+    assert run.document.stretches[0].judged == len(run.results["id"]) >= 10
     assert not run.report_path.exists()
 
 

@@ -116,7 +116,7 @@ def test_provenance_says_what_made_the_results(run: Run) -> None:
     assert document.grasps.content == run.candidates.content
     assert document.engine.name == "standard" and document.trial["lift_height"] == 0.3
     assert document.station.path == "panda_tabletop"
-    assert sum(s.judged or 0 for s in document.sessions) == 30
+    assert sum(s.judged or 0 for s in document.stretches) == 30
     assert RunDocument.__dataclass_fields__["version"].default == 1
 
 

@@ -242,9 +242,10 @@ def test_a_hand_in_the_table_names_it(empty: Scene, station: Station) -> None:
 def test_a_wall_behind_the_hand_is_in_the_way_of_the_pregrasp(
     empty: Scene, changed: Callable[..., Station]
 ) -> None:
-    """Hand and last link reach 0.26 m back from the TCP; the wall is 0.28 m behind the grasp."""
+    """The wall is 0.32 m behind the grasp, and the wrist reaches 0.29 m back from the TCP: 0.2104 m
+    to the axes of the last two joints, and the thickness of the links there."""
     X_WG = grasp_from_axes((0, 1, 0), (1, 0, 0), (0.6, 0.0, 0.15))
-    wall = Obstacle(X_WB=Pose((0.31, 0.0, 0.1)), size=(0.02, 0.4, 0.2))
+    wall = Obstacle(X_WB=Pose((0.27, 0.0, 0.1)), size=(0.02, 0.4, 0.2))
     free, blocked = changed(), changed(background={"wall": wall})
     assert ArmReach(empty, free).check(X_WG).outcome is None
     at_once = ReachSettings(standoff=0.0)

@@ -307,7 +307,7 @@ def test_models_of_drake_are_not_fetched(scene: Scene, station: Station, tmp_pat
     text = text.replace("meshes/hand.obj", "package://drake_models/ycb/meshes/004_sugar_box.obj")
     (tmp_path / "hand.sdf").write_text(text, encoding="utf-8")
     changed = replace(station, hand_model=tmp_path / "hand.sdf")
-    with pytest.raises(RuntimeError, match="drake_models"):
+    with pytest.raises(RuntimeError, match="refers to unknown package 'drake_models'"):
         build_station_diagram(scene, changed, robot="hand")
 
 

@@ -61,7 +61,7 @@ def _header(run: Run, title: str) -> Html:
     document = run.document
     count = document.grasps.count
     how = "sampled" if document.grasps.origin == "sampled" else "given"
-    day = document.sessions[0].started[:10] if document.sessions else ""
+    day = document.stretches[0].started[:10] if document.stretches else ""
     about = f"{count} {how} grasps, engine {document.engine.name}, seed {document.seed}"
     return element(
         "header",

@@ -11,8 +11,8 @@ from burg_drake.evaluation.summary import duration
 
 
 def provenance(run: Run) -> Html:
-    """Command, inputs with their hashes, versions, sessions and files."""
-    facts = [*_inputs(run.document), *_settings(run.document), *_sessions(run.document)]
+    """Command, inputs with their hashes, versions, stretches and files."""
+    facts = [*_inputs(run.document), *_settings(run.document), *_stretches(run.document)]
     return element(
         "section",
         element("h2", "How to reproduce"),
@@ -88,12 +88,12 @@ def _listed(settings: dict[str, float]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
 
 
-def _sessions(document: RunDocument) -> list[tuple[str, str]]:
+def _stretches(document: RunDocument) -> list[tuple[str, str]]:
     lines = []
-    for session in document.sessions:
-        judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
-        took = "" if session.seconds is None else f" in {duration(session.seconds)}"
-        plural = "" if session.workers == 1 else "s"
-        text = f"{session.started}: {judged}{took}, {session.workers} worker{plural}"
+    for stretch in document.stretches:
+        judged = "interrupted" if stretch.judged is None else f"{stretch.judged} grasps"
+        took = "" if stretch.seconds is None else f" in {duration(stretch.seconds)}"
+        plural = "" if stretch.workers == 1 else "s"
+        text = f"{stretch.started}: {judged}{took}, {stretch.workers} worker{plural}"
         lines.append(("judged", text))
     return [*lines, ("command", document.command)]
