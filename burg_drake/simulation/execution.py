@@ -20,6 +20,10 @@ MINIMUM_LIFT = 0.5
 """Share of the lift height that the target must rise by to count as lifted."""
 
 
+LEVER = 0.05
+"""Turning counts as the motion of a point at this distance from the grasp [m]."""
+
+
 class BystanderReached(Exception):
     """A moving body touched objects that are locked.
 
@@ -71,7 +75,7 @@ class Execution:
             if self._contact.any:
                 return self._end(Outcome.ONE_FINGER)
             return self._end(Outcome.CLOSED_EMPTY if touched else Outcome.NO_CONTACT)
-        self._X_GO_grip = inverse(self._X_WG()) @ self._X_WO()
+        self._X_GO_grip = self._X_GO()
         if not self._lift():
             return self._end(Outcome.SLIPPED)
         if not self._hold():
@@ -108,11 +112,23 @@ class Execution:
         return self._contact.both and self._risen() >= MINIMUM_LIFT * settings.lift_height
 
     def _hold(self) -> bool:
-        """Waits; returns whether the target is held at the end."""
-        for _ in range(max(1, round(self._settings.hold_time / self._settings.poll))):
+        """Waits; returns whether the target is held at the end.
+
+        The end is early when the target has come to rest in the hand: at the speeds of
+        `TrialSettings` it would move by less than a millimetre in what is left.
+        """
+        settings = self._settings
+        X_GO, resting = self._X_GO(), 0.0
+        for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self._advance()
             if not self._contact.any:
                 return False
+            X_GO_before, X_GO = X_GO, self._X_GO()
+            distance, angle = _motion(X_GO_before, X_GO)
+            slow = max(distance, angle * LEVER) <= settings.settled_speed * settings.poll
+            resting = resting + settings.poll if slow else 0.0
+            if resting >= settings.resting_time - 1e-9:
+                break
         return self._contact.both
 
     def _advance(self) -> float:
@@ -142,8 +158,9 @@ class Execution:
     def _risen(self) -> float:
         return self._height() - self._height_start
 
-    def _X_WO(self) -> Array:
-        return self._plant.EvalBodyPoseInWorld(self._plant_context, self._target).GetAsMatrix4()
+    def _X_GO(self) -> Array:
+        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
+        return inverse(self._X_WG()) @ X_WO.GetAsMatrix4()
 
     def _X_WG(self) -> Array:
         return self._trial.hand.X_WG(self._plant_context)
@@ -151,10 +168,7 @@ class Execution:
     def _end(self, outcome: Outcome) -> TrialResult:
         slip = tilt = force = math.nan
         if self._X_GO_grip is not None:
-            # how the target has moved in the grasp frame since the grip had settled
-            X_GG = inverse(self._X_WG()) @ self._X_WO() @ inverse(self._X_GO_grip)
-            slip = float(np.linalg.norm(X_GG[:3, 3]))
-            tilt = float(rotation_angle(X_GG[:3, :3]))
+            slip, tilt = _motion(self._X_GO_grip, self._X_GO())
             closing = self._X_WG()[:3, 0]
             force = float(np.abs(self._contact.force @ closing).min())
         margins = Margins(
@@ -167,3 +181,9 @@ class Execution:
             end_time=self._context.get_time(),
         )
         return TrialResult(outcome=outcome, margins=margins)
+
+
+def _motion(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
+    """How a target has moved in the hand: of the point at the grasp [m], and its angle [rad]."""
+    X_GG = X_GO_later @ inverse(X_GO)
+    return float(np.linalg.norm(X_GG[:3, 3])), float(rotation_angle(X_GG[:3, :3]))

@@ -48,6 +48,8 @@ class TrialSettings:
         lift_time: duration of the rise [s]; half of it accelerates and half of it brakes, both by
             4 height / time^2.
         hold_time: how long the target must be held after the rise [s].
+        resting_time: holding ends early when the target has moved in the hand by less than
+            `settled_speed` for this long [s].
         poll: interval at which contacts are looked at [s].
         settled_speed: the grip has settled when the fingers are slower than this [m/s] ...
         settled_time: ... for this long [s].
@@ -57,6 +59,7 @@ class TrialSettings:
     lift_height: float = 0.30
     lift_time: float = 1.25
     hold_time: float = 0.5
+    resting_time: float = 0.1
     poll: float = 0.01
     settled_speed: float = 0.002
     settled_time: float = 0.05
