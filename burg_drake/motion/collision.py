@@ -74,7 +74,6 @@ class ArmCollision:
         self.joints = station_diagram.arm_joints
         self._index = [joint.position_start() for joint in self.joints]
         self._default = plant.GetPositions(plant.CreateDefaultContext())
-        self._ignored = self.checker.GetNominalFilteredCollisionMatrix() != 0
         self._names = station_diagram.body_names
         self._carried = _carried(station_diagram)
 
@@ -91,7 +90,7 @@ class ArmCollision:
     def overlaps(self, q: Array) -> list[Overlap]:
         """What collides at arm positions `q` (n,), the deepest overlap first; empty if free."""
         self.checker.UpdatePositions(self.configuration(q))
-        query = self.checker.model_context().GetQueryObject()
+        query = self.checker.model_context().GetQueryObject()  # with the checker's filters
         depths: dict[tuple[BodyIndex, BodyIndex], float] = {}
         for pair in query.ComputePointPairPenetration():
             inspector = query.inspector()
@@ -99,8 +98,7 @@ class ArmCollision:
                 self._diagram.plant.GetBodyFromFrameId(inspector.GetFrameId(g)).index()
                 for g in (pair.id_A, pair.id_B)
             )
-            if not self._ignored[int(a), int(b)]:
-                depths[a, b] = max(depths.get((a, b), 0.0), pair.depth)
+            depths[a, b] = max(depths.get((a, b), 0.0), pair.depth)
         found = [self._overlap(a, b, depth) for (a, b), depth in depths.items()]
         return sorted(found, key=lambda o: (-o.depth, str(o)))
 
