@@ -65,8 +65,8 @@ class Source:
     """Where an object came from.
 
     Attributes:
-        file: name of the mesh file it was built from.
-        sha256: hash of that file's bytes.
+        file: name of the mesh file it was built from; empty for a mesh in memory.
+        sha256: hash of that file's bytes, or of the mesh's arrays.
         scale: factor from the file's unit to metres.
         repairs: what was changed in the mesh, one sentence each.
     """

@@ -15,9 +15,9 @@ from burg_drake.core.schema import Vector3
 from burg_drake.objects.library import MassProperties
 
 DEFAULT_DENSITY = 300.0
-"""Density where neither mass nor density is given [kg/m^3]: the six YCB objects with published
-masses that this was fitted to (boxes of food, cans, a bottle) have 190 to 1070, median 600, and
-household things of thin plastic or with air inside less; give the mass where it matters."""
+"""Density where neither mass nor density is given [kg/m^3]. It is a guess between things that are
+mostly air and solid ones: the published masses of six YCB objects (boxes of food, cans, a full
+bottle) over the volumes of their scans give 190 to 1090. Give the mass where it matters."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,265 @@
+"""Whole builds: what is built, what is kept, and what fails alone."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.objects import build as build_module
+from burg_drake.objects import stages
+from burg_drake.objects.build import build_library
+from burg_drake.objects.library import load_library
+from burg_drake.objects.source import ObjectSource
+
+
+def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimesh:
+    return trimesh.creation.box(size)
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    _box().export(folder / "Box.stl")
+    trimesh.creation.cylinder(0.03, 0.1, sections=32).export(folder / "can.obj")
+    return folder
+
+
+def _sources(meshes: Path, mass: float = 0.2) -> list[ObjectSource]:
+    return [
+        ObjectSource.from_file(meshes / "Box.stl", mass=mass),
+        ObjectSource.from_file(meshes / "can.obj"),
+    ]
+
+
+def _times(root: Path) -> dict[str, int]:
+    return {str(p.relative_to(root)): p.stat().st_mtime_ns for p in root.rglob("*") if p.is_file()}
+
+
+def _contents(root: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(root)): p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+
+def test_entries_say_what_was_built(meshes: Path, tmp_path: Path) -> None:
+    report = build_library(_sources(meshes), tmp_path / "lib", name="things")
+    assert report.built == ("box", "can")
+    assert (report.cached, report.failed) == ((), {})
+    box = report.library.entry("box")
+    assert box.mass == 0.2
+    assert box.friction == 0.24
+    assert box.source.file == "Box.stl"
+    np.testing.assert_allclose(np.subtract(box.upper, box.lower), [0.1, 0.06, 0.03], atol=1e-7)
+    assert len(box.stable_poses) == 3
+    assert len(box.pieces) == 1
+    for relative in (box.mesh, box.sdf, *box.pieces):
+        assert report.library.path(relative).is_file()
+    assert load_library(tmp_path / "lib").document == report.library.document
+    assert report.library.name == "things"
+
+
+def test_a_density_that_was_assumed_is_reported(meshes: Path, tmp_path: Path) -> None:
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    mass = 300.0 * 16 * np.sin(2 * np.pi / 32) * 0.03**2 * 0.1  # a prism with 32 sides
+    assert report.notes["can"] == (f"no mass or density given: {mass:.4g} kg from 300 kg/m^3",)
+    assert "box" not in report.notes
+
+
+def test_what_has_not_changed_is_not_touched(meshes: Path, tmp_path: Path) -> None:
+    build_library(_sources(meshes), tmp_path / "lib")
+    before = _times(tmp_path / "lib")
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    assert report.cached == ("box", "can")
+    assert _times(tmp_path / "lib") == before
+
+
+def test_a_new_mass_rewrites_the_sdf_and_nothing_else(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = build_library(_sources(meshes), tmp_path / "lib").library.entry("box")
+    before = _times(tmp_path / "lib")
+    monkeypatch.setattr(stages, "load_mesh", None)  # neither the mesh nor the pieces are needed
+    report = build_library(_sources(meshes, mass=0.4), tmp_path / "lib")
+    assert (report.built, report.cached) == (("box",), ("can",))
+    changed = {k for k, t in _times(tmp_path / "lib").items() if before.get(k) != t}
+    assert changed == {"library.yaml", "box/box.sdf", "box/build.json"}
+    entry = report.library.entry("box")
+    assert entry.build != first.build
+    np.testing.assert_allclose(
+        entry.mass_properties.inertia, 2.0 * np.array(first.mass_properties.inertia)
+    )
+    assert "<mass>0.4</mass>" in report.library.path(entry.sdf).read_text()
+
+
+def test_a_new_colour_keeps_the_pieces(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = _sources(meshes)[0]
+    build_library([source], tmp_path / "lib")
+    pieces = (tmp_path / "lib/box/pieces/000.obj").read_bytes()
+    monkeypatch.setattr(stages, "convex_pieces", None)
+    report = build_library([replace(source, rgba=(1.0, 0.0, 0.0, 1.0))], tmp_path / "lib")
+    assert report.built == ("box",)
+    assert "Kd 1 0 0" in (tmp_path / "lib/box/mesh.mtl").read_text()
+    assert (tmp_path / "lib/box/pieces/000.obj").read_bytes() == pieces
+
+
+def test_a_changed_mesh_is_built_again(meshes: Path, tmp_path: Path) -> None:
+    build_library(_sources(meshes), tmp_path / "lib")
+    _box((0.12, 0.06, 0.03)).export(meshes / "Box.stl")
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    assert report.built == ("box",)
+    assert report.library.entry("box").upper[0] == pytest.approx(0.06)
+
+
+def test_lost_files_are_built_again(meshes: Path, tmp_path: Path) -> None:
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    report.library.path(report.library.entry("box").pieces[0]).unlink()
+    assert build_library(_sources(meshes), tmp_path / "lib").built == ("box",)
+    report.library.path(report.library.entry("box").mesh).unlink()
+    assert build_library(_sources(meshes), tmp_path / "lib").built == ("box",)
+
+
+def test_a_new_description_is_taken_over(meshes: Path, tmp_path: Path) -> None:
+    source = _sources(meshes)[0]
+    before = build_library([source], tmp_path / "lib").library.entry("box")
+    report = build_library([replace(source, description="a box")], tmp_path / "lib")
+    assert report.library.entry("box").description == "a box"
+    assert report.library.entry("box").build == before.build  # results stay valid
+
+
+def test_objects_of_earlier_builds_stay(meshes: Path, tmp_path: Path) -> None:
+    first, second = _sources(meshes)
+    build_library([second], tmp_path / "lib", name="things")
+    report = build_library([first], tmp_path / "lib")
+    assert list(report.library.objects) == ["box", "can"]
+    assert report.library.name == "things"
+
+
+def test_the_same_input_gives_the_same_bytes(meshes: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        build_library(_sources(meshes), tmp_path / name, name="things", workers=1 + (name == "b"))
+    assert _contents(tmp_path / "a") == _contents(tmp_path / "b")
+
+
+def test_one_broken_mesh_fails_alone(meshes: Path, tmp_path: Path) -> None:
+    (meshes / "broken.obj").write_text("v 0 0 0\n")
+    seen: list[tuple[str, str, int, int]] = []
+    sources = [
+        *_sources(meshes),
+        ObjectSource.from_file(meshes / "broken.obj"),
+        ObjectSource.from_file(meshes / "missing.obj"),
+        ObjectSource(name="nothing", mesh=_box(), mass=0.0),
+    ]
+    report = build_library(sources, tmp_path / "lib", progress=lambda *event: seen.append(event))
+    assert report.built == ("box", "can")
+    assert report.failed == {
+        "broken": f"{meshes / 'broken.obj'}: the mesh file has no triangles",
+        "missing": f"{meshes / 'missing.obj'}: the mesh file does not exist",
+        "nothing": "nothing: mass is 0 kg; it must be above 0 (leave it out to use a density)",
+    }
+    assert sorted(event[0] for event in seen) == ["box", "broken", "can", "missing", "nothing"]
+    assert [event[2:] for event in seen] == [(k, 5) for k in range(1, 6)]
+    assert not (tmp_path / "lib" / "broken").exists()
+
+
+def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> None:
+    build_library(_sources(meshes), tmp_path / "lib")
+    (meshes / "Box.stl").write_bytes(b"")
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    assert list(report.failed) == ["box"]
+    assert report.library.path(report.library.entry("box").sdf).is_file()
+
+
+def test_programming_errors_in_one_object_do_not_stop_the_others(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = stages.convex_pieces
+
+    def fails_for_cans(surface, *args):  # type: ignore[no-untyped-def]
+        if len(surface.vertices) > 8:
+            raise RuntimeError("unheard of\nwith details")
+        return original(surface, *args)
+
+    monkeypatch.setattr(stages, "convex_pieces", fails_for_cans)
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    assert report.built == ("box",)
+    assert report.failed == {"can": "RuntimeError: unheard of"}
+
+
+def test_a_kill_loses_nothing_that_was_finished(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def killed(name: str, *_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build_library(_sources(meshes), tmp_path / "lib", progress=killed)
+    assert len(load_library(tmp_path / "lib").objects) == 1
+    report = build_library(_sources(meshes), tmp_path / "lib")
+    assert len(report.cached) == 1
+    assert len(report.built) == 1
+
+
+def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path) -> None:
+    dead = tmp_path / "lib" / f"{build_module.SCRATCH}999999999-abc"
+    (dead / "box").mkdir(parents=True)
+    build_library(_sources(meshes), tmp_path / "lib")
+    assert sorted(p.name for p in (tmp_path / "lib").iterdir()) == ["box", "can", "library.yaml"]
+
+
+def test_names_that_collide(meshes: Path, tmp_path: Path) -> None:
+    _box().export(meshes / "box.ply")
+    with pytest.raises(
+        InvalidInputError, match=r"2 meshes make the same object 'box': .*Box\.stl, "
+    ):
+        build_library([meshes / "Box.stl", meshes / "box.ply"], tmp_path / "lib")
+
+
+def test_places_that_cannot_be_written_to(meshes: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidInputError, match=r"cannot write to folder .*file"):
+        build_library(_sources(meshes), tmp_path / "file")
+
+
+def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
+    halves = tuple(_box((0.05, 0.06, 0.03)).apply_translation([x, 0, 0]) for x in (-0.025, 0.025))
+    source = ObjectSource(name="box", mesh=_box(), pieces=halves, mass=0.1)
+    report = build_library([source], tmp_path / "lib")
+    entry = report.library.entry("box")
+    assert len(entry.pieces) == 2
+    assert report.library.path(entry.sdf).read_text().count("<drake:declare_convex/>") == 2
+
+
+def test_open_meshes_take_their_volume_from_the_pieces(tmp_path: Path) -> None:
+    lidless = _box()
+    lidless.update_faces(lidless.triangles_center[:, 2] < 0.0149)
+    source = ObjectSource(name="box", mesh=lidless, pieces=(_box(),), mass=0.1)
+    report = build_library([source], tmp_path / "lib")
+    properties = report.library.entry("box").mass_properties
+    assert properties.volume == pytest.approx(0.1 * 0.06 * 0.03, rel=1e-6)
+    assert report.notes["box"] == (
+        "the mesh is not closed; its volume is that of the convex pieces",
+    )
+
+
+def test_fifty_unchanged_objects_take_less_than_a_second(tmp_path: Path) -> None:
+    mesh = _box()
+    sources = [ObjectSource(name=f"box_{i}", mesh=mesh, mass=0.1) for i in range(50)]
+    build_library(sources, tmp_path / "lib")
+    start = time.process_time()
+    assert len(build_library(sources, tmp_path / "lib").cached) == 50
+    assert time.process_time() - start < 1.0
+
+
+def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> None:
+    build_library(_sources(meshes), tmp_path / "lib")
+    umask = os.umask(0)
+    os.umask(umask)
+    assert (tmp_path / "lib/box").stat().st_mode & 0o777 == 0o777 & ~umask

@@ -1,0 +1,207 @@
+"""Meshes as they come: formats, units, and one clear line for what cannot be used."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from burg_drake.core.errors import MeshError
+from burg_drake.objects.meshes import load_mesh, mesh_hash, texture_image
+
+SIZE = (0.10, 0.06, 0.03)
+
+
+@pytest.fixture
+def box() -> trimesh.Trimesh:
+    return trimesh.creation.box(SIZE).apply_translation([0.01, 0.02, 0.03])
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])
+def test_formats_keep_the_frame(tmp_path: Path, box: trimesh.Trimesh, suffix: str) -> None:
+    box.export(tmp_path / f"box.{suffix}")
+    mesh = load_mesh(tmp_path / f"box.{suffix}")
+    assert mesh.closed
+    assert len(mesh.surface.vertices) == 8
+    np.testing.assert_allclose(mesh.surface.bounds, box.bounds, atol=1e-7)
+
+
+def test_gltf_is_turned_from_y_up_to_z_up(tmp_path: Path) -> None:
+    # A thing 0.3 m tall, upright in glTF's convention, stands upright in O.
+    tall = trimesh.creation.box((0.1, 0.3, 0.05)).apply_translation([0.0, 0.15, 0.2])
+    tall.export(tmp_path / "tall.glb")
+    mesh = load_mesh(tmp_path / "tall.glb")
+    np.testing.assert_allclose(
+        mesh.surface.bounds, [[-0.05, -0.225, 0.0], [0.05, -0.175, 0.3]], atol=1e-7
+    )
+    assert mesh.surface.volume == pytest.approx(0.1 * 0.3 * 0.05)
+    assert "turned from glTF's y-up to z-up" in mesh.repairs
+
+
+def test_scene_graphs_are_joined_with_their_transforms(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    part = trimesh.creation.box((0.02, 0.02, 0.02))
+    scene.add_geometry(part, transform=trimesh.transformations.translation_matrix([0.1, 0, 0]))
+    scene.add_geometry(part, transform=trimesh.transformations.translation_matrix([-0.1, 0, 0]))
+    scene.export(tmp_path / "two.glb")
+    surface = load_mesh(tmp_path / "two.glb").surface
+    np.testing.assert_allclose(surface.extents, [0.22, 0.02, 0.02], atol=1e-7)
+    assert surface.volume == pytest.approx(2 * 0.02**3)
+
+
+def test_scale_is_to_metres(tmp_path: Path, box: trimesh.Trimesh) -> None:
+    box.copy().apply_scale(1000.0).export(tmp_path / "mm.stl")
+    mesh = load_mesh(tmp_path / "mm.stl", scale=0.001)
+    np.testing.assert_allclose(mesh.surface.extents, SIZE, atol=1e-7)
+    assert "scaled by 0.001" in mesh.repairs
+
+
+def test_texture_survives_with_its_coordinates(tmp_path: Path, box: trimesh.Trimesh) -> None:
+    uv = np.random.default_rng(0).random((8, 2))
+    image = Image.new("RGB", (8, 8), (10, 200, 30))
+    visual = trimesh.visual.TextureVisuals(uv=uv, image=image)
+    trimesh.Trimesh(box.vertices, box.faces, visual=visual, process=False).export(
+        tmp_path / "textured.glb"
+    )
+    mesh = load_mesh(tmp_path / "textured.glb")
+    assert texture_image(mesh.visual).getpixel((3, 3))[:3] == (10, 200, 30)
+    assert mesh.visual.visual.uv.shape == (len(mesh.visual.vertices), 2)
+    assert mesh.rgba is None
+
+
+def test_vertex_colours_become_the_main_colour(tmp_path: Path, box: trimesh.Trimesh) -> None:
+    box.visual.vertex_colors = [255, 51, 0, 255]
+    box.export(tmp_path / "red.ply")
+    assert load_mesh(tmp_path / "red.ply").rgba == (1.0, 0.2, 0.0, 1.0)
+
+
+def test_parts_keep_their_colours(tmp_path: Path) -> None:
+    red, blue = trimesh.creation.box((0.02,) * 3), trimesh.creation.box((0.02,) * 3)
+    for part, colour in ((red, [255, 0, 0, 255]), (blue, [0, 0, 255, 255])):
+        part.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(baseColorFactor=colour)
+        )
+    scene = trimesh.Scene([red, blue.apply_translation([0.1, 0, 0])])
+    scene.export(tmp_path / "parts.glb")
+    visual = load_mesh(tmp_path / "parts.glb").visual
+    left = visual.triangles_center[:, 0] < 0.05
+    assert {tuple(c) for c in visual.visual.face_colors[left].tolist()} == {(255, 0, 0, 255)}
+    assert {tuple(c) for c in visual.visual.face_colors[~left].tolist()} == {(0, 0, 255, 255)}
+
+
+def _message(source: Path | trimesh.Trimesh, scale: float = 1.0) -> str:
+    with pytest.raises(MeshError) as caught:
+        load_mesh(source, scale)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_millimetres_are_recognised(box: trimesh.Trimesh) -> None:
+    box.apply_scale(1000.0)
+    assert _message(box) == (
+        "mesh in memory: looks like millimetres: largest extent 100 m; try scale=0.001"
+    )
+
+
+def test_a_scale_given_the_wrong_way_is_recognised(box: trimesh.Trimesh) -> None:
+    assert _message(box, 1000.0).endswith("largest extent 100 m; try scale=1")
+    assert _message(box, 0.001).endswith("only 0.1 mm, but lengths are in metres; try scale=1")
+
+
+def test_extents_far_from_any_unit_get_a_scale_that_fits(box: trimesh.Trimesh) -> None:
+    message = _message(box.apply_scale(1e7))
+    scale = float(message.rpartition("=")[2])
+    assert "millimetres" not in message
+    assert 0.01 <= scale * 1e6 <= 1.0
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    assert _message(tmp_path / "no.obj") == f"{tmp_path / 'no.obj'}: the mesh file does not exist"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("a.obj", b"", "the mesh file is empty"),
+        ("a.obj", b"# nothing here\n", "the mesh file has no triangles"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh file has no triangles"),
+        ("a.obj", b"v 0 0 0\nf 1 2 3\n", "not a readable .obj mesh"),
+        ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "not a readable .ply mesh"),
+        ("a.stl", b"\x00\x01\x02 this is no mesh", "the mesh file has no triangles"),
+        ("a.glb", b"glTF but not really", "not a readable .glb mesh"),
+        ("a.gltf", b"{]", "not a readable .gltf mesh"),
+        ("a.dae", b"<x/>", ".dae is not one of .obj, .ply, .stl, .glb, .gltf"),
+        ("a.stl", b"\0" * 80 + struct.pack("<I", 0), "the mesh"),
+    ],
+)
+def test_files_that_are_no_meshes(tmp_path: Path, name: str, content: bytes, expected: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    message = _message(tmp_path / name)
+    assert message.startswith(f"{tmp_path / name}: ")
+    assert expected in message
+
+
+def test_nan_vertices(box: trimesh.Trimesh) -> None:
+    vertices = np.array(box.vertices)
+    vertices[3, 1] = np.nan
+    broken = trimesh.Trimesh(vertices, box.faces, process=False, validate=False)
+    assert _message(broken) == "mesh in memory: 1 of 8 vertices are NaN or infinite"
+
+
+def test_flat_meshes(box: trimesh.Trimesh) -> None:
+    assert "is flat (100 x 60 x 0 mm)" in _message(box.apply_transform(np.diag([1, 1, 0, 1.0])))
+
+
+def test_single_triangles_are_flat() -> None:
+    triangle = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]], process=False)
+    assert "is flat" in _message(triangle)
+
+
+def test_sheets_with_a_face_on_both_sides_are_open() -> None:
+    bent = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
+    half = bent.faces[bent.triangles_center[:, 2] > 0]
+    mesh = load_mesh(
+        trimesh.Trimesh(bent.vertices, np.vstack([half, half[:, ::-1]]), process=False)
+    )
+    assert not mesh.closed
+    assert mesh.repairs == (
+        f"dropped {len(half)} duplicate faces",
+        "left open: the volume is taken from the convex pieces",
+    )
+
+
+def test_closed_sheets_without_thickness() -> None:
+    bent = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
+    below = bent.vertices[:, 2] < 0
+    bent.vertices[below, 2] = -bent.vertices[below, 2] - 2e-8
+    assert "encloses no volume (a sheet without thickness?)" in _message(bent)
+
+
+def test_all_vertices_at_one_point() -> None:
+    point = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
+    assert _message(point) == "mesh in memory: all vertices are at one point"
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan")])
+def test_scales_that_are_none(box: trimesh.Trimesh, scale: float) -> None:
+    assert "scale is" in _message(box, scale)
+
+
+def test_hash_follows_the_files_that_a_mesh_refers_to(tmp_path: Path, box: trimesh.Trimesh) -> None:
+    visual = trimesh.visual.TextureVisuals(
+        uv=np.zeros((8, 2)), image=Image.new("RGB", (4, 4), (1, 2, 3))
+    )
+    trimesh.Trimesh(box.vertices, box.faces, visual=visual, process=False).export(
+        tmp_path / "box.obj"
+    )
+    (picture,) = tmp_path.glob("*.png")
+    first = mesh_hash(tmp_path / "box.obj")
+    (tmp_path / "unrelated.png").write_bytes(b"other")
+    assert mesh_hash(tmp_path / "box.obj") == first
+    Image.new("RGB", (4, 4), (9, 9, 9)).save(picture)
+    assert mesh_hash(tmp_path / "box.obj") != first
