@@ -11,6 +11,8 @@ DEFAULT_STATION = "panda_tabletop"
 # Kept in step with station.engine, which imports too much for a help text; a test compares them.
 ENGINE_NAMES = ("reference", "standard", "screening")
 DEFAULT_ENGINE = "standard"
+# Likewise in step with evaluation.candidates.
+DEFAULT_APPROACH_ANGLE = 75.0
 
 
 class Parser(argparse.ArgumentParser):
@@ -129,6 +131,14 @@ def positive(text: str) -> float:
     value = number(text)
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def approach_angle(text: str) -> float:
+    """An angle from straight down in degrees, above 0 to 180."""
+    value = number(text)
+    if not 0.0 < value <= 180.0:
+        raise argparse.ArgumentTypeError(f"{text} is not an angle above 0, at most 180 degrees")
     return value
 
 

@@ -7,11 +7,13 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
+    DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
     ENGINE_NAMES,
     add_scene,
     add_station,
     add_verb,
+    approach_angle,
     positive_int,
     seed,
 )
@@ -54,6 +56,13 @@ def add_to(verbs: Any) -> None:
         help="grasps sampled for each object (default: %(default)s)",
     )
     parser.add_argument(
+        "--approach-angle",
+        metavar="DEG",
+        type=approach_angle,
+        default=DEFAULT_APPROACH_ANGLE,
+        help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
+    )
+    parser.add_argument(
         "--grasps", metavar="FILE", help="judge these grasps (.npz of a GraspSet); sample none"
     )
     parser.add_argument(
@@ -94,6 +103,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         station,
         arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
         grasps_per_object=arguments.grasps_per_object,
+        approach_angle_deg=arguments.approach_angle,
         grasps=None if given is None else by_instance(scene, GraspSet.load(given), given),
         engine=arguments.engine,
         seed=arguments.seed,

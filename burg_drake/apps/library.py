@@ -134,7 +134,7 @@ def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> 
     shown = library.objects if only is None else [n for n in library.objects if n in set(only)]
     table = Table(box=box.SIMPLE_HEAD, title_justify="left")
     table.add_column("object", no_wrap=True)
-    for column in ("mass [g]", "size [mm]", "friction", "pieces", "stable poses"):
+    for column in ("mass [g]", "size [mm]", "mu", "pieces", "poses"):
         table.add_column(column, justify="right", no_wrap=True)
     for name in shown:
         entry = library.objects[name]

@@ -19,7 +19,12 @@ from pathlib import Path
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.resources import PACKAGE_URI
-from burg_drake.evaluation.candidates import Candidates, given_candidates, sample_candidates
+from burg_drake.evaluation.candidates import (
+    DEFAULT_APPROACH_ANGLE_DEG,
+    Candidates,
+    given_candidates,
+    sample_candidates,
+)
 from burg_drake.evaluation.executors import default_workers, judge_all
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.judge import StationJudgeFactory
@@ -58,6 +63,7 @@ def evaluate(
     out: str | Path,
     *,
     grasps_per_object: int = 100,
+    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
     grasps: Mapping[str, GraspSet] | None = None,
     engine: Engine | str = ENGINES["standard"],
     seed: int = 0,
@@ -77,6 +83,8 @@ def evaluate(
         scene, station: as loaded, or references for `load_scene` and `load_station`.
         out: folder of the run; made if need be.
         grasps_per_object: antipodal grasps to sample for each free instance.
+        approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
+            above 0; 90 is as far as from the side, 180 from anywhere.
         grasps: the user's own grasps in the object frame, by instance; nothing is sampled then.
         engine: how trials are stepped; an engine or the name of a preset.
         seed: of the sampling.
@@ -107,14 +115,19 @@ def evaluate(
     if not (folder / RUN_FILE).exists():
         _require_sound(scene, station)
     reach = reach and station.document.arm is not None
+    asked = Grasps(origin="given", count=0, objects={}, content="")
+    if grasps is None:
+        angle = float(approach_angle_deg)
+        asked = replace(
+            asked, origin="sampled", per_object=grasps_per_object, approach_angle_deg=angle
+        )
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = _open(
             folder,
             scene,
             station,
             grasps,
-            grasps_per_object,
-            _document(folder, scene, station, engine, seed=seed, reach=reach, table=table),
+            _document(folder, scene, station, asked, engine, seed=seed, reach=reach, table=table),
             reporter,
         )
         make_judge = StationJudgeFactory(scene, station, engine, reach)
@@ -126,13 +139,14 @@ def _document(
     folder: Path,
     scene: Scene,
     station: Station,
+    grasps: Grasps,
     engine: Engine,
     *,
     seed: int,
     reach: bool,
     table: TableFormat,
 ) -> RunDocument:
-    """What this call asks for; the grasps are filled in later."""
+    """What this call asks for; what comes of the grasps is filled in later."""
     from burg_drake.motion.reach import ReachSettings
     from burg_drake.simulation.hand_trial import TrialSettings
 
@@ -153,7 +167,7 @@ def _document(
             path=library if library.startswith(PACKAGE_URI) else str(scene.library.root.resolve()),
             objects={i.object: scene.library.entry(i.object).build for i in instances},
         ),
-        grasps=Grasps(origin="sampled", count=0, objects={}, content=""),
+        grasps=grasps,
         engine=engine,
         trial=numbers(TrialSettings()),
         reach=reach,
@@ -169,19 +183,14 @@ def _open(
     scene: Scene,
     station: Station,
     grasps: Mapping[str, GraspSet] | None,
-    grasps_per_object: int,
     document: RunDocument,
     reporter: Reporter,
 ) -> Run:
     """Goes on with the run in the folder, or begins a new one there."""
     candidates: Candidates | None = None
-    per_object = None
     if grasps is not None:
         candidates = given_candidates(scene, grasps)
-        document = _with_grasps(document, scene, candidates, None, 0.0)
-    else:
-        per_object = grasps_per_object
-        document = replace(document, grasps=replace(document.grasps, per_object=per_object))
+        document = _with_grasps(document, scene, candidates, 0.0)
     if (folder / RUN_FILE).exists():
         run = load_run(folder)
         require_same_run(folder, run.document, document)
@@ -189,26 +198,23 @@ def _open(
     if candidates is None:
         reporter.show(Progress("sampling"))
         start = time.process_time()
-        candidates = sample_candidates(scene, station, grasps_per_object, document.seed)
+        n, angle = document.grasps.per_object, document.grasps.approach_angle_deg
+        assert n is not None and angle is not None
+        candidates = sample_candidates(scene, station, n, document.seed, angle)
         cpu = time.process_time() - start
-        document = _with_grasps(document, scene, candidates, per_object, cpu)
+        document = _with_grasps(document, scene, candidates, cpu)
     return create_run(folder, document, scene, station, candidates)
 
 
 def _with_grasps(
-    document: RunDocument,
-    scene: Scene,
-    candidates: Candidates,
-    per_object: int | None,
-    cpu: float,
+    document: RunDocument, scene: Scene, candidates: Candidates, cpu: float
 ) -> RunDocument:
     counts = Counter({scene.instance(name).object: 0 for name in scene.instances})
     counts.update(scene.instance(name).object for name in candidates.instance.tolist())
     return replace(
         document,
-        grasps=Grasps(
-            origin="given" if per_object is None else "sampled",
-            per_object=per_object,
+        grasps=replace(
+            document.grasps,
             count=len(candidates),
             objects=dict(counts),
             content=candidates.content,

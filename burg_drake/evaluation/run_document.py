@@ -59,6 +59,7 @@ class Grasps:
     Attributes:
         origin: sampled here, or given by the user.
         per_object: how many were asked for, if sampled.
+        approach_angle_deg: largest angle between their approach and straight down, if sampled.
         count: how many there are.
         objects: how many there are by object; 0 where an object has none.
         content: hash of them all.
@@ -67,6 +68,7 @@ class Grasps:
 
     origin: Literal["sampled", "given"]
     per_object: int | None = None
+    approach_angle_deg: float | None = None
     count: int
     objects: dict[str, int]
     content: str
@@ -139,6 +141,8 @@ def identity(document: RunDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same run, in words, by topic."""
     grasps, engine = document.grasps, document.engine
     settings = content_hash(vars(engine), document.trial, document.arm)[:HASH_DIGITS]
+    sampled = grasps.origin == "sampled"
+    approach = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
     return {
         "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
@@ -147,9 +151,10 @@ def identity(document: RunDocument) -> dict[str, str]:
         "reach": "on" if document.reach else "off",
         "grasps": (
             f"{grasps.per_object} an object"
-            if grasps.origin == "sampled"
+            if sampled
             else f"given, content {grasps.content[:HASH_DIGITS]}"
         ),
+        **approach,
         "seed": str(document.seed),
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),
@@ -165,7 +170,8 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
     old, new = identity(there), identity(here)
     if old["engine"] != new["engine"] or old["reach"] != new["reach"]:
         del old["settings of engine, trial and arm"]  # they differ too, which says nothing more
-    differences = [f"{k} is {old[k]} there, {new[k]} here" for k in old if old[k] != new[k]]
+    topics = [k for k in old if k in new and old[k] != new[k]]
+    differences = [f"{k} is {old[k]} there, {new[k]} here" for k in topics]
     if differences:
         raise InvalidInputError(
             f"{folder} holds another run ({'; '.join(differences)}); choose another -o, or"

@@ -4,13 +4,14 @@ A point is drawn on the surface, a line through the material within the friction
 inward normal; where the line leaves the material again, within the friction cone of that face, the
 two points are a pair of contacts that two frictional fingers can squeeze without slipping (Nguyen,
 "Constructing force-closure grasps", IJRR 1988). The grasp frame G lies midway with +x along the
-line; the approach direction +z is uniform about it. The hand's own body is not looked at here.
+line; the approach direction +z is uniform about it, or about the part of the turn that an approach
+cone leaves. The hand's own body is not looked at here.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError, MeshError
 from burg_drake.core.frames import Array, grasp_from_axes
 from burg_drake.core.grasps import GraspSet
+from burg_drake.grasping.approach import ApproachCone
 from burg_drake.grasping.rays import Indices, RayCaster
 from burg_drake.objects.library import DEFAULT_FRICTION
 
@@ -71,6 +73,7 @@ def sample_antipodal(
     friction: float = DEFAULT_FRICTION,
     opening: tuple[float, float] = PANDA_OPENING,
     approaches: int = 1,
+    approach_cone: ApproachCone | None = None,
     object: str = "",
 ) -> GraspSet:
     """Samples grasps whose contacts are antipodal.
@@ -89,10 +92,14 @@ def sample_antipodal(
         opening: smallest and largest distance between the fingers [m]. Widths are at most the
             largest less `FINGER_CLEARANCE` on both sides.
         approaches: evenly spaced approach angles for each pair of contacts, the first one random.
+        approach_cone: where approach directions lie; anywhere if None. They are then uniform among
+            the angles about the closing axis that the cone allows, and a pair of contacts without
+            such an angle is left out: 60 degrees about straight down need a closing axis at most 60
+            degrees from horizontal. The same generator state draws the same pairs for any cone.
         object: name of the library object.
 
     Returns:
-        n grasps; fewer if the object has none, or hardly any (see `PATIENCE`). `width` is the
+        n grasps; fewer if there are none, or hardly any (see `PATIENCE`). `width` is the
         distance of the contacts. `score` is 1 where the closing line meets both surfaces at right
         angles and falls to 0 where all of the friction is needed: 1 - friction needed / friction.
 
@@ -110,6 +117,7 @@ def sample_antipodal(
         "opening": [float(w) for w in opening],
         "finger_clearance": FINGER_CLEARANCE,
         "approaches": int(approaches),
+        "approach_cone": None if approach_cone is None else asdict(approach_cone),
         "mesh": content_hash(
             np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
         ),
@@ -119,10 +127,11 @@ def sample_antipodal(
     found = rays = 0
     while found < n and rays < PATIENCE + RARITY * found:
         pairs = contact_pairs(surface, CHUNK, rng, friction, opening)
-        closing = pairs.p_OC2 - pairs.p_OC1
-        poses.append(_grasps(closing, 0.5 * (pairs.p_OC1 + pairs.p_OC2), approaches, rng))
-        widths.append(np.repeat(np.linalg.norm(closing, axis=1), approaches))
-        scores.append(np.repeat(1.0 - pairs.friction_needed / friction, approaches))
+        closing, center = pairs.p_OC2 - pairs.p_OC1, 0.5 * (pairs.p_OC1 + pairs.p_OC2)
+        pair, approach = _approach_directions(closing, approaches, approach_cone, rng)
+        poses.append(grasp_from_axes(closing[pair], approach, center[pair]))
+        widths.append(np.linalg.norm(closing, axis=1)[pair])
+        scores.append(1.0 - pairs.friction_needed[pair] / friction)
         found += len(poses[-1])
         rays += CHUNK
     return GraspSet.create(
@@ -250,14 +259,22 @@ def _directions_in_cone(axis: Array, half_angle: float, rng: np.random.Generator
     return cosine * axis + sine * (np.cos(azimuth) * u + np.sin(azimuth) * v)
 
 
-def _grasps(closing: Array, center: Array, approaches: int, rng: np.random.Generator) -> Array:
-    """(N * approaches, 4, 4) poses about `closing` axes and `center` points (N, 3)."""
-    step = 2.0 * np.pi * np.arange(approaches) / approaches
-    angle = rng.uniform(0.0, 2.0 * np.pi, (len(closing), 1)) + step
+def _approach_directions(
+    closing: Array, approaches: int, cone: ApproachCone | None, rng: np.random.Generator
+) -> tuple[Indices, Array]:
+    """Directions (M, 3) perpendicular to closing axes (N, 3), and whose they are (M,)."""
     u, v = _perpendicular(closing / np.linalg.norm(closing, axis=1, keepdims=True))
-    approach = np.cos(angle)[..., None] * u[:, None] + np.sin(angle)[..., None] * v[:, None]
-    X_OG = grasp_from_axes(closing[:, None], approach, center[:, None])
-    return X_OG.reshape(-1, 4, 4)
+    first = rng.random((len(closing), 1))
+    if cone is None:
+        kept = np.arange(len(closing))
+        angle = 2.0 * np.pi * first + 2.0 * np.pi * np.arange(approaches) / approaches
+    else:
+        middle, half = cone.turns(u, v)
+        kept = np.flatnonzero(~np.isnan(half))
+        share = (first[kept] + np.arange(approaches) / approaches) % 1.0
+        angle = middle[kept, None] + half[kept, None] * (2.0 * share - 1.0)
+    direction = np.cos(angle)[..., None] * u[kept, None] + np.sin(angle)[..., None] * v[kept, None]
+    return np.repeat(kept, approaches), direction.reshape(-1, 3)
 
 
 def _perpendicular(axis: Array) -> tuple[Array, Array]:

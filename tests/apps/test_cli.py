@@ -11,9 +11,15 @@ import pytest
 
 from burg_drake import __version__
 from burg_drake.apps import cli
-from burg_drake.apps.arguments import DEFAULT_ENGINE, DEFAULT_STATION, ENGINE_NAMES
+from burg_drake.apps.arguments import (
+    DEFAULT_APPROACH_ANGLE,
+    DEFAULT_ENGINE,
+    DEFAULT_STATION,
+    ENGINE_NAMES,
+)
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import builtin_names
+from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.station.engine import ENGINES
 
 HELP = (
@@ -163,3 +169,4 @@ def test_defaults_are_those_of_the_library() -> None:
     assert set(ENGINE_NAMES) == set(ENGINES)
     assert DEFAULT_ENGINE in ENGINES
     assert DEFAULT_STATION in builtin_names("stations")
+    assert DEFAULT_APPROACH_ANGLE == DEFAULT_APPROACH_ANGLE_DEG

@@ -11,6 +11,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.schema import Pose
 from burg_drake.evaluation.candidates import Candidates, given_candidates, sample_candidates
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
@@ -39,6 +40,44 @@ def test_what_else_is_in_the_scene_does_not_matter(scene: Scene, station: Statio
     assert of(everything, "bar") == of(alone, "bar")
     assert of(everything, "bar") != of(sample_candidates(scene, station, 20, seed=1), "bar")
     assert len(sample_candidates(only(scene), station, 20, seed=0)) == 0
+
+
+def posed(scene: Scene, **rpy_deg: tuple[float, float, float]) -> Scene:
+    """The scene with instances turned."""
+    instances = tuple(
+        dataclasses.replace(i, X_SO=Pose(i.X_SO.translation, rpy_deg=rpy_deg[name]))
+        if (name := i.name or i.object) in rpy_deg
+        else i
+        for i in scene.document.instances
+    )
+    return Scene(
+        dataclasses.replace(scene.document, instances=instances), scene.library, scene.path
+    )
+
+
+@pytest.mark.parametrize("angle", [20.0, 75.0, 90.0, 120.0])
+def test_the_hand_comes_from_above(scene: Scene, station: Station, angle: float) -> None:
+    turned = posed(scene, left=(30.0, 40.0, 50.0), bar=(0.0, -90.0, 10.0))
+    tilted = Pose((0.4, 0.1, 0.0), rpy_deg=(0.0, 25.0, 70.0))  # a board that is not level
+    document = dataclasses.replace(station.document, X_WS=tilted)
+    sloping = dataclasses.replace(station, document=document)
+    sampled = sample_candidates(turned, sloping, 200, 0, angle)
+    assert len(sampled) == 600
+    for name in turned.instances:
+        X_OG = sampled.grasps.X_OG[sampled.instance == name]
+        approach = (tilted.matrix() @ turned.X_SO(name) @ X_OG)[:, :3, 2]
+        from_down = np.degrees(np.arccos(np.clip(-approach[:, 2], -1.0, 1.0)))
+        assert 0.85 * angle < from_down.max() <= angle + 1e-3
+
+
+def test_objects_on_the_same_side_get_the_same_grasps(scene: Scene, station: Station) -> None:
+    about_vertical = sample_candidates(posed(scene, right=(0, 0, 77.7)), station, 20, seed=0)
+    assert of(about_vertical, "left") == of(about_vertical, "right")
+    tipped = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, seed=0)
+    assert of(tipped, "left") == of(about_vertical, "left")
+    assert not set(of(tipped, "left")) & set(of(tipped, "right"))
+    anywhere = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, 0, 180.0)
+    assert of(anywhere, "left") == of(anywhere, "right")
 
 
 def test_the_hand_opens_wide_enough(scene: Scene, station: Station) -> None:
@@ -78,3 +117,10 @@ def test_given_grasps_must_fit_the_scene(scene: Scene) -> None:
         given_candidates(scene, {"bar": grasps})
     with pytest.raises(InvalidInputError, match="grasps per object is 0"):
         sample_candidates(scene, None, 0, seed=0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("angle", [0.0, -10.0, 180.5, np.nan])
+def test_an_approach_angle_out_of_range(scene: Scene, station: Station, angle: float) -> None:
+    message = f"^approach angle is {angle:g} degrees; give more than 0, at most 180$"
+    with pytest.raises(InvalidInputError, match=message):
+        sample_candidates(scene, station, 5, 0, angle)

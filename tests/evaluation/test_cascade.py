@@ -154,11 +154,15 @@ def test_another_run_is_not_mixed_in(
         f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object"
         " there, 6 an object here); choose another -o, or delete it"
     )
+    with pytest.raises(InvalidInputError) as error:
+        evaluate(scene, station, run, grasps_per_object=5, approach_angle_deg=90, progress=False)
+    assert "(approach angle is 75.0 degrees there, 90.0 degrees here)" in str(error.value)
     with pytest.raises(InvalidInputError, match="reach is on there, off here"):
         evaluate(scene, station, run, grasps_per_object=5, reach=False, progress=False)
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
-    with pytest.raises(InvalidInputError, match="5 an object there, given, content"):
+    with pytest.raises(InvalidInputError, match="5 an object there, given, content") as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
+    assert "approach angle" not in str(error.value)  # it goes with the sampling
 
 
 def test_given_grasps_are_judged_in_place_of_sampled_ones(
@@ -216,6 +220,8 @@ def test_bad_input_is_said_before_any_work(
         evaluate_in("run", engine="standart")
     with pytest.raises(InvalidInputError, match="grasps per object is 0"):
         evaluate_in("run", grasps_per_object=0)
+    with pytest.raises(InvalidInputError, match=r"^approach angle is 181 degrees; give"):
+        evaluate_in("run", approach_angle_deg=181.0)
     assert not (tmp_path / "run" / "run.yaml").exists()
 
 

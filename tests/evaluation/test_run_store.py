@@ -114,6 +114,7 @@ def test_provenance_says_what_made_the_results(run: Run) -> None:
     assert document.library.objects == {"cube": "build of cube", "bar": "build of bar"}
     assert document.grasps.objects == {"cube": 20, "bar": 10}
     assert document.grasps.content == run.candidates.content
+    assert document.grasps.approach_angle_deg == 75.0
     assert document.engine.name == "standard" and document.trial["lift_height"] == 0.3
     assert document.station.path == "panda_tabletop"
     assert sum(s.judged or 0 for s in document.stretches) == 30

@@ -14,6 +14,7 @@ from burg_drake.core.errors import InvalidInputError, MeshError
 from burg_drake.core.frames import check_pose, swap_fingers
 from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.antipodal import FINGER_CLEARANCE, MIN_WIDTH, sample_antipodal
+from burg_drake.grasping.approach import ApproachCone
 
 MU = 0.24
 CONE = np.arctan(MU)
@@ -327,6 +328,125 @@ def test_approaches_are_evenly_spaced_about_each_pair():
     turn = np.cross(z, np.roll(z, -1, axis=1))
     np.testing.assert_allclose(turn, X[:, :, :3, 0], atol=1e-12)
     assert len(np.unique(grasps.width)) == 100
+
+
+# --- where the hand comes from --------------------------------------------------------------------
+
+DOWN = (0.0, 0.0, -1.0)
+
+
+def cone(degrees: float, axis=DOWN) -> ApproachCone:
+    return ApproachCone(axis, np.deg2rad(degrees))
+
+
+def from_axis(grasps: GraspSet, axis=DOWN) -> np.ndarray:
+    """Angle between approach and axis [deg]."""
+    cosine = grasps.X_OG[:, :3, 2] @ np.array(axis) / np.linalg.norm(axis)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def rank_among_allowed(grasps: GraspSet, degrees: float, axis=DOWN) -> np.ndarray:
+    """Share of the allowed turns below the approach's own, by trying 3600 turns one by one."""
+    x, z = closing(grasps)[:, None], grasps.X_OG[:, None, :3, 2]
+    turn = np.deg2rad(np.arange(0.05, 360.0, 0.1))[:, None]
+    tried = np.cos(turn) * z + np.sin(turn) * np.cross(x, z)
+    allowed = tried @ axis >= np.cos(np.deg2rad(degrees)) * np.linalg.norm(axis)
+    ahead = allowed.cumprod(axis=1).sum(axis=1)  # one interval: on from here, and back from here
+    behind = allowed[:, ::-1].cumprod(axis=1).sum(axis=1)
+    whole = allowed.all(axis=1)
+    np.testing.assert_array_equal((ahead + behind)[~whole], allowed.sum(axis=1)[~whole])
+    return (behind / np.maximum(ahead + behind, 1))[~whole]
+
+
+@pytest.mark.parametrize(
+    ("degrees", "axis"), [(45.0, DOWN), (45.0, (1.0, -2.0, 0.5)), (90.0, DOWN), (130.0, DOWN)]
+)
+def test_approaches_to_a_sphere_are_uniform_in_the_cone(degrees, axis):
+    """Lines through a sphere have all directions alike, so their component along the axis is
+    uniform, up to the sine of the cone's angle, from where on no approach is left."""
+    n = 3000
+    sphere = creation.icosphere(subdivisions=5, radius=0.03)
+    grasps = grasp(sphere, n=n, friction=0.01, approach_cone=cone(degrees, axis))
+    check_pose(grasps.X_OG, "X_OG")
+    assert len(grasps) == n
+    assert degrees - 2.0 < from_axis(grasps, axis).max() <= degrees + 1e-6
+    along = np.abs(closing(grasps) @ axis) / np.linalg.norm(axis)
+    largest = np.sin(np.deg2rad(min(degrees, 90.0)))
+    assert along.max() <= largest + 1e-9
+    assert kstest(along / largest, "uniform").pvalue > 1e-3
+    rank = rank_among_allowed(grasps.select(slice(0, 1000)), degrees, axis)
+    assert len(rank) > 500
+    assert kstest(rank, "uniform").pvalue > 1e-3
+
+
+def test_a_box_on_a_table_is_not_grasped_by_its_top_and_bottom():
+    cube = box(0.04, 0.04, 0.04)
+    vertical = {
+        degrees: np.abs(closing(grasp(cube, n=3000, approach_cone=cone(degrees)))[:, 2]) > 0.5
+        for degrees in (60.0, 75.0, 90.0, 180.0)
+    }
+    assert not vertical[60.0].any() and not vertical[75.0].any()  # the lines tilt by 13.5 degrees
+    for degrees in (90.0, 180.0):
+        assert len(vertical[degrees]) == 3000
+        assert vertical[degrees].mean() == pytest.approx(1 / 3, abs=0.04)
+
+
+def test_a_plate_that_lies_has_no_grasp_from_above():
+    start = time.process_time()
+    assert len(grasp(box(0.3, 0.4, 0.05), n=100, approach_cone=cone(75.0))) == 0
+    assert time.process_time() - start < 5.0
+    steeper = grasp(box(0.3, 0.4, 0.05), n=100, approach_cone=cone(80.0))
+    assert len(steeper) == 100  # closing lines that tilt by 10 degrees or more
+    assert np.abs(closing(steeper)[:, 2]).max() <= np.cos(np.deg2rad(10.0))
+
+
+def test_a_cone_of_all_directions_leaves_out_nothing():
+    free, everywhere = grasp(lumpy(), n=12000), grasp(lumpy(), n=12000, approach_cone=cone(180.0))
+    for column in (0, 3):  # the same pairs of contacts
+        np.testing.assert_array_equal(everywhere.X_OG[..., column], free.X_OG[..., column])
+    assert_same_distribution(free, everywhere)
+
+
+def test_a_cone_selects_among_the_pairs_of_the_same_seed():
+    free, above = grasp(lumpy(), n=4000), grasp(lumpy(), n=500, approach_cone=cone(50.0))
+    rows = {tuple(row): i for i, row in enumerate(free.X_OG[:, :3, 3])}
+    index = [rows[tuple(row)] for row in above.X_OG[:, :3, 3]]
+    assert index == sorted(index)
+    possible = np.abs(closing(free)[: index[-1] + 1, 2]) <= np.sin(np.deg2rad(50.0))
+    assert np.flatnonzero(possible).tolist() == index
+    repeated = grasp(lumpy(), n=9000, approach_cone=cone(50.0))
+    np.testing.assert_array_equal(repeated.id[:500], above.id)
+
+
+def test_several_approaches_share_the_cone_evenly():
+    grasps = grasp(lumpy(), n=600, approaches=3, approach_cone=cone(50.0))
+    assert from_axis(grasps).max() <= 50.0 + 1e-6
+    rank = rank_among_allowed(grasps, 50.0).reshape(-1, 3)
+    wide = np.abs(closing(grasps)[::3, 2]) < 0.6  # where 0.1 degrees are little
+    gaps = np.diff(np.sort(rank[wide], axis=1), axis=1)
+    np.testing.assert_allclose(gaps, 1 / 3, atol=5e-3)
+    assert kstest(rank[:, 0], "uniform").pvalue > 1e-3
+
+
+def test_the_provenance_tells_the_cone():
+    assert grasp(lumpy(), n=1).provenance["approach_cone"] is None
+    above = grasp(lumpy(), n=5, approach_cone=cone(60.0, np.array([0, 1, -1])))
+    told = above.provenance["approach_cone"]
+    assert told == {"axis": [0.0, 1.0, -1.0], "angle": np.deg2rad(60.0)}
+    again = grasp(lumpy(), n=5, approach_cone=ApproachCone(tuple(told["axis"]), told["angle"]))
+    np.testing.assert_array_equal(again.id, above.id)
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (0.0, 1.0), (0.0, 0.0, np.nan)])
+def test_an_axis_that_is_no_direction(axis):
+    with pytest.raises(InvalidInputError, match=r"^axis of the approach cone is \(0.0, .*; give a"):
+        ApproachCone(axis, 1.0)
+
+
+@pytest.mark.parametrize("angle", [0.0, -1.0, 3.2, np.nan])
+def test_an_angle_that_makes_no_cone(angle):
+    with pytest.raises(InvalidInputError, match=f"^angle of the approach cone is {angle}; give it"):
+        ApproachCone(DOWN, angle)
 
 
 # --- nothing to grasp -----------------------------------------------------------------------------

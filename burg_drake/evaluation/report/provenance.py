@@ -40,6 +40,7 @@ def reproduce_command(run: Run) -> str:
         words += ["--grasps", str(run.path / GRASPS_FILE)]
     else:
         words += ["--grasps-per-object", str(document.grasps.per_object)]
+        words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
     words += ["--engine", document.engine.name, "--seed", str(document.seed)]
     words += [] if document.reach else ["--no-reach"]
     words += [] if document.table == "csv" else ["--table", document.table]
