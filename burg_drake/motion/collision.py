@@ -44,8 +44,7 @@ class ArmCollision:
     """Checks the arm, its hand open, against itself and the scene as the documents place it.
 
     Attributes:
-        checker: Drake's checker. Configurations are those of the whole plant: the objects are free
-            bodies in it.
+        checker: Drake's checker. Configurations are those of the whole plant, fingers included.
         joints: the arm's joints from base to hand.
     """
 
@@ -53,7 +52,9 @@ class ArmCollision:
         """Takes a diagram over; nobody else may use its plant for something else.
 
         Args:
-            station_diagram: built with `robot="arm"`.
+            station_diagram: built with `robot="arm"` and `weld_objects=True`: Drake's checker demands
+                that interpolation between two equal configurations is exact, which quaternions of
+                free bodies may miss by a rounding.
 
         Raises:
             InvalidInputError: the diagram has no arm.

@@ -97,7 +97,7 @@ class ArmReach:
             InvalidInputError: the station has no arm, or in its home posture something collides.
         """
         self.settings = settings or ReachSettings()
-        diagram = build_station_diagram(scene, station, robot="arm")
+        diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         arm = station.document.arm
         assert arm is not None  # build_station_diagram has seen to it
         self.collision = ArmCollision(diagram)

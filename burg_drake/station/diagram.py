@@ -48,7 +48,7 @@ class StationDiagram:
     Attributes:
         diagram: the Drake diagram; keep it alive while its plant is used.
         scene, station, robot, engine: what it was built from.
-        free: body of each free instance, by name.
+        free: body of each instance that is not background, by name.
         fixed: bodies of background instances and obstacles, by name.
         table: the table's body.
         robot_bodies: all bodies of hand and arm.
@@ -107,6 +107,7 @@ def build_station_diagram(
     engine: Engine = ENGINES["standard"],
     meshcat: Meshcat | None = None,
     cameras: bool = False,
+    weld_objects: bool = False,
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
@@ -120,6 +121,7 @@ def build_station_diagram(
         engine: time step and contact settings.
         meshcat: where to show the diagram live, if anywhere.
         cameras: add the station's cameras; needs the renderer's system libraries.
+        weld_objects: fix the free objects where they stand, for a plant of the robot alone.
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -143,14 +145,14 @@ def build_station_diagram(
     add_board(plant, scene.board, station)
     free = {name: _add_instance(builder, scene, name) for name in scene.instances}
     fixed = {name: _add_instance(builder, scene, name) for name in scene.background}
-    for name, body in fixed.items():
+    for name, body in {**fixed, **(free if weld_objects else {})}.items():
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot)
 
     plant.Finalize()
-    for name, body in free.items():
+    for name, body in ({} if weld_objects else free).items():
         X_WO = instance_pose(scene, station, name)
         plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform(X_WO))
     set_default_posture(plant, station, models)

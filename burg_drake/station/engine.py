@@ -15,9 +15,10 @@ class Engine:
     Attributes:
         name: name of the preset.
         time_step: discrete step of the plant [s].
-        contact_approximation: Drake's approximation of the contact problem. `lagged` keeps
-            Coulomb's friction limit within a few per cent at every step from 1 to 10 ms; `sap`
-            is wrong on marginal grasps.
+        contact_approximation: Drake's approximation of the contact problem. With `lagged`
+            the pads hold up to Coulomb's limit, within a few per cent, at every step from 1 to 10
+            ms; `sap` is wrong on marginal grasps. Sliding on the table is right within 3 % at
+            1 ms and 8 % at 2 ms, and braked too much at 5 ms.
         contact_model: hydroelastic where geometry allows it, else point contact.
         contact_surface: polygons are faster than triangles and as accurate here.
     """
