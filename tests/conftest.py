@@ -1,4 +1,4 @@
-"""What all tests share: one thread a process, and the generators under `tools/`.
+"""What all tests share: one thread a process, Ctrl-C, and the generators under `tools/`.
 
 The tests run against a checkout (editable install) and against an installed wheel alike
 (`make test`). `tools/` is in no wheel, and putting the root of the checkout on `sys.path` would
@@ -8,6 +8,7 @@ shadow the wheel; therefore the package `tools`, and nothing else, is announced 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -15,6 +16,11 @@ from types import ModuleType
 # pytest-xdist fills the cores with processes; read by OpenMP and OpenBLAS when they are loaded.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# What a script starts in the background ignores Ctrl-C, and so do all its children; the tests of
+# interrupts need it as it is at a terminal.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _announce_tools(folder: Path) -> None:

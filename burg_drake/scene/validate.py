@@ -67,7 +67,7 @@ def validate_scene(scene: Scene) -> tuple[SceneIssue, ...]:
         if issue is not None:
             issues.append(issue)
         others = [p for other, p in placed.items() if other != name]
-        issue = _ground_issue(name, placed[name], others)
+        issue = _ground_issue(scene, name, placed[name], others)
         if issue is not None:
             issues.append(issue)
     return tuple(issues)
@@ -129,14 +129,16 @@ def _bounds_issue(scene: Scene, name: str, p_SV: Array) -> SceneIssue | None:
     )
 
 
-def _ground_issue(name: str, p_SV: Array, others: list[Array]) -> SceneIssue | None:
+def _ground_issue(scene: Scene, name: str, p_SV: Array, others: list[Array]) -> SceneIssue | None:
     lowest = float(p_SV[:, 2].min())
     if lowest < -TOUCH_TOLERANCE:
+        height = round(float(scene.X_SO(name)[2, 3]) - lowest, 4) + 0.0
         return SceneIssue(
             instance=name,
             kind="in_ground",
             amount=-lowest,
-            message=f"{name!r} is in the ground: it reaches {_mm(-lowest)} below the board",
+            message=f"{name!r} is in the ground: it reaches {_mm(-lowest)} below the board;"
+            f" z = {height:.4f} would put it on top",
         )
     if lowest > HOVER_TOLERANCE and not any(_may_support(other, p_SV) for other in others):
         return SceneIssue(

@@ -13,7 +13,7 @@ robot: a real one compensates its own weight.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
 from pydrake.math import RigidTransform
@@ -21,7 +21,7 @@ from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, 
 from pydrake.multibody.tree import BodyIndex, Joint, ModelInstanceIndex, RigidBody
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.resources import data_root
 from burg_drake.scene.scene import Scene
@@ -128,10 +128,13 @@ def build_station_diagram(
         the arm is in its home posture.
 
     Raises:
-        InvalidInputError: `arm` without an arm in the station, a home posture that does not fit
+        UnknownNameError: no such `robot`.
+        InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station, a home posture that does not fit
             the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
+    if robot not in get_args(Robot):
+        raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
     builder = RobotDiagramBuilder(time_step=engine.time_step)
     plant = builder.plant()
     # Models name their files relative to themselves or in this package; Drake's own models would
@@ -204,7 +207,14 @@ def _add_instance(builder: RobotDiagramBuilder, scene: Scene, name: str) -> Rigi
         raise InvalidInputError(
             f"{scene.path}: instance name {name!r} is taken by the station; choose another"
         )
-    (model,) = parser.AddModels(str(scene.library.path(scene.entry(name).sdf)))
+    path = scene.library.path(scene.entry(name).sdf)
+    try:
+        (model,) = parser.AddModels(str(path))
+    except RuntimeError as error:
+        raise InvalidInputError(
+            f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"
+            f" {scene.library.name!r} again"
+        ) from error
     plant.RenameModelInstance(model, name)
     return plant.GetBodyByName("body", model)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,9 +16,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.station import Obstacle, Station, load_station
 
@@ -317,3 +318,16 @@ def test_meshcat_shows_the_instances(scene: Scene, station: Station) -> None:
     built.diagram.ForcedPublish(built.diagram.CreateDefaultContext())
     for name in ("box", "can_left", "can_right", "table", "board", "arm", "hand"):
         assert meshcat.HasPath(f"/drake/visualizer/{name}"), name
+
+
+def test_unknown_robot_and_incomplete_library(tmp_path: Path) -> None:
+    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    with pytest.raises(UnknownNameError, match="robot 'arms' does not exist; did you mean 'arm'"):
+        build_station_diagram(scene, station, robot="arms")  # type: ignore[arg-type]
+    library = tmp_path / "library"
+    shutil.copytree(scene.library.root, library)
+    next((library / "mug" / "pieces").iterdir()).unlink()
+    document = replace(scene.document, library=str(library))
+    save_scene(document, tmp_path / "scene.yaml")
+    with pytest.raises(InvalidInputError, match="mug.sdf cannot be loaded .* build the library"):
+        build_station_diagram(load_scene(tmp_path / "scene.yaml"), station)
