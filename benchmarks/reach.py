@@ -16,7 +16,6 @@ from collections import defaultdict
 from collections.abc import Callable
 
 import numpy as np
-import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.parsing import Parser
@@ -71,7 +70,7 @@ def clear_grasps(scene: Scene, station: Station, count: int) -> list[Array]:
     found = []
     for name in scene.instances:
         entry = scene.entry(name)
-        mesh = trimesh.load(scene.library.path(entry.mesh), force="mesh")
+        mesh = scene.library.surface(scene.instance(name).object)
         rng = rng_from("benchmark reach", name)
         sampled = sample_antipodal(mesh, count, rng, friction=entry.friction)
         X_WG = diagram.X_WO(name) @ sampled.X_OG

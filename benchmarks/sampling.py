@@ -33,8 +33,7 @@ def main() -> None:
     arguments = parser.parse_args()
     print(f"{'mesh':24}{'faces':>8}{'grasps':>8}{'grasps/s':>11}{'peer':>7}{'ratio':>8}")
     slowest = np.inf
-    for name, path in named(arguments.meshes) if arguments.meshes else household():
-        mesh = trimesh.load(path, force="mesh")
+    for name, mesh in named(arguments.meshes) if arguments.meshes else household():
         count, rate = measure(mesh, arguments.n, arguments.repeat)
         reference = peer(name)
         slowest = min(slowest, rate)
@@ -62,13 +61,13 @@ def peer(name: str) -> float:
     return next((rate for kind, rate in PEER.items() if kind in name), PEER_FASTEST)
 
 
-def named(paths: list[Path]) -> list[tuple[str, Path]]:
-    return [(path.stem, path) for path in paths]
+def named(paths: list[Path]) -> list[tuple[str, trimesh.Trimesh]]:
+    return [(path.stem, trimesh.load_mesh(path)) for path in paths]
 
 
-def household() -> list[tuple[str, Path]]:
+def household() -> list[tuple[str, trimesh.Trimesh]]:
     library = load_library("household")
-    return [(name, library.path(entry.mesh)) for name, entry in library.objects.items()]
+    return [(name, library.surface(name)) for name in library.objects]
 
 
 if __name__ == "__main__":

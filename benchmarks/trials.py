@@ -15,7 +15,6 @@ import time
 from collections import Counter
 
 import numpy as np
-import trimesh
 
 import burg_drake as burg
 from burg_drake.core.content import rng_from
@@ -68,7 +67,7 @@ def measure(
     """CPU seconds of executed trials and of rejected grasps, and the outcomes of the clear ones."""
     scene = trial.diagram.scene
     entry = scene.entry(name)
-    mesh = trimesh.load(scene.library.path(entry.mesh), force="mesh")
+    mesh = scene.library.surface(scene.instance(name).object)
     rng = rng_from("benchmark", name)
     sampled = burg.sample_antipodal(mesh, grasps, rng, friction=entry.friction)
     executed, rejected, outcomes = [], [], Counter[str]()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import trimesh
-
 from burg_drake import HandTrial, load_scene, load_station, sample_antipodal
 from burg_drake.core.content import rng_from
 
 scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
-mesh = trimesh.load_mesh(scene.library.path(scene.entry("box").mesh))
+mesh = scene.library.surface("box")
 grasps = sample_antipodal(
     mesh, 500, rng_from("example"), opening=station.hand.opening, object="box"
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,9 +20,17 @@ from burg_drake.apps.arguments import (
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError, nearest
 
 if TYPE_CHECKING:
+    import yaml
+
     from burg_drake.objects.build import BuildReport
     from burg_drake.objects.library import ObjectLibrary
     from burg_drake.objects.source import ObjectSource
+
+
+MASSES_FORMAT = """\
+format of masses.yaml: 'NAME: KG' lines, NAME a mesh file without its suffix
+  mug: 0.118
+  cracker_box: 0.411"""
 
 
 def add_to(verbs: Any) -> None:
@@ -51,6 +60,7 @@ def _add_build(group: Any) -> None:
         "burg-drake library build mug.stl -o my_library --scale 0.001 --mass mug=0.118",
         "burg-drake library build scans/ -o my_library --masses masses.yaml --friction 0.4",
     )
+    build.epilog = f"{build.epilog}\n\n{MASSES_FORMAT}"
     build.add_argument(
         "meshes", metavar="MESH", nargs="+", help="mesh files (obj, ply, stl, glb, gltf) or folders"
     )
@@ -65,7 +75,7 @@ def _add_build(group: Any) -> None:
         help="mass of an object; may be given several times",
     )
     build.add_argument(
-        "--masses", metavar="FILE", help="YAML file with a line 'NAME: KG' for each object"
+        "--masses", metavar="FILE", help="YAML file of 'NAME: KG' lines; --mass goes first"
     )
     build.add_argument(
         "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
@@ -172,8 +182,8 @@ def _sources(arguments: argparse.Namespace) -> list[ObjectSource]:
 
     meshes = _mesh_files(arguments.meshes)
     names = {object_name(mesh.stem) for mesh in meshes}
-    given = [] if arguments.masses is None else _read_masses(Path(arguments.masses))
-    masses = _by_name([*given, *arguments.mass], names, "mass")
+    masses = {} if arguments.masses is None else _read_masses(Path(arguments.masses), names)
+    masses.update(_by_name(arguments.mass, names, "mass"))
     frictions = _by_name([f for f in arguments.friction if f[0]], names, "friction")
     common = next((mu for name, mu in reversed(arguments.friction) if not name), None)
     return [
@@ -218,19 +228,46 @@ def _by_name(pairs: Iterable[tuple[str, float]], names: set[str], what: str) -> 
     return values
 
 
-def _read_masses(path: Path) -> list[tuple[str, float]]:
-    """Pairs of a YAML file with a line `NAME: KG` for each object."""
+def _read_masses(path: Path, names: set[str]) -> dict[str, float]:
+    """Masses [kg] by object name, of a YAML file with a line `NAME: KG` for each object."""
     import yaml
 
+    from burg_drake.objects.source import object_name
+
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
     except OSError as error:
         raise DocumentError(f"cannot read {path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DocumentError(f"{path}: not valid YAML: {str(error).splitlines()[0]}") from error
-    if not isinstance(document, dict):
-        raise DocumentError(f"{path}: expected lines 'NAME: KG', such as 'mug: 0.118'")
-    for name, mass in document.items():
-        if isinstance(mass, bool) or not isinstance(mass, (int, float)) or not mass > 0.0:
-            raise DocumentError(f"{path}: {name}: mass is {mass!r}; give kilograms above 0")
-    return [(str(name), float(mass)) for name, mass in document.items()]
+    except UnicodeDecodeError as error:
+        raise DocumentError(f"cannot read {path}: it is not a text file") from error
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark else ""
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise DocumentError(f"{path}{line}: not valid YAML: {problem}") from error
+    if not isinstance(node, yaml.MappingNode):
+        line = f":{node.start_mark.line + 1}" if node else ""
+        raise DocumentError(f"{path}{line}: expected lines 'NAME: KG', such as 'mug: 0.118'")
+    masses: dict[str, float] = {}
+    for key, value in node.value:
+        where = f"{path}:{key.start_mark.line + 1}"
+        if not isinstance(key, yaml.ScalarNode):
+            raise DocumentError(f"{where}: expected a line 'NAME: KG', such as 'mug: 0.118'")
+        name = object_name(key.value)
+        if name not in names:
+            raise DocumentError(f"{where}: {key.value}: no such mesh; {nearest(name, names)}")
+        if name in masses:
+            raise DocumentError(f"{where}: {key.value}: its mass is given twice")
+        masses[name] = _kilograms(value, f"{where}: {key.value}")
+    return masses
+
+
+def _kilograms(node: yaml.Node, where: str) -> float:
+    text = node.value if isinstance(node.value, str) else "a structure"
+    try:
+        mass = float(text)
+    except ValueError:
+        mass = math.nan
+    if not 0.0 < mass < math.inf:
+        raise DocumentError(f"{where}: mass is {text or 'missing'}; give kilograms above 0")
+    return mass

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 
 @contextmanager
 def object_progress(total: int) -> Iterator[Callable[[str, str, int, int], None]]:
-    """A bar for library builds; off a terminal one line for each object.
+    """A bar for library builds on standard error; off a terminal one line for each object.
 
     Yields:
         What `build_library` calls after each object.
@@ -19,7 +20,7 @@ def object_progress(total: int) -> Iterator[Callable[[str, str, int, int], None]
     console = Console(stderr=True)
     if not console.is_terminal:
         yield lambda name, state, done, count: print(
-            f"[{done}/{count}] {name}: {state}", flush=True
+            f"[{done}/{count}] {name}: {state}", file=sys.stderr, flush=True
         )
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())

@@ -7,9 +7,6 @@ not built again: see `burg_drake.objects.stages`.
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -17,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.files import writable_folder
 from burg_drake.objects.library import (
     LIBRARY_FILE,
     LibraryDocument,
@@ -27,6 +23,7 @@ from burg_drake.objects.library import (
 )
 from burg_drake.objects.source import ObjectSource, object_name
 from burg_drake.objects.stages import Built, StageKeys, build_object, is_current, stage_keys
+from burg_drake.objects.target import check_targets, opened_for_build, scratch_folder
 
 Progress = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
@@ -76,17 +73,26 @@ def build_library(
 
     Returns:
         The library and what was done; an object that cannot be built is in `failed`, and its
-        earlier version, if there was one, stays.
+        earlier version, if there was one, stays. If none of a new library can, no files are left.
 
     Raises:
-        InvalidInputError: `out` cannot be written to, or two sources have the same name.
+        InvalidInputError: `out` cannot be written to, another build is writing it, two sources have
+            the same name, or an object's folder exists that is no object of this library or holds
+            a source mesh. Nothing is changed then.
         DocumentError: `out` holds a `library.yaml` that cannot be read.
     """
     named = [s if isinstance(s, ObjectSource) else ObjectSource.from_file(s) for s in sources]
     _check_names(named)
-    root = writable_folder(out).resolve()
-    _clear_abandoned(root)
-    tally = _Tally(_open(root, name), len(named), progress)
+    with opened_for_build(out) as root:
+        library = _open(root, name)
+        check_targets(named, root, library.objects)
+        tally = _Tally(_renamed(library, name), len(named), progress)
+        _build(named, tally, workers)
+        return tally.report(named)
+
+
+def _build(named: Sequence[ObjectSource], tally: _Tally, workers: int) -> None:
+    root = tally.library.root
     work: list[Work] = []
     for source in named:
         try:
@@ -99,16 +105,12 @@ def build_library(
             tally.count(source.name, "cached")
         else:
             work.append((source, keys))
-    with tempfile.TemporaryDirectory(dir=root, prefix=f"{SCRATCH}{os.getpid()}-") as scratch:
-        for source, outcome in _outcomes(work, root, Path(scratch), workers):
+    with scratch_folder(root) as scratch:
+        for source, outcome in _outcomes(work, root, scratch, workers):
             if isinstance(outcome, Built):
-                tally.publish(source, outcome, Path(scratch))
+                tally.publish(source, outcome, scratch)
             else:
                 tally.fail(source.name, outcome)
-    return tally.report(named)
-
-
-SCRATCH = ".building-"
 
 
 class _Tally:
@@ -151,7 +153,7 @@ class _Tally:
 
     def report(self, sources: Sequence[ObjectSource]) -> BuildReport:
         names = [s.name for s in sources]
-        if not (self.library.root / LIBRARY_FILE).exists():
+        if not self.failed and not (self.library.root / LIBRARY_FILE).exists():
             self.library.save()
         return BuildReport(
             self.library,
@@ -172,35 +174,21 @@ def _check_names(sources: Sequence[ObjectSource]) -> None:
 
 def _open(root: Path, name: str | None) -> ObjectLibrary:
     if (root / LIBRARY_FILE).exists():
-        library = load_library(root)
-        if name is not None and name != library.name:
-            library = ObjectLibrary(replace(library.document, name=name), root)
-            library.save()
-        return library
+        return load_library(root)
     return ObjectLibrary(LibraryDocument(name=name or object_name(root.name)), root)
+
+
+def _renamed(library: ObjectLibrary, name: str | None) -> ObjectLibrary:
+    if name is None or name == library.name:
+        return library
+    library = ObjectLibrary(replace(library.document, name=name), library.root)
+    library.save()
+    return library
 
 
 def _with_entries(library: ObjectLibrary, entries: dict[str, ObjectEntry]) -> ObjectLibrary:
     ordered = {name: entries[name] for name in sorted(entries)}
     return ObjectLibrary(replace(library.document, objects=ordered), library.root)
-
-
-def _clear_abandoned(root: Path) -> None:
-    """Removes the scratch folders of builds that were killed."""
-    for folder in root.glob(f"{SCRATCH}*"):
-        owner = folder.name.removeprefix(SCRATCH).split("-")[0]
-        if not (owner.isdigit() and _alive(int(owner))):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return process != os.getpid()
 
 
 def _outcomes(

@@ -9,12 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, load_document, save_document
+
+if TYPE_CHECKING:
+    import trimesh
 
 DEFAULT_FRICTION = 0.24
 """Friction coefficient where none is given, as in BURG-Toolkit (Rudorfer et al., 2022)."""
@@ -86,12 +89,17 @@ class ObjectEntry:
         mesh: surface mesh in metres, in the object frame O (.obj).
         sdf: the Drake model; one link `body` whose frame is O.
         pieces: convex collision pieces (.obj).
-        friction: coefficient between the object and gripper pads or table.
+        friction: coefficient. In a trial, that between the object and the gripper's pads, as they
+            take the target's. Against the table and other objects Drake combines the coefficients
+            a and b of the two to 2ab / (a + b).
         lower, upper: corners of the axis-aligned bounding box in O [m].
         mass_properties: mass, centre of mass, inertia.
         stable_poses: most probable first.
         source: the mesh file and its repairs.
-        build: hash of everything that this entry was built from.
+        build: hash of everything that was given (the mesh with its textures, mass, density,
+            friction, scale, pieces, colour, name, parameters of the decomposition), of the
+            pipeline's version and defaults, and of CoACD's version unless pieces were given;
+            not of the files that came out.
     """
 
     description: str = ""
@@ -174,6 +182,26 @@ class ObjectLibrary:
         if not path.exists():
             raise UnknownNameError(f"{path} is missing; build the library {self.name!r} again")
         return path
+
+    def surface(self, name: str) -> trimesh.Trimesh:
+        """The surface of an object, to sample on and measure.
+
+        Args:
+            name: of the object.
+
+        Returns:
+            Its mesh in the object frame O [m], without colours; vertices that the file repeats for
+            their normals and texture coordinates are merged.
+
+        Raises:
+            UnknownNameError: no such object, or its mesh file is missing.
+        """
+        import trimesh
+
+        path = self.path(self.entry(name).mesh)
+        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        return mesh
 
     @cached_property
     def content(self) -> dict[str, str]:

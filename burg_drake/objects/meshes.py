@@ -31,6 +31,12 @@ MAX_EXTENT = 2.5
 MIN_EXTENT = 1e-3
 """Smallest plausible largest extent [m]."""
 
+USUAL_EXTENT = (0.01, 1.0)
+"""Largest extents of nearly all things on a table [m], to tell a mesh's unit by."""
+
+UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "metres": 1.0}
+"""Units that meshes come in [m]."""
+
 FLAT = 1e-6
 """A mesh is flat when its hull's volume, or the volume that its closed surface encloses, is below
 this share of its largest extent cubed (a sheet of paper has 5e-4)."""
@@ -195,6 +201,8 @@ def _read(path: Path) -> trimesh.Trimesh:
         mesh = _joined(parts) if parts else None
     except Exception as error:  # the readers raise whatever their parsing stumbles over
         reason = str(error).strip().splitlines() or [type(error).__name__]
+        if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
+            reason = ["its contents are neither text nor a known binary form"]
         raise MeshError(f"{path}: not a readable {path.suffix} mesh: {reason[0]}") from error
     if mesh is None:
         raise MeshError(f"{path}: the mesh file has no triangles")
@@ -238,20 +246,31 @@ def _check_numbers(mesh: trimesh.Trimesh, name: str) -> None:
 
 def _check_size(mesh: trimesh.Trimesh, name: str, scale: float) -> None:
     extent = float(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0).max())
-    if extent > MAX_EXTENT:
-        unit = "looks like millimetres: " if extent < 1000.0 * MAX_EXTENT else ""
-        factor = 1e-3 if unit else 10.0 ** -np.ceil(np.log10(extent))
-        raise MeshError(
-            f"{name}: {unit}largest extent {extent:.4g} m; try scale={scale * factor:g}"
-        )
     if extent == 0.0:
         raise MeshError(f"{name}: all vertices are at one point")
-    if extent < MIN_EXTENT:
-        factor = 1000.0 if extent > 1e-3 * MIN_EXTENT else 10.0 ** -np.ceil(np.log10(extent))
+    if not MIN_EXTENT <= extent <= MAX_EXTENT:
         raise MeshError(
-            f"{name}: largest extent is only {extent * 1000:.3g} mm, but lengths are in metres;"
-            f" try scale={scale * factor:g}"
+            f"{name}: largest extent is {_length(extent)}, but lengths are in metres;"
+            f" {_scale_hint(extent / scale)}"
         )
+
+
+def _scale_hint(extent: float) -> str:
+    """Which scales would make something of a mesh with this largest extent in its own unit."""
+    fits: dict[str, float] = {}
+    for low, high in (USUAL_EXTENT, (MIN_EXTENT, MAX_EXTENT)):
+        fits = fits or {u: s for u, s in UNITS.items() if low <= s * extent <= high}
+    if not fits:
+        scale = 10.0 ** (-1.0 - np.ceil(np.log10(extent)))  # 10 to 100 mm
+        return f"try scale={scale:g} (--scale {scale:g})"
+    return "looks like " + ", or ".join(
+        f"{unit}: scale={scale:g} (--scale {scale:g}) makes it {_length(scale * extent)}"
+        for unit, scale in fits.items()
+    )
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.4g} m" if metres > 1.0 else f"{1000.0 * metres:.4g} mm"
 
 
 def _check_volume(surface: trimesh.Trimesh, closed: bool, name: str) -> None:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from importlib import metadata
 from pathlib import Path
 from typing import Any, cast
 
@@ -126,8 +127,9 @@ def stage_keys(source: ObjectSource) -> StageKeys:
     if source.pieces is not None:
         given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in source.pieces]
     visual = content_hash(VERSION, "visual", mesh, float(source.scale), source.rgba)
+    maker = [_coacd_version()] if given is None else []
     pieces = content_hash(
-        VERSION, "pieces", mesh, float(source.scale), given, asdict(source.decomposition)
+        VERSION, "pieces", mesh, float(source.scale), given, asdict(source.decomposition), *maker
     )
     numbers = (source.mass, source.density, source.coefficient)
     build = content_hash(
@@ -142,6 +144,14 @@ def stage_keys(source: ObjectSource) -> StageKeys:
     in_memory = isinstance(source.mesh, trimesh.Trimesh)
     file = mesh if in_memory else hashlib.sha256(Path(source.mesh).read_bytes()).hexdigest()
     return StageKeys(file, visual, pieces, build)
+
+
+def _coacd_version() -> str:
+    """Other versions of CoACD may cut the same mesh otherwise."""
+    try:
+        return metadata.version("coacd")
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def is_current(entry: ObjectEntry, keys: StageKeys, source: ObjectSource, root: Path) -> bool:

@@ -55,7 +55,9 @@ def test_one_broken_mesh_is_one_failure(mesh: Path, tmp_path: Path, capsys: Capt
     (tmp_path / "broken.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert build(mesh, tmp_path / "broken.obj", "-o", tmp_path / "library") == 1
     captured = capsys.readouterr()
-    (line,) = captured.err.splitlines()
+    *progress, line = captured.err.splitlines()
+    assert len(progress) == 2 and all(p.startswith("[") for p in progress)
+    assert "[1/2]" not in captured.out  # what others read is free of progress
     assert line.startswith("burg-drake: error: ")
     assert "broken.obj: 1 of 3 vertices are NaN or infinite" in line
     assert list(load_library(tmp_path / "library").objects) == ["block"]
@@ -76,15 +78,31 @@ def test_nothing_could_be_built(
     if content is not None:
         path.write_text(content)
     assert build(path, "-o", tmp_path / "library") == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    _, line = capsys.readouterr().err.splitlines()  # after that of the progress
     assert line.startswith(f"burg-drake: error: {path}: ") and message in line
+    assert not (tmp_path / "library").exists()
 
 
 def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
     assert build(tmp_path / "block.stl", "-o", tmp_path / "library") == 2
+    _, line = capsys.readouterr().err.splitlines()
+    assert "looks like millimetres: scale=0.001 (--scale 0.001) makes it 60 mm" in line
+    assert not (tmp_path / "library").exists()
+
+
+def test_folders_of_the_users_are_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    (tmp_path / "cube").mkdir()
+    trimesh.creation.box((0.05, 0.04, 0.06)).export(tmp_path / "cube" / "cube.obj")
+    before = (tmp_path / "cube" / "cube.obj").read_bytes()
+    monkeypatch.chdir(tmp_path)
+    assert build("cube/cube.obj", "-o", ".") == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "looks like millimetres" in line and "0.001" in line
+    assert line.startswith(f"burg-drake: error: {tmp_path / 'cube'} exists and is no object of")
+    assert (tmp_path / "cube" / "cube.obj").read_bytes() == before
+    assert [p.name for p in tmp_path.rglob("*")] == ["cube", "cube.obj"]
 
 
 @pytest.mark.parametrize(
@@ -117,10 +135,17 @@ def test_bad_numbers(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("block: 0\n", "masses.yaml: block: mass is 0; give kilograms above 0"),
-        ("block: heavy\n", "masses.yaml: block: mass is 'heavy'; give kilograms above 0"),
-        ("- block\n", "masses.yaml: expected lines 'NAME: KG', such as 'mug: 0.118'"),
-        ("block: [\n", "masses.yaml: not valid YAML"),
+        ("block: 0\n", "masses.yaml:1: block: mass is 0; give kilograms above 0"),
+        ("block: heavy\n", "masses.yaml:1: block: mass is heavy; give kilograms above 0"),
+        ("# none\n\nblock:\n", "masses.yaml:3: block: mass is missing; give kilograms above 0"),
+        ("block: [1]\n", "masses.yaml:1: block: mass is a structure; give kilograms above 0"),
+        ("block: .nan\n", "masses.yaml:1: block: mass is .nan; give kilograms above 0"),
+        ("block: 1\nBlock: 2\n", "masses.yaml:2: Block: its mass is given twice"),
+        ("block: 1\nblok: 2\n", "masses.yaml:2: blok: no such mesh; did you mean 'block'?"),
+        ("[block]: 1\n", "masses.yaml:1: expected a line 'NAME: KG', such as 'mug: 0.118'"),
+        ("", "masses.yaml: expected lines 'NAME: KG', such as 'mug: 0.118'"),
+        ("- block\n", "masses.yaml:1: expected lines 'NAME: KG', such as 'mug: 0.118'"),
+        ("block: [\n", "masses.yaml:2: not valid YAML"),
         (None, "masses.yaml: No such file or directory"),
     ],
 )
@@ -156,3 +181,17 @@ def test_folder_without_meshes(tmp_path: Path, capsys: Capture) -> None:
     (tmp_path / "empty").mkdir()
     assert build(tmp_path / "empty", "-o", tmp_path / "library") == 2
     assert "holds no mesh (.obj, .ply, .stl, .glb, .gltf)" in capsys.readouterr().err
+
+
+def test_the_help_describes_masses_files(capsys: Capture) -> None:
+    with pytest.raises(SystemExit):
+        build("--help")
+    text = capsys.readouterr().out
+    assert "format of masses.yaml: 'NAME: KG' lines" in text and "\n  mug: 0.118\n" in text
+
+
+def test_masses_of_the_command_line_go_first(mesh: Path, tmp_path: Path) -> None:
+    (tmp_path / "masses.yaml").write_text("block: 1\n")
+    arguments = ("--masses", tmp_path / "masses.yaml", "--mass", "block=0.2")
+    assert build(mesh, "-o", tmp_path / "library", *arguments) == 0
+    assert load_library(tmp_path / "library").entry("block").mass == 0.2

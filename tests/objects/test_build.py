@@ -12,11 +12,11 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects import build as build_module
 from burg_drake.objects import stages
 from burg_drake.objects.build import build_library
 from burg_drake.objects.library import load_library
 from burg_drake.objects.source import ObjectSource
+from burg_drake.objects.target import SCRATCH
 
 
 def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimesh:
@@ -208,7 +208,7 @@ def test_a_kill_loses_nothing_that_was_finished(
 
 
 def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path) -> None:
-    dead = tmp_path / "lib" / f"{build_module.SCRATCH}999999999-abc"
+    dead = tmp_path / "lib" / f"{SCRATCH}999999999-abc"
     (dead / "box").mkdir(parents=True)
     build_library(_sources(meshes), tmp_path / "lib")
     assert sorted(p.name for p in (tmp_path / "lib").iterdir()) == ["box", "can", "library.yaml"]
@@ -263,3 +263,14 @@ def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> N
     umask = os.umask(0)
     os.umask(umask)
     assert (tmp_path / "lib/box").stat().st_mode & 0o777 == 0o777 & ~umask
+
+
+def test_another_coacd_version_cuts_again_what_it_cut(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = ObjectSource(name="given", mesh=_box(), pieces=(_box(),), mass=0.1)
+    sources = [*_sources(meshes), given]
+    build_library(sources, tmp_path / "lib")
+    monkeypatch.setattr(stages.metadata, "version", lambda name: f"another {name}")
+    report = build_library(sources, tmp_path / "lib")
+    assert (report.built, report.cached) == (("box", "can"), ("given",))

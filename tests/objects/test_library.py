@@ -96,3 +96,15 @@ def test_mass_below_zero_names_the_key(library: ObjectLibrary) -> None:
     file.write_text(file.read_text().replace("mass: 0.30000000000000004", "mass: 0"))
     with pytest.raises(DocumentError, match=r"library\.yaml:\d+: objects\.box\.mass_properties"):
         load_library(library.root)
+
+
+def test_surfaces_have_no_seams_and_are_in_the_object_frame() -> None:
+    library = load_library("household")
+    for name, entry in library.objects.items():
+        surface = library.surface(name)
+        np.testing.assert_allclose(surface.bounds, [entry.lower, entry.upper], atol=1e-6)
+        assert len(np.unique(surface.vertices, axis=0)) == len(surface.vertices)
+        assert surface.is_watertight
+        assert surface.volume == pytest.approx(entry.mass_properties.volume, rel=1e-4)
+    with pytest.raises(UnknownNameError, match="'bax' is not in library"):
+        library.surface("bax")

@@ -101,23 +101,32 @@ def _message(source: Path | trimesh.Trimesh, scale: float = 1.0) -> str:
     return text
 
 
-def test_millimetres_are_recognised(box: trimesh.Trimesh) -> None:
-    box.apply_scale(1000.0)
-    assert _message(box) == (
-        "mesh in memory: looks like millimetres: largest extent 100 m; try scale=0.001"
-    )
+MM, CM, M = (f"scale={s} (--scale {s}) makes it" for s in ("0.001", "0.01", "1"))
 
 
-def test_a_scale_given_the_wrong_way_is_recognised(box: trimesh.Trimesh) -> None:
-    assert _message(box, 1000.0).endswith("largest extent 100 m; try scale=1")
-    assert _message(box, 0.001).endswith("only 0.1 mm, but lengths are in metres; try scale=1")
+@pytest.mark.parametrize(
+    ("extent", "scale", "expected"),
+    [
+        (200.0, 1.0, f"is 200 m, but lengths are in metres; looks like millimetres: {MM} 200 mm"),
+        (2000.0, 1.0, f"is 2000 m, but lengths are in metres; looks like millimetres: {MM} 2 m"),
+        (20.0, 1.0, f"looks like millimetres: {MM} 20 mm, or centimetres: {CM} 200 mm"),
+        (5.0, 1.0, f"is 5 m, but lengths are in metres; looks like centimetres: {CM} 50 mm"),
+        (0.1, 1000.0, f"is 100 m, but lengths are in metres; looks like metres: {M} 100 mm"),
+        (0.1, 0.001, f"is 0.1 mm, but lengths are in metres; looks like metres: {M} 100 mm"),
+        (1e-4, 1.0, "is 0.1 mm, but lengths are in metres; try scale=1000 (--scale 1000)"),
+    ],
+)
+def test_a_wrong_unit_is_recognised(extent: float, scale: float, expected: str) -> None:
+    message = _message(trimesh.creation.box((0.6 * extent, extent, 0.5 * extent)), scale)
+    assert message.startswith("mesh in memory: largest extent is ") and message.endswith(expected)
 
 
-def test_extents_far_from_any_unit_get_a_scale_that_fits(box: trimesh.Trimesh) -> None:
-    message = _message(box.apply_scale(1e7))
-    scale = float(message.rpartition("=")[2])
-    assert "millimetres" not in message
-    assert 0.01 <= scale * 1e6 <= 1.0
+@pytest.mark.parametrize("extent", [7e6, 3e-7])
+def test_extents_far_from_any_unit_get_a_scale_that_fits(extent: float) -> None:
+    box = trimesh.creation.box((extent, extent, extent))
+    scale = float(_message(box).rpartition(" ")[2].rstrip(")"))
+    np.testing.assert_allclose(load_mesh(box, scale).surface.extents, scale * extent, rtol=1e-5)
+    assert 0.01 <= scale * extent <= 0.1
 
 
 def test_missing_file(tmp_path: Path) -> None:
@@ -205,3 +214,12 @@ def test_hash_follows_the_files_that_a_mesh_refers_to(tmp_path: Path, box: trime
     assert mesh_hash(tmp_path / "box.obj") == first
     Image.new("RGB", (4, 4), (9, 9, 9)).save(picture)
     assert mesh_hash(tmp_path / "box.obj") != first
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".stl", ".ply", ".glb"])
+def test_random_bytes_are_no_mesh(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"noise{suffix}"
+    path.write_bytes(np.random.default_rng(1).bytes(3000))
+    with pytest.raises(MeshError, match=f"not a readable {suffix} mesh") as caught:
+        load_mesh(path)
+    assert "No module" not in str(caught.value)
