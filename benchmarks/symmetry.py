@@ -74,7 +74,7 @@ def main() -> None:
         print(f"{name:20} {count} trials", flush=True)
     for label, flips, peer in (("swapped", swapped, 8.8), ("turned", moved, 5.6)):
         print(
-            f"{label}: {flips} of {executed} verdicts change ({flips / executed:.1%}; peer {peer} %)"
+            f"{label}: {flips} of {executed} verdicts change ({flips / executed:.1%}, peer {peer}%)"
         )
 
 

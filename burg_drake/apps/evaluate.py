@@ -17,12 +17,9 @@ from burg_drake.apps.arguments import (
     positive_int,
     seed,
 )
-from burg_drake.core.errors import UnknownNameError, nearest
 
 if TYPE_CHECKING:
-    from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.run_store import Run
-    from burg_drake.scene.scene import Scene
 
 DEFAULT_OUTPUT = "runs"
 
@@ -63,7 +60,9 @@ def add_to(verbs: Any) -> None:
         help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
     )
     parser.add_argument(
-        "--grasps", metavar="FILE", help="judge these grasps (.npz of a GraspSet); sample none"
+        "--grasps",
+        metavar="FILE",
+        help="judge these grasps (.npz of a GraspSet, or grasps.npz of a run); sample none",
     )
     parser.add_argument(
         "--engine",
@@ -90,7 +89,7 @@ def add_to(verbs: Any) -> None:
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
-    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.candidates import read_grasps
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station
@@ -104,7 +103,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
         grasps_per_object=arguments.grasps_per_object,
         approach_angle_deg=arguments.approach_angle,
-        grasps=None if given is None else by_instance(scene, GraspSet.load(given), given),
+        grasps=None if given is None else read_grasps(scene, given),
         engine=arguments.engine,
         seed=arguments.seed,
         workers=arguments.workers,
@@ -132,21 +131,3 @@ def print_summary(run: Run) -> None:
     from burg_drake.evaluation.summary import summarize, summary_view
 
     Console().print(summary_view(summarize(run)))
-
-
-def by_instance(scene: Scene, grasps: GraspSet, source: str) -> dict[str, GraspSet]:
-    """The grasps of a file for all instances of their objects.
-
-    Raises:
-        UnknownNameError: grasps of an object that the scene does not have.
-    """
-    objects = {scene.instance(name).object for name in scene.instances}
-    unknown = sorted(set(grasps.object.tolist()) - objects)
-    if unknown:
-        raise UnknownNameError(
-            f"{source} has grasps of object {unknown[0]!r}, which is not in scene {scene.name!r};"
-            f" {nearest(unknown[0], objects)}"
-        )
-    sets = {name: scene.instance(name).object for name in scene.instances}
-    members = {name: grasps.object == object for name, object in sets.items()}
-    return {name: grasps.select(mask) for name, mask in members.items() if mask.any()}

@@ -10,6 +10,7 @@ from burg_drake.apps.arguments import add_verb, add_view
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.judge import Verdict
     from burg_drake.evaluation.run_store import Run
 
 
@@ -57,13 +58,29 @@ def run_replay(arguments: argparse.Namespace) -> int:
     lines = describe(result)
     verdict = run.verdicts.get(id)
     if verdict is not None and verdict.outcome is not result.outcome:
-        lines.insert(0, f"the run's verdict: {verdict.outcome}; the hand alone:")
+        lines.insert(0, _other_verdict(run, verdict))
     for line in lines:
         print(line)
     if arguments.html is None and result.margins.end_time == 0.0:
         print("nothing moves: the trial ended at its start", file=sys.stderr)
     present(meshcat, arguments, title=f"{scene.name}: {id}", caption=lines)
     return 0
+
+
+def _other_verdict(run: Run, verdict: Verdict) -> str:
+    """Introduces a trial that ends unlike the run's, with what may be the cause."""
+    from burg_drake.core.outcome import Stage
+    from burg_drake.evaluation.run_document import software_versions
+
+    there, here = run.document.versions, software_versions()
+    changed = [
+        f"{name} {there[name]}, now {here[name]}"
+        for name in there
+        if name in here and there[name] != here[name]
+    ]
+    versions = f" (with {'; '.join(changed)})" if changed else ""
+    trial = "the hand alone" if verdict.stage is Stage.REACHABLE else "this time"
+    return f"the run's verdict: {verdict.outcome}{versions}; {trial}:"
 
 
 def _best(run: Run) -> str:

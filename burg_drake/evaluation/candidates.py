@@ -165,6 +165,42 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
     return _join({name: _distinct(grasps[name]) for name in scene.instances if name in grasps})
 
 
+def read_grasps(scene: Scene, path: str | Path) -> dict[str, GraspSet]:
+    """Reads a grasp file for `given_candidates`.
+
+    Args:
+        scene: the scene.
+        path: grasps.npz of a run, whose grasps stay on their instances; or any other file of a
+            `GraspSet`, whose grasps go to every instance of their object.
+
+    Raises:
+        InvalidInputError: the file is something else.
+        UnknownNameError: grasps of an object or on an instance that the scene does not have.
+    """
+    grasps = GraspSet.load(path)
+    if "instances" in grasps.provenance:
+        return _of_run(Candidates.load(Path(path)))
+    objects = {name: scene.instance(name).object for name in scene.instances}
+    unknown = sorted(set(grasps.object.tolist()) - set(objects.values()))
+    if unknown:
+        raise UnknownNameError(
+            f"{path} has grasps of object {unknown[0]!r}, which is not in scene {scene.name!r};"
+            f" {nearest(unknown[0], set(objects.values()))}"
+        )
+    members = {name: grasps.object == object for name, object in objects.items()}
+    return {name: grasps.select(mask) for name, mask in members.items() if mask.any()}
+
+
+def _of_run(candidates: Candidates) -> dict[str, GraspSet]:
+    """The grasps by instance, each set with its own provenance."""
+    parts = candidates.grasps.provenance.get("parts", {})
+    sets = {}
+    for name in dict.fromkeys(candidates.instance.tolist()):
+        chosen = candidates.grasps.select(candidates.instance == name)
+        sets[name] = dataclasses.replace(chosen, provenance=parts.get(name, {}))
+    return sets
+
+
 def _join(by_instance: dict[str, GraspSet]) -> Candidates:
     if not by_instance:
         return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
@@ -200,7 +236,7 @@ def _sample_object(
     entry: ObjectEntry = scene.library.entry(name)
     return _distinct(
         sample_antipodal(
-            _load_mesh(scene.library.path(entry.mesh)),
+            scene.library.surface(name),
             n,
             rng_from("antipodal", seed, entry.build),
             friction=entry.friction,
@@ -209,11 +245,3 @@ def _sample_object(
             object=name,
         )
     )
-
-
-def _load_mesh(path: Path):  # type: ignore[no-untyped-def]
-    import trimesh
-
-    mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    return mesh

@@ -17,6 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidates import (
@@ -40,6 +41,7 @@ from burg_drake.evaluation.run_document import (
     numbers,
     portable_reference,
     require_same_run,
+    run_hash,
     software_versions,
 )
 from burg_drake.evaluation.run_store import (
@@ -50,6 +52,7 @@ from burg_drake.evaluation.run_store import (
     load_run,
     require_run_folder,
     save_run,
+    write_copies,
 )
 from burg_drake.evaluation.table import TableFormat, require_writer, write_table
 from burg_drake.scene.scene import Scene, load_scene
@@ -114,6 +117,7 @@ def evaluate(
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         _require_sound(scene, station)
+    writable_folder(folder)
     reach = reach and station.document.arm is not None
     asked = Grasps(origin="given", count=0, objects={}, content="")
     if grasps is None:
@@ -194,6 +198,7 @@ def _open(
     if (folder / RUN_FILE).exists():
         run = load_run(folder)
         require_same_run(folder, run.document, document)
+        write_copies(folder, scene, station)
         return run
     if candidates is None:
         reporter.show(Progress("sampling"))
@@ -203,6 +208,7 @@ def _open(
         candidates = sample_candidates(scene, station, n, document.seed, angle)
         cpu = time.process_time() - start
         document = _with_grasps(document, scene, candidates, cpu)
+    document = replace(document, hash=run_hash(document))
     return create_run(folder, document, scene, station, candidates)
 
 

@@ -1,7 +1,8 @@
 """Judges candidates in worker processes, in any order, surviving the death of workers.
 
 A grasp that ends its worker (a crash inside Drake) is tried once more, alone, in a fresh process;
-when that dies too, the grasp's outcome is `simulation_failed` and the others go on.
+when that dies too, the grasp's outcome is `simulation_failed` and the others go on. So do they when
+a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -24,8 +26,12 @@ from burg_drake.evaluation.worker import Begins, Dying, Judged, Message, Ready, 
 
 TASK_SIZE = 8
 """Grasps handed out at a time: few enough that workers finish together."""
-HOPELESS = 10
-"""So many deaths in a row, with nothing judged in between, are not the grasps' fault."""
+GRASP_TIME_LIMIT = 300.0
+"""Wall time for one grasp [s]; a trial takes about a second, and the slowest ones some tens."""
+HOPELESS = 50
+"""So many grasps in a row that end their workers, with none judged in between, end the run."""
+FALSE_STARTS = 2
+"""So many workers in a row that die before their judge is built end the run."""
 FAREWELL = 5.0
 """Time that an idle worker is given to end by itself [s]."""
 ONE_THREAD = {
@@ -59,7 +65,7 @@ def judge_all(
     Raises:
         InvalidInputError: workers is below 1.
         BurgError: the judge cannot be built.
-        SimulationError: workers keep dying without having judged anything.
+        SimulationError: workers die while the judge is built, or at `HOPELESS` grasps in a row.
     """
     count = default_workers() if workers is None else workers
     if count < 1:
@@ -82,8 +88,10 @@ class _Worker:
         first: task that is kept for it until it is ready, if any.
         ready: whether its judge is built.
         task: grasps that it was given and has not judged yet.
-        announces: whether it says which stage begins.
+        last_try: whether its task is a grasp that has ended another worker before.
         stage: the last one that it announced.
+        since: when it began with the first grasp of `task`, by `time.monotonic` [s].
+        overdue: whether it was ended because that grasp took too long.
         last_words: why it is about to end.
     """
 
@@ -92,8 +100,10 @@ class _Worker:
     first: Task | None = None
     ready: bool = False
     task: deque[Candidate] = field(default_factory=deque)
-    announces: bool = False
+    last_try: bool = False
     stage: Stage = Stage.CLEAR
+    since: float = 0.0
+    overdue: bool = False
     last_words: str = ""
 
     @property
@@ -102,8 +112,19 @@ class _Worker:
 
     def give(self, task: Task) -> None:
         self.task = deque(task.candidates)
-        self.announces = task.announce
+        self.last_try = task.last_try
+        self.since = time.monotonic()
         self.send(task)
+
+    def judged(self) -> Candidate:
+        """Takes the grasp off the task that a verdict has come for."""
+        self.since, self.overdue = time.monotonic(), False
+        return self.task.popleft()
+
+    def end_if_overdue(self) -> None:
+        if time.monotonic() > self.since + GRASP_TIME_LIMIT and not self.connection.poll():
+            self.overdue = True
+            self.process.kill()
 
     def send(self, message: object) -> None:
         with contextlib.suppress(OSError):  # it has died; its pipe's end tells the main loop
@@ -111,6 +132,8 @@ class _Worker:
 
     def cause_of_death(self) -> str:
         code = self.process.wait()
+        if self.overdue:
+            return f"took longer than {GRASP_TIME_LIMIT:g} s"
         if code < 0:
             return f"the worker process was ended by {signal.Signals(-code).name}"
         return f"the worker process ended: {self.last_words or f'exit code {code}'}"
@@ -125,13 +148,14 @@ class _Pool:
             Task(tuple(candidates[i : i + TASK_SIZE])) for i in range(0, len(candidates), TASK_SIZE)
         )
         self.workers: dict[object, _Worker] = {}
-        self.deaths_in_a_row = 0
+        self.false_starts = 0
+        self.crashes_in_a_row = 0
 
     def run(self, count: int) -> Iterator[tuple[Candidate, Verdict]]:
         for _ in range(count):
             self.hire()
         while self.todo or any(w.task or w.first for w in self.workers.values()):
-            for connection in wait([w.connection for w in self.workers.values()]):
+            for connection in wait([w.connection for w in self.workers.values()], self.patience):
                 worker = self.workers[connection]
                 try:
                     message: Message = worker.connection.recv()
@@ -142,10 +166,23 @@ class _Pool:
             for worker in self.workers.values():
                 if worker.idle and self.todo:
                     worker.give(self.todo.popleft())
+                elif worker.task:
+                    worker.end_if_overdue()
+
+    @property
+    def patience(self) -> float | None:
+        """Time until the next grasp takes too long [s]."""
+        since = [w.since for w in self.workers.values() if w.task and not w.overdue]
+        return max(0.0, min(since) + GRASP_TIME_LIMIT - time.monotonic()) if since else None
 
     def hire(self, first: Task | None = None) -> None:
         worker = _start(self.make_judge, first)
         self.workers[worker.connection] = worker
+
+    def replace(self) -> None:
+        """Starts a worker in the place of a dead one, if there is work for it."""
+        if self.todo:
+            self.hire()
 
     def hear(self, worker: _Worker, message: Message) -> Iterator[tuple[Candidate, Verdict]]:
         match message:
@@ -157,12 +194,13 @@ class _Pool:
                 worker.stage = stage
             case Ready():
                 worker.ready = True
+                self.false_starts = 0
                 if worker.first is not None:
                     worker.give(worker.first)
                     worker.first = None
             case Judged(verdict):
-                self.deaths_in_a_row = 0
-                yield worker.task.popleft(), verdict
+                self.crashes_in_a_row = 0
+                yield worker.judged(), verdict
 
     def bury(self, worker: _Worker) -> Iterator[tuple[Candidate, Verdict]]:
         """Deals with the death of a worker: the grasp it was at is suspect, the rest is kept."""
@@ -170,21 +208,27 @@ class _Pool:
         worker.connection.close()
         reason = worker.cause_of_death()
         if not worker.ready:
-            raise SimulationError(f"cannot build the simulation: {reason}")
-        self.deaths_in_a_row += 1
-        if self.deaths_in_a_row >= HOPELESS:
-            raise SimulationError(f"{HOPELESS} worker processes in a row died: {reason}")
+            self.false_starts += 1
+            if self.false_starts >= FALSE_STARTS:
+                raise SimulationError(f"cannot build the simulation: {reason}")
+            self.hire(worker.first)
+            return
         if not worker.task:
-            self.hire()
+            self.replace()
             return
         suspect = worker.task.popleft()
         if worker.task:
             self.todo.appendleft(Task(tuple(worker.task)))
-        if worker.announces:
-            self.hire()
-            yield suspect, Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
-        else:
-            self.hire(Task((suspect,), announce=True))
+        if not (worker.last_try or worker.overdue):
+            self.hire(Task((suspect,), last_try=True))
+            return
+        yield suspect, Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
+        self.crashes_in_a_row += 1
+        if self.crashes_in_a_row >= HOPELESS:
+            raise SimulationError(
+                f"{HOPELESS} grasps in a row could not be simulated; the last one: {reason}"
+            )
+        self.replace()
 
     def dismiss(self) -> None:
         """Lets idle workers end by themselves, and ends those that are still starting."""

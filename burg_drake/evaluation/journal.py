@@ -42,7 +42,9 @@ class Journal:
                 " or choose another -o"
             ) from error
         content = path.read_bytes()
-        os.ftruncate(self._file, content.rfind(b"\n") + 1)
+        whole = content.rfind(b"\n") + 1
+        if whole != len(content):  # otherwise the file keeps its date: table and report are newer
+            os.ftruncate(self._file, whole)
 
     def append(self, id: str, verdict: Verdict) -> None:
         """Adds a verdict.

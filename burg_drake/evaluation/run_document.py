@@ -97,6 +97,7 @@ class RunDocument:
     """Schema of run.yaml.
 
     Attributes:
+        hash: `run_hash`, once the candidates are known; column `run` of the results file.
         command: the command line, or the Python script, that began the run.
         scene, station, library, grasps: what was judged.
         engine: how trials were stepped.
@@ -110,6 +111,7 @@ class RunDocument:
     """
 
     version: int = 1
+    hash: str = ""
     command: str = ""
     scene: Input
     station: Input
@@ -131,7 +133,9 @@ def software_versions() -> dict[str, str]:
         "burg_drake": __version__,
         "drake": _installed("drake"),
         "numpy": _installed("numpy"),
+        "scipy": _installed("scipy"),
         "trimesh": _installed("trimesh"),
+        "embreex": _installed("embreex"),
         "python": platform.python_version(),
         "platform": platform.platform(),
     }
@@ -159,6 +163,11 @@ def identity(document: RunDocument) -> dict[str, str]:
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),
     }
+
+
+def run_hash(document: RunDocument) -> str:
+    """Short hash of what decides about a run's results: `identity` and the candidates."""
+    return content_hash(identity(document), document.grasps.content)[:HASH_DIGITS]
 
 
 def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> None:

@@ -40,7 +40,6 @@ STATION_FILE = "station.yaml"
 GRASPS_FILE = "grasps.npz"
 JOURNAL_FILE = "journal.jsonl"
 REPORT_FILE = "report.html"
-FILES = (RUN_FILE, SCENE_FILE, STATION_FILE, GRASPS_FILE, JOURNAL_FILE, REPORT_FILE)
 RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
 
 SLIP_SCALE = 0.005
@@ -95,6 +94,7 @@ class Run:
             joints=self._joints,
             seed=self.document.seed,
             engine=self.document.engine.name,
+            run=self.document.hash,
         )
 
     @property
@@ -217,17 +217,28 @@ def load_run(path: str | Path) -> Run:
 def create_run(
     folder: Path, document: RunDocument, scene: Scene, station: Station, candidates: Candidates
 ) -> Run:
-    """Writes a new run without results; run.yaml comes last and makes it one.
+    """Writes a new run without results.
+
+    The candidates come before run.yaml, which makes the folder a run, and the copies after it:
+    see `require_run_folder`.
 
     Raises:
         InvalidInputError: the folder cannot be written.
     """
     writable_folder(folder)
-    library = portable_reference(scene.library.root, folder)
-    save_scene(dataclasses.replace(scene.document, library=library), folder / SCENE_FILE)
-    save_document(portable_station(station, folder), folder / STATION_FILE)
     candidates.save(folder / GRASPS_FILE)
-    return save_run(Run(folder, document))
+    run = save_run(Run(folder, document))
+    write_copies(folder, scene, station)
+    return run
+
+
+def write_copies(folder: Path, scene: Scene, station: Station) -> None:
+    """Writes those copies of the documents that a run lacks because it was killed before."""
+    if not (folder / SCENE_FILE).exists():
+        library = portable_reference(scene.library.root, folder)
+        save_scene(dataclasses.replace(scene.document, library=library), folder / SCENE_FILE)
+    if not (folder / STATION_FILE).exists():
+        save_document(portable_station(station, folder), folder / STATION_FILE)
 
 
 def save_run(run: Run) -> Run:
@@ -237,16 +248,25 @@ def save_run(run: Run) -> Run:
 
 
 def require_run_folder(folder: Path) -> None:
-    """Refuses a folder with other people's files in it.
+    """Refuses a folder that holds anything but a run; makes none.
+
+    Without run.yaml only what a run leaves that is killed at its very start is tolerated: an
+    empty journal, possibly with candidates beside it. Names alone prove nothing: scene.yaml,
+    station.yaml or grasps.npz may be the user's own.
 
     Raises:
         InvalidInputError: it cannot be written, or something else is in it.
     """
+    if not folder.exists():
+        return
     writable_folder(folder)
-    own = {*FILES, "results.csv", "results.parquet"}
+    if (folder / RUN_FILE).exists():
+        return
+    journal = folder / JOURNAL_FILE
+    begun = journal.is_file() and journal.stat().st_size == 0
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
-    foreign = sorted(names - own)
-    if foreign and not (folder / RUN_FILE).exists():
+    foreign = sorted(names - {JOURNAL_FILE, GRASPS_FILE} if begun else names)
+    if foreign:
         raise InvalidInputError(
             f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another -o"
         )

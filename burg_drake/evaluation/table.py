@@ -11,7 +11,12 @@ Columns, one row a grasp, in the order of the candidates:
     q_grasp_1 ...             arm configuration at the grasp [rad]; stations with an arm only
     q_pregrasp_1 ...          and at the pregrasp
     seed, engine              of the run
+    run                       short hash of all that decides about the results; `hash` in run.yaml
     cpu_clear, cpu_reach, cpu_trial   CPU time of each stage [s]
+
+The column `run` leads from a results file on its own to the run.yaml with the same `hash`, which
+has the hashes of scene, station, objects and grasps, all settings, and the versions of burg_drake,
+Drake and the libraries. Parquet files carry it along.
 
 What is not defined for a grasp is an empty cell in CSV and null in Parquet, NaN in memory.
 """
@@ -43,7 +48,7 @@ CPU_COLUMNS = {
     Stage.REACHABLE: "cpu_reach",
     Stage.EXECUTED: "cpu_trial",
 }
-TEXT = ("id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine")
+TEXT = ("id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine", "run")
 INTEGER = ("seed",)
 METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key of their metadata."""
@@ -56,6 +61,7 @@ def make_columns(
     joints: int,
     seed: int,
     engine: str,
+    run: str,
 ) -> Columns:
     """The table of all grasps that are judged, in the order of the candidates.
 
@@ -64,6 +70,7 @@ def make_columns(
         verdicts: by grasp id; grasps without one are left out.
         joints: number of the arm's joints, 0 without an arm.
         seed, engine: of the run.
+        run: its hash.
     """
     judged = [i for i, id in enumerate(candidates.id) if id in verdicts]
     rows = [verdicts[candidates.id[i]] for i in judged]
@@ -89,6 +96,7 @@ def make_columns(
             columns[f"{name}_{k + 1}"] = _numbers(angles)
     columns["seed"] = np.full(len(rows), seed, dtype=np.int64)
     columns["engine"] = _texts([engine] * len(rows))
+    columns["run"] = _texts([run] * len(rows))
     for stage, name in CPU_COLUMNS.items():
         columns[name] = _numbers([v.cpu.get(stage, np.nan) for v in rows])
     return columns

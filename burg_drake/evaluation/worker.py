@@ -24,11 +24,11 @@ class Task:
 
     Attributes:
         candidates: to be judged in this order.
-        announce: say which stage begins, so that its death can be told from the last word.
+        last_try: of a single grasp that has ended another worker before.
     """
 
     candidates: tuple[Candidate, ...]
-    announce: bool = False
+    last_try: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,5 +99,5 @@ def _serve(connection: Connection) -> None:
     connection.send(Ready())
     while (task := connection.recv()) is not None:
         for candidate in task.candidates:
-            announce = (lambda s: connection.send(Begins(s))) if task.announce else None
-            connection.send(Judged(judge_grasp(judge, candidate, announce)))
+            verdict = judge_grasp(judge, candidate, lambda s: connection.send(Begins(s)))
+            connection.send(Judged(verdict))

@@ -52,9 +52,9 @@ class ArmCollision:
         """Takes a diagram over; nobody else may use its plant for something else.
 
         Args:
-            station_diagram: built with `robot="arm"` and `weld_objects=True`: Drake's checker demands
-                that interpolation between two equal configurations is exact, which quaternions of
-                free bodies may miss by a rounding.
+            station_diagram: built with `robot="arm"` and `weld_objects=True`: Drake's checker
+                demands that interpolation between two equal configurations is exact, which
+                quaternions of free bodies may miss by a rounding.
 
         Raises:
             InvalidInputError: the diagram has no arm.

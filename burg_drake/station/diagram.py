@@ -129,8 +129,8 @@ def build_station_diagram(
 
     Raises:
         UnknownNameError: no such `robot`.
-        InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station, a home posture that does not fit
-            the arm, or two things of the same name.
+        InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station,
+            a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
     if robot not in get_args(Robot):

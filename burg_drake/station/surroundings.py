@@ -20,8 +20,8 @@ from burg_drake.station.robot import ROBOT_MODELS
 from burg_drake.station.station import Station
 
 TABLE_MODULUS = 1e6
-"""Hydroelastic modulus of table and obstacles [Pa]. Household objects sink in by some hundredths of a
-millimetre. At 1e7 the contact of an object at rest chatters from step to step, and a thrown object
+"""Hydroelastic modulus of table and obstacles [Pa]. Household objects sink in by some hundredths of
+a millimetre. At 1e7 the contact of an object at rest chatters from step to step, and a thrown one
 stops four times too early; at 1e6 it obeys Coulomb's law."""
 DISSIPATION = 5.0
 """Hunt-Crossley dissipation of table and obstacles [s/m]."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
+import shutil
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +15,10 @@ from burg_drake.apps.cli import main
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.journal import Journal
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.run_store import Run, load_run, save_run
 
 Capture = pytest.CaptureFixture[str]
 
@@ -123,6 +128,36 @@ def test_replay_live(run: Run, capsys: Capture) -> None:
     captured = capsys.readouterr()
     assert re.match(r"collision target \(box, \d+\.\d mm deep\)\n", captured.out)
     assert captured.err == "nothing moves: the trial ended at its start\n"
+
+
+@pytest.mark.parametrize(
+    ("stage", "versions", "line"),
+    [
+        ("reachable", {}, "the run's verdict: no_ik; the hand alone:"),
+        ("executed", {}, "the run's verdict: simulation_failed; this time:"),
+        (
+            "executed",
+            {"drake": "1.2.3"},
+            f"the run's verdict: simulation_failed (with drake 1.2.3, now {version('drake')});"
+            " this time:",
+        ),
+    ],
+)
+def test_replay_that_ends_unlike_the_run(
+    stage: str, versions: dict[str, str], line: str, run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(run.path, other)
+    document = run.document
+    document = dataclasses.replace(document, versions={**document.versions, **versions})
+    save_run(Run(other, document))
+    outcome = Outcome.NO_IK if stage == "reachable" else Outcome.SIMULATION_FAILED
+    id = str(run.results["id"][1])
+    with Journal(other / "journal.jsonl") as journal:  # the last line about a grasp counts
+        journal.append(id, Verdict(outcome, Stage(stage)))
+    assert main(["replay", str(other), "--grasp", id, "--no-wait"]) == 0
+    first, second = capsys.readouterr().out.splitlines()[:2]
+    assert first == line and second.startswith("collision target")
 
 
 def test_replay_of_an_unknown_grasp(run: Run, capsys: Capture) -> None:

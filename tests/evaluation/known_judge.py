@@ -77,8 +77,8 @@ class CrashingJudge(KnownJudge):
     """Ends its process on some grasps, in the stage `executed`.
 
     Attributes:
-        how: by grasp id: `segfault`, `exit`, `error`, or `once`, which crashes only as long as the
-            file `log` does not exist.
+        how: by grasp id: `segfault`, `exit`, `error`, `hang`, or `once`, which crashes only as long
+            as the file `log` does not exist.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -91,12 +91,15 @@ class CrashingJudge(KnownJudge):
                 raise SystemExit("a condition of Drake failed")
             case "error":
                 raise RuntimeError("the solver\ndid not converge")
+            case "hang":
+                time.sleep(3600.0)
             case "once" if self.log is not None and not self.log.exists():
                 self.log.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
         return super().execute(grasp)
 
     def clear(self, grasp: Candidate) -> Decision:
+        time.sleep(self.pause)
         return Decision()
 
     def reach(self, grasp: Candidate) -> Decision:
@@ -122,6 +125,22 @@ def die() -> KnownJudge:
     """A factory that ends the process."""
     os.kill(os.getpid(), signal.SIGSEGV)
     raise AssertionError
+
+
+@dataclass(frozen=True)
+class DieOnStart:
+    """A factory that ends the process in which it is called for the n-th time, counted in `log`."""
+
+    judge: Any
+    log: Path
+    n: tuple[int, ...]
+
+    def __call__(self) -> Any:
+        with self.log.open("a") as file:
+            file.write("start\n")
+        if len(self.log.read_text().split()) in self.n:
+            die()
+        return self.judge
 
 
 def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause: float = 0) -> None:

@@ -12,7 +12,12 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidates import Candidates, given_candidates, sample_candidates
+from burg_drake.evaluation.candidates import (
+    Candidates,
+    given_candidates,
+    read_grasps,
+    sample_candidates,
+)
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
@@ -124,3 +129,27 @@ def test_an_approach_angle_out_of_range(scene: Scene, station: Station, angle: f
     message = f"^approach angle is {angle:g} degrees; give more than 0, at most 180$"
     with pytest.raises(InvalidInputError, match=message):
         sample_candidates(scene, station, 5, 0, angle)
+
+
+def test_grasps_of_a_run_stay_on_their_instances(
+    tmp_path: Path, scene: Scene, station: Station
+) -> None:
+    sampled = sample_candidates(posed(scene, right=(90, 0, 0)), station, 5, seed=0)
+    sampled.save(tmp_path / "grasps.npz")
+    back = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.npz"))
+    assert back.id == sampled.id and back.content == sampled.content
+    assert back.grasps.provenance == sampled.grasps.provenance
+    given_candidates(scene, {}).save(tmp_path / "none.npz")
+    assert read_grasps(scene, tmp_path / "none.npz") == {}
+    with pytest.raises(UnknownNameError, match="'left', which is not a free instance"):
+        given_candidates(only(scene, "bar"), read_grasps(scene, tmp_path / "grasps.npz"))
+
+
+def test_other_grasps_go_to_all_instances_of_their_object(tmp_path: Path, scene: Scene) -> None:
+    X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]])
+    GraspSet.create(X_OG, object="cube").save(tmp_path / "cube.npz")
+    given = given_candidates(scene, read_grasps(scene, tmp_path / "cube.npz"))
+    assert given.instance.tolist() == ["left", "left", "right", "right"]
+    GraspSet.create(X_OG, object="cub").save(tmp_path / "cub.npz")
+    with pytest.raises(UnknownNameError, match=r"cub.npz has grasps of object 'cub', .* 'cube'"):
+        read_grasps(scene, tmp_path / "cub.npz")

@@ -14,7 +14,9 @@ import pytest
 from known_judge import KnownJudge, Make, expected, install
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidates import read_grasps
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.progress import Progress
@@ -31,7 +33,7 @@ def same_results(a: Run, b: Run) -> bool:
     return all(np.array_equal(a.results[n], b.results[n], equal_nan=n not in TEXT) for n in names)
 
 
-TEXT = {"id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine"}
+TEXT = {"id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine", "run"}
 
 
 def test_results_do_not_depend_on_workers(
@@ -56,6 +58,12 @@ def test_a_complete_run_returns_at_once(
     again = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
     assert same_results(first, again)
     assert len(again.document.stretches) == 1
+    files = {path: path.stat().st_ino for path in first.path.iterdir()}
+    assert len(files) == 7
+    dates = {path: path.stat().st_mtime_ns for path in files}
+    evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    assert {path: path.stat().st_ino for path in first.path.iterdir()} == files
+    assert {path: path.stat().st_mtime_ns for path in files} == dates
     pytest.importorskip("pyarrow")
     parquet = evaluate(
         scene, station, tmp_path / "run", grasps_per_object=5, progress=False, table="parquet"
@@ -175,6 +183,51 @@ def test_given_grasps_are_judged_in_place_of_sampled_ones(
     np.testing.assert_array_equal(run.candidate(run.candidates.id[0]).X_OG, np.eye(4))
 
 
+def test_given_grasps_are_reproduced_from_the_run(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    poses = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]])
+    cubes = GraspSet.create(poses, object="cube")
+    given = {"right": cubes.select([1]), "left": cubes.select([0])}
+    run = evaluate(scene, station, tmp_path / "run", grasps=given, workers=1, progress=False)
+    back = read_grasps(scene, run.path / "grasps.npz")
+    again = evaluate(scene, station, tmp_path / "again", grasps=back, workers=1, progress=False)
+    assert same_results(run, again) and len(again.candidates) == 2
+    assert evaluate(scene, station, run.path, grasps=back, progress=False).complete  # the same run
+
+
+@pytest.mark.parametrize("name", ["scene.yaml", "station.yaml", "grasps.npz", "results.csv"])
+def test_own_files_are_not_overwritten(
+    name: str, scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / name).write_text("my work")
+    with pytest.raises(InvalidInputError) as error:
+        evaluate(scene, station, mine, grasps_per_object=2, progress=False)
+    assert str(error.value) == (
+        f"{mine} is not empty and holds no run ({name} is in it); choose another -o"
+    )
+    assert {path.name: path.read_text() for path in mine.iterdir()} == {name: "my work"}
+
+
+@pytest.mark.parametrize("write", ["save_run", "write_copies", "portable_station"])
+def test_a_run_that_is_killed_at_its_start_goes_on(
+    write: str, scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    def die(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    options = {"grasps_per_object": 2, "workers": 1, "progress": False}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(f"burg_drake.evaluation.run_store.{write}", die)
+        with pytest.raises(KeyboardInterrupt):
+            evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
+    run = evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
+    assert run.complete and run.scene().content == scene.content
+    assert run.station().content == station.content
+
+
 def test_no_grasps_are_a_complete_run(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
@@ -242,6 +295,7 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
         patch.setattr("burg_drake.station.check.require_sound_scene", refuse)
         with pytest.raises(InvalidInputError, match="overlap"):
             evaluate(scene, station, tmp_path / "run", progress=False)
+    assert not (tmp_path / "run").exists()
 
 
 def test_judges_are_pickled_with_all_they_need(scene: Scene, station: Station) -> None:

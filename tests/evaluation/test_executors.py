@@ -10,7 +10,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from known_judge import CrashingJudge, KnownJudge, Make, die, expected, refuse
+from known_judge import CrashingJudge, DieOnStart, KnownJudge, Make, die, expected, refuse
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
@@ -60,8 +60,52 @@ def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
 def test_deaths_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("burg_drake.evaluation.executors.HOPELESS", 5)
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
-    with pytest.raises(SimulationError, match=r"5 worker processes in a row died: .*SIGSEGV"):
-        list(judge_all(grasps(40), make, workers=2))
+    judged = []
+    with pytest.raises(SimulationError, match=r"^5 grasps in a row could not .*: .*SIGSEGV"):
+        for candidate, _ in judge_all(grasps(40), make, workers=2):
+            judged.append(candidate.id)
+    assert len(set(judged)) == len(judged) == 5  # none of them is lost
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_row_of_crashing_grasps_does_not_end_the_run(workers: int) -> None:
+    crashing = [c.id for c in grasps(20)[6:11]]
+    make = Make(CrashingJudge(how=tuple((id, "segfault") for id in crashing)))
+    judged = {c.id: v.outcome for c, v in judge_all(grasps(20), make, workers=workers)}
+    failed = dict.fromkeys(crashing, Outcome.SIMULATION_FAILED)
+    assert judged == {c.id: expected(c.id) for c in grasps(20)} | failed
+
+
+def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
+    judge = CrashingJudge(how=(("cube-0002", "segfault"),))
+    make = DieOnStart(judge, tmp_path / "twice", n=(2, 4))  # each time after a crash of the grasp
+    judged = {c.id: v.outcome for c, v in judge_all(grasps(10), make, workers=1)}
+    failed = {"cube-0002": Outcome.SIMULATION_FAILED}
+    assert judged == {c.id: expected(c.id) for c in grasps(10)} | failed
+    assert len((tmp_path / "twice").read_text().split()) == 5
+    make = DieOnStart(judge, tmp_path / "in a row", n=(2, 3))
+    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* ended by SIGSEGV"):
+        list(judge_all(grasps(10), make, workers=1))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_grasp_that_takes_too_long_is_settled(
+    workers: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.executors.GRASP_TIME_LIMIT", 0.5)
+    # 20 grasps of 50 ms each: a whole task is not a grasp
+    judge = CrashingJudge(pause=0.05, how=(("cube-0003", "hang"), ("cube-0012", "hang")))
+    start = time.monotonic()
+    judged = {c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=workers)}
+    assert time.monotonic() - start < 30.0
+    assert len(judged) == 20
+    for id, verdict in judged.items():
+        if id in ("cube-0003", "cube-0012"):
+            assert verdict.outcome is Outcome.SIMULATION_FAILED
+            assert verdict.stage is Stage.EXECUTED
+            assert verdict.reason == "took longer than 0.5 s"
+        else:
+            assert verdict.outcome is expected(id)
 
 
 def test_what_cannot_be_built_is_said_as_it_is() -> None:

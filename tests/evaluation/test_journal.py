@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 
 import pytest
 
@@ -44,6 +45,15 @@ def test_a_torn_line_is_cut_off_and_the_rest_is_kept(tmp_path) -> None:
         assert list(read_journal(path)) == ["a", "c"], cut
 
 
+def test_opening_a_whole_journal_leaves_its_date(tmp_path) -> None:
+    path = tmp_path / "journal.jsonl"
+    for content in (b"", encode("a", LIFTED)):
+        path.write_bytes(content)
+        os.utime(path, ns=(10**18, 10**18))
+        Journal(path).close()
+        assert path.stat().st_mtime_ns == 10**18
+
+
 def test_a_damaged_line_counts_as_not_judged(tmp_path) -> None:
     path = tmp_path / "journal.jsonl"
     path.write_bytes(encode("a", LIFTED) + b'{"id": "b"}\n\x00\xff\n[]\n' + encode("c", BLOCKED))
@@ -68,8 +78,6 @@ def test_a_full_disk_is_said_in_one_line() -> None:
     if not Path("/dev/full").exists():
         pytest.skip("needs /dev/full")
     journal = object.__new__(Journal)
-    import os
-
     journal._path, journal._file = Path("run/journal.jsonl"), os.open("/dev/full", os.O_WRONLY)
     with pytest.raises(InvalidInputError, match="No space left on device; what is in it is kept"):
         journal.append("a", LIFTED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 import shutil
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_document import RunDocument, portable_reference
+from burg_drake.evaluation.run_document import RunDocument, portable_reference, run_hash
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.table import read_table
 from burg_drake.scene.scene import Scene
@@ -110,7 +111,9 @@ def test_what_is_no_run_is_said(tmp_path: Path) -> None:
 
 def test_provenance_says_what_made_the_results(run: Run) -> None:
     document = run.document
-    assert document.versions["burg_drake"] and document.versions["drake"] != "unknown"
+    assert document.versions["burg_drake"]
+    for package in ("drake", "numpy", "scipy", "trimesh", "embreex"):
+        assert document.versions[package] == importlib.metadata.version(package)
     assert document.library.objects == {"cube": "build of cube", "bar": "build of bar"}
     assert document.grasps.objects == {"cube": 20, "bar": 10}
     assert document.grasps.content == run.candidates.content
@@ -119,6 +122,21 @@ def test_provenance_says_what_made_the_results(run: Run) -> None:
     assert document.station.path == "panda_tabletop"
     assert sum(s.judged or 0 for s in document.stretches) == 30
     assert RunDocument.__dataclass_fields__["version"].default == 1
+
+
+def test_a_results_file_on_its_own_leads_to_its_run(run: Run) -> None:
+    document = load_run(run.path).document
+    assert set(read_table(run.table_path)["run"].tolist()) == {document.hash}
+    assert len(document.hash) == 12 and document.hash in run.report_path.read_text()
+    assert run_hash(dataclasses.replace(document, stretches=(), command="")) == document.hash
+    others = [
+        dataclasses.replace(document, seed=1),
+        dataclasses.replace(document, versions={**document.versions, "drake": "0"}),
+        dataclasses.replace(document, grasps=dataclasses.replace(document.grasps, content="0")),
+        dataclasses.replace(document, scene=dataclasses.replace(document.scene, content="0")),
+        dataclasses.replace(document, trial={**document.trial, "lift_height": 0.1}),
+    ]
+    assert len({document.hash, *map(run_hash, others)}) == 6
 
 
 def test_references_of_copies_hold_everywhere(tmp_path: Path) -> None:

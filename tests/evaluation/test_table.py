@@ -50,7 +50,7 @@ def columns() -> Columns:
             cpu={Stage.CLEAR: 1e-4, Stage.EXECUTED: 0.2},
         ),
     }
-    return make_columns(candidates(), verdicts, joints=7, seed=2**40, engine="standard")
+    return make_columns(candidates(), verdicts, joints=7, seed=2**40, engine="standard", run="0a1b")
 
 
 def test_rows_are_the_judged_grasps_in_the_order_of_the_candidates() -> None:
@@ -89,6 +89,7 @@ def test_csv_is_plain(tmp_path: Path) -> None:
     assert first["reason"] == 'comma, "quote", Ä'
     assert first["tilt"] == second["slip"] == second["q_grasp_7"] == ""
     assert first["seed"] == "1099511627776"
+    assert first["run"] == second["run"] == "0a1b"
 
 
 def test_parquet_has_nulls_and_metadata(tmp_path: Path) -> None:
@@ -102,7 +103,7 @@ def test_parquet_has_nulls_and_metadata(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_no_rows_are_a_table_too(tmp_path: Path, suffix: str) -> None:
-    table = make_columns(candidates(), {}, joints=0, seed=0, engine="standard")
+    table = make_columns(candidates(), {}, joints=0, seed=0, engine="standard", run="")
     write_table(tmp_path / f"r.{suffix}", table)
     assert [len(v) for v in read_table(tmp_path / f"r.{suffix}").values()] == [0] * len(table)
 

@@ -329,5 +329,5 @@ def test_unknown_robot_and_incomplete_library(tmp_path: Path) -> None:
     next((library / "mug" / "pieces").iterdir()).unlink()
     document = replace(scene.document, library=str(library))
     save_scene(document, tmp_path / "scene.yaml")
-    with pytest.raises(InvalidInputError, match="mug.sdf cannot be loaded .* build the library"):
+    with pytest.raises(InvalidInputError, match=r"mug\.sdf cannot be loaded .* build the library"):
         build_station_diagram(load_scene(tmp_path / "scene.yaml"), station)

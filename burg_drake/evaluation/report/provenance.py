@@ -81,6 +81,7 @@ def _settings(document: RunDocument) -> list[tuple[str, str]]:
         ("trial", _listed(document.trial)),
         ("arm", _listed(document.arm) if document.reach else "not asked"),
         ("seed", str(document.seed)),
+        ("run", f"{document.hash} (all of the above; column run of the table)"),
         *document.versions.items(),
     ]
 
