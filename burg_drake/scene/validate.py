@@ -82,7 +82,7 @@ def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
     errors = [issue for issue in issues if issue.is_error]
     if errors:
         more = len(errors) - 1
-        rest = f" (and {more} more: burg-drake scene validate {scene.path})" if more else ""
+        rest = f" (and {more} more; burg-drake scene validate lists all)" if more else ""
         raise InvalidInputError(f"{scene.path}: {errors[0].message}{rest}")
 
 

@@ -107,7 +107,7 @@ def test_require_sound_gives_one_line(make_scene: MakeScene) -> None:
         require_sound(scene, validate_scene(scene))
     assert str(caught.value) == (
         f"{scene.path}: 'cube_0' is out of bounds: 30.0 mm over the left edge of the board"
-        f" (600 x 400 mm) (and 1 more: burg-drake scene validate {scene.path})"
+        f" (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"
     )
 
 
