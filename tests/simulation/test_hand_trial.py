@@ -43,7 +43,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     sphere.apply_translation((0.0, 0.0, 0.03))
     sources = [
         ObjectSource(name="box", mesh=box_mesh(BOX), mass=BOX_MASS),
-        ObjectSource(name="heavy", mesh=box_mesh(BOX), mass=60.0),
+        ObjectSource(name="heavy", mesh=box_mesh(BOX), mass=20.0),
         ObjectSource(name="block", mesh=box_mesh((0.05, 0.05, 0.05)), mass=0.1),
         ObjectSource(name="ball", mesh=sphere, mass=0.1),
     ]
@@ -172,11 +172,12 @@ def test_squeezed_out(make_scene) -> None:
 
 
 def test_one_finger_against_an_object_that_does_not_move(make_scene) -> None:
-    """60 kg on a table rub with more than both fingers' force: the first finger stops the hand."""
+    """20 kg with a coefficient of 1.5 on a table of 0.5 rub with 147 N, more than both fingers'
+    80 N: the first finger stops the hand."""
     trial = HandTrial(make_scene(("heavy", 0.3, 0.2, 0.0)), make_station())
-    result = trial.run("heavy", from_above(0.05, x=0.006))
+    result = trial.run("heavy", from_above(0.05, x=0.006), friction=1.5)
     assert result.outcome is Outcome.ONE_FINGER
-    assert result.margins.lift == pytest.approx(0.0, abs=1e-3)
+    assert result.margins.lift == pytest.approx(0.0, abs=4e-3)  # it sinks in a little
 
 
 def test_fingers_push_a_light_object_to_the_middle(box_trial: HandTrial) -> None:
