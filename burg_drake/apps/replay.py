@@ -42,7 +42,7 @@ def run_replay(arguments: argparse.Namespace) -> int:
     from burg_drake.visualization.replay import describe, record_trial
 
     run = load_run(arguments.run_folder)
-    id = arguments.grasp or _best(run)
+    id = _best(run) if arguments.best else arguments.grasp
     candidate = run.candidate(id)
     scene, station = run.scene(), run.station()
     meshcat = open_view(arguments)

@@ -254,3 +254,8 @@ def test_a_changed_library_is_noticed(run: Run, monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(Run, "scene", changed)
     assert main(["replay", str(run.path), "--best"]) == 2
+
+
+def test_replay_of_an_empty_id_is_not_the_best(run: Run, capsys: Capture) -> None:
+    assert main(["replay", str(run.path), "--grasp", ""]) == 2
+    assert "has no judged grasp ''" in capsys.readouterr().err
