@@ -21,7 +21,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.grasping.approach": ["ApproachCone"],
         "burg_drake.grasping.antipodal": ["sample_antipodal"],
         "burg_drake.motion.reach": ["ArmReach"],
-        "burg_drake.objects.build": ["build_library"],
+        "burg_drake.pipeline.build": ["build_library"],
         "burg_drake.objects.library": ["load_library"],
         "burg_drake.scene.scene": ["load_scene"],
         "burg_drake.scene.validate": ["validate_scene"],

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.objects.build import build_library
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
 
 with tempfile.TemporaryDirectory() as folder:
     # A mesh as it comes from CAD: a tube, in millimetres, as .stl.

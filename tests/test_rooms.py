@@ -13,12 +13,14 @@ PACKAGE = Path(burg_drake.__file__).parent
 # A room may import itself and the rooms before it.
 ROOMS = [
     "core",
+    "formats",
     "objects",
     "scene",
     "station",
     "grasping",
     "motion",
     "simulation",
+    "pipeline",
     "visualization",
     "evaluation",
     "apps",

@@ -22,9 +22,9 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 if TYPE_CHECKING:
     import yaml
 
-    from burg_drake.objects.build import BuildReport
+    from burg_drake.pipeline.build import BuildReport
     from burg_drake.objects.library import ObjectLibrary
-    from burg_drake.objects.source import ObjectSource
+    from burg_drake.pipeline.source import ObjectSource
 
 
 MASSES_FORMAT = """\
@@ -103,7 +103,7 @@ def run_build(arguments: argparse.Namespace) -> int:
     """Builds a library; 1 if some objects could not be built, an error if none could."""
     from burg_drake.apps.progress import object_progress
     from burg_drake.evaluation.executors import default_workers
-    from burg_drake.objects.build import build_library
+    from burg_drake.pipeline.build import build_library
 
     sources = _sources(arguments)
     with object_progress(len(sources)) as progress:
@@ -178,7 +178,7 @@ def _print_report(report: BuildReport) -> None:
 
 
 def _sources(arguments: argparse.Namespace) -> list[ObjectSource]:
-    from burg_drake.objects.source import ObjectSource, object_name
+    from burg_drake.pipeline.source import ObjectSource, object_name
 
     meshes = _mesh_files(arguments.meshes)
     names = {object_name(mesh.stem) for mesh in meshes}
@@ -217,7 +217,7 @@ def _mesh_files(arguments: Iterable[str]) -> list[Path]:
 
 def _by_name(pairs: Iterable[tuple[str, float]], names: set[str], what: str) -> dict[str, float]:
     """Values by object name; the name of the mesh file's stem is as good."""
-    from burg_drake.objects.source import object_name
+    from burg_drake.pipeline.source import object_name
 
     values: dict[str, float] = {}
     for given, value in pairs:
@@ -232,7 +232,7 @@ def _read_masses(path: Path, names: set[str]) -> dict[str, float]:
     """Masses [kg] by object name, of a YAML file with a line `NAME: KG` for each object."""
     import yaml
 
-    from burg_drake.objects.source import object_name
+    from burg_drake.pipeline.source import object_name
 
     try:
         node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)

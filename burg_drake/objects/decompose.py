@@ -18,6 +18,7 @@ from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import Array
 from burg_drake.objects.coacd_process import DecompositionFailed, run_coacd
 from burg_drake.objects.hulls import convex_hull, reduced_hull, thickness
+from burg_drake.objects.library import Decomposition
 
 CONVEX_RATIO = 1.02
 """A mesh whose hull has at most this times its volume counts as convex."""
@@ -32,30 +33,6 @@ fails on as it is."""
 
 NEIGHBOURS = 1e-3
 """Pieces whose bounding boxes are farther apart are never joined [m]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Decomposition:
-    """Parameters of the decomposition.
-
-    Attributes:
-        threshold: CoACD's concavity at which cutting stops, relative to a unit-sized object.
-        join: volume that joining pieces may add, as a share of the pieces' volume.
-        max_vertices: most vertices of a piece.
-        tolerance: pieces stay within this distance of the full hull where `max_vertices`
-            allows [m].
-        min_thickness: thinner pieces are dropped [m].
-        timeout: wall time allowed for CoACD [s].
-        seed: of CoACD's search.
-    """
-
-    threshold: float = 0.05
-    join: float = 0.01
-    max_vertices: int = 64
-    tolerance: float = 2e-4
-    min_thickness: float = 2e-4
-    timeout: float = 300.0
-    seed: int = 0
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
 from burg_drake.grasping.clearance import HandClearance
-from burg_drake.objects.build import build_library
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.hand import load_hand

@@ -14,8 +14,8 @@ from burg_drake.core.frames import swap_fingers
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
-from burg_drake.objects.build import build_library
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.hand_trial import HandTrial, TrialSettings

@@ -9,8 +9,8 @@ import trimesh
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.schema import Pose
-from burg_drake.objects.build import build_library
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.scene.validate import SceneIssue
 from burg_drake.station.check import check_scene, require_sound_scene

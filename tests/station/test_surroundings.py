@@ -11,8 +11,8 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
 
 from burg_drake.core.schema import Pose
-from burg_drake.objects.build import build_library
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.engine import ENGINES

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from burg_drake.objects.build import build_library
+from burg_drake.pipeline.build import build_library
 from burg_drake.objects.obj_file import face_palette
-from burg_drake.objects.source import ObjectSource
+from burg_drake.pipeline.source import ObjectSource
 
 from . import household_shapes
 from .shape import Shape

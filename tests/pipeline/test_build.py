@@ -12,11 +12,11 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects import stages
-from burg_drake.objects.build import build_library
+from burg_drake.pipeline import stages
+from burg_drake.pipeline.build import build_library
 from burg_drake.objects.library import load_library
-from burg_drake.objects.source import ObjectSource
-from burg_drake.objects.target import SCRATCH
+from burg_drake.pipeline.source import ObjectSource
+from burg_drake.pipeline.target import SCRATCH
 
 
 def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimesh:

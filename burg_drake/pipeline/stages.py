@@ -35,7 +35,7 @@ from burg_drake.objects.mass import (
 from burg_drake.objects.meshes import SurfaceMesh, load_mesh, mesh_hash, texture_image
 from burg_drake.objects.obj_file import write_piece, write_visual
 from burg_drake.objects.sdf import DEFAULT_CONTACT, model_sdf
-from burg_drake.objects.source import ObjectSource, check_source
+from burg_drake.pipeline.source import ObjectSource, check_source
 from burg_drake.objects.stable_poses import stable_poses
 
 VERSION = 1

@@ -2,7 +2,7 @@
 
 Each object is built in a hidden folder and moved into place when it is whole; `library.yaml` is
 written after each object, so that a killed build keeps what it finished. What has not changed is
-not built again: see `burg_drake.objects.stages`.
+not built again: see `burg_drake.pipeline.stages`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from burg_drake.objects.library import (
     ObjectLibrary,
     load_library,
 )
-from burg_drake.objects.source import ObjectSource, object_name
-from burg_drake.objects.stages import Built, StageKeys, build_object, is_current, stage_keys
-from burg_drake.objects.target import check_targets, opened_for_build, scratch_folder
+from burg_drake.pipeline.source import ObjectSource, object_name
+from burg_drake.pipeline.stages import Built, StageKeys, build_object, is_current, stage_keys
+from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_folder
 
 Progress = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of

@@ -9,8 +9,7 @@ from pathlib import Path
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.decompose import Decomposition
-from burg_drake.objects.library import DEFAULT_FRICTION
+from burg_drake.objects.library import DEFAULT_FRICTION, Decomposition
 from burg_drake.objects.obj_file import Rgba
 
 NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")

@@ -11,10 +11,10 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.build import build_library
+from burg_drake.pipeline.build import build_library
 from burg_drake.objects.library import load_library
-from burg_drake.objects.source import ObjectSource
-from burg_drake.objects.target import LOCK_FILE, opened_for_build
+from burg_drake.pipeline.source import ObjectSource
+from burg_drake.pipeline.target import LOCK_FILE, opened_for_build
 
 
 def _contents(root: Path) -> dict[str, bytes | None]:
@@ -124,7 +124,7 @@ def test_one_build_at_a_time(tmp_path: Path) -> None:
 
 def test_the_lock_of_a_killed_build_is_free(tmp_path: Path) -> None:
     script = (
-        "import os, sys; from burg_drake.objects.target import opened_for_build\n"
+        "import os, sys; from burg_drake.pipeline.target import opened_for_build\n"
         "with opened_for_build(sys.argv[1]): os._exit(9)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}

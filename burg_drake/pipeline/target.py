@@ -19,8 +19,8 @@ import trimesh
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.objects.library import LIBRARY_FILE
-from burg_drake.objects.source import NAME_PATTERN, ObjectSource
-from burg_drake.objects.stages import read_record
+from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource
+from burg_drake.pipeline.stages import read_record
 
 LOCK_FILE = ".library.lock"
 """Exists while a build runs, and is empty; a lock on it ends with the process, however it ends."""

@@ -1,0 +1,1 @@
+"""Documents of other projects, read into plain data; needs nothing but `core`."""

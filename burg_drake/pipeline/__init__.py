@@ -1,0 +1,1 @@
+"""Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked."""
