@@ -22,8 +22,8 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 if TYPE_CHECKING:
     import yaml
 
-    from burg_drake.pipeline.build import BuildReport
     from burg_drake.objects.library import ObjectLibrary
+    from burg_drake.pipeline.build import BuildReport
     from burg_drake.pipeline.source import ObjectSource
 
 

@@ -35,8 +35,8 @@ from burg_drake.objects.mass import (
 from burg_drake.objects.meshes import SurfaceMesh, load_mesh, mesh_hash, texture_image
 from burg_drake.objects.obj_file import write_piece, write_visual
 from burg_drake.objects.sdf import DEFAULT_CONTACT, model_sdf
-from burg_drake.pipeline.source import ObjectSource, check_source
 from burg_drake.objects.stable_poses import stable_poses
+from burg_drake.pipeline.source import ObjectSource, check_source
 
 VERSION = 1
 """Raise it when a stage gives other results for the same input; everything is then built anew."""
