@@ -17,7 +17,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.approach import ApproachCone
-from burg_drake.objects.library import ObjectEntry
+from burg_drake.objects.entry import ObjectEntry
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 

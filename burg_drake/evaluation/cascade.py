@@ -19,6 +19,7 @@ from pathlib import Path
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.processes import default_workers
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidates import (
     DEFAULT_APPROACH_ANGLE_DEG,
@@ -26,7 +27,7 @@ from burg_drake.evaluation.candidates import (
     given_candidates,
     sample_candidates,
 )
-from burg_drake.evaluation.executors import default_workers, judge_all
+from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.judge import StationJudgeFactory
 from burg_drake.evaluation.progress import Listener, Progress, Reporter

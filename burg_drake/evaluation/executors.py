@@ -8,18 +8,16 @@ a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended.
 from __future__ import annotations
 
 import contextlib
-import os
-import signal
 import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, Pipe, wait
+from multiprocessing.connection import Connection, wait
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.processes import cause_of_death, default_workers, start_worker
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import Judge, Verdict
 from burg_drake.evaluation.worker import Begins, Dying, Judged, Message, Ready, Task, Unable
@@ -34,17 +32,6 @@ FALSE_STARTS = 2
 """So many workers in a row that die before their judge is built end the run."""
 FAREWELL = 5.0
 """Time that an idle worker is given to end by itself [s]."""
-ONE_THREAD = {
-    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
-}
-"""Environment of a worker: parallelism is in the processes, and sums keep their order."""
-
-
-def default_workers() -> int:
-    """Number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def judge_all(
@@ -131,12 +118,8 @@ class _Worker:
             self.connection.send(message)
 
     def cause_of_death(self) -> str:
-        code = self.process.wait()
-        if self.overdue:
-            return f"took longer than {GRASP_TIME_LIMIT:g} s"
-        if code < 0:
-            return f"the worker process was ended by {signal.Signals(-code).name}"
-        return f"the worker process ended: {self.last_words or f'exit code {code}'}"
+        cause = cause_of_death(self.process, self.last_words)
+        return f"took longer than {GRASP_TIME_LIMIT:g} s" if self.overdue else cause
 
 
 class _Pool:
@@ -253,28 +236,7 @@ class _Pool:
 
 
 def _start(make_judge: Callable[[], Judge], first: Task | None) -> _Worker:
-    """Starts a worker: a fresh interpreter (Drake does not survive a fork) with our import path.
-
-    An interrupt from the keyboard reaches the whole group of processes. Workers start with it
-    blocked: the parent alone decides what it means.
-    """
-    ours, theirs = Pipe()
-    program = (
-        f"import sys; sys.path[:] = {sys.path!r};"
-        f" from burg_drake.evaluation.worker import main; main({theirs.fileno()})"
-    )
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        process = subprocess.Popen(
-            [sys.executable, "-c", program],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            pass_fds=[theirs.fileno()],
-            env={**os.environ, **ONE_THREAD},
-        )
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    theirs.close()
-    worker = _Worker(process, ours, first)
+    process, connection = start_worker("burg_drake.evaluation.worker")
+    worker = _Worker(process, connection, first)
     worker.send(make_judge)
     return worker

@@ -1,8 +1,4 @@
-"""The main loop of a worker process: build a judge once, then judge what comes.
-
-Workers are plain interpreters that talk over a pipe (see `executors`): unlike multiprocessing's
-they never import the user's main module, so that scripts and notebooks need no special guard.
-"""
+"""The main loop of a worker process: build a judge once, then judge what comes."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from burg_drake.core.frames import Array, grasp_from_axes
 from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.approach import ApproachCone
 from burg_drake.grasping.rays import Indices, RayCaster
-from burg_drake.objects.library import DEFAULT_FRICTION
+from burg_drake.objects.entry import DEFAULT_FRICTION
 
 if TYPE_CHECKING:
     import trimesh

@@ -1,4 +1,8 @@
-"""The screen of the open hand against the scene, with the hand's real collision geometry."""
+"""The screen of the open hand against the scene, with the hand's real collision geometry.
+
+Objects are what they are in simulation, with one exception: where that is a rigid mesh, of which
+Drake would see the convex hull here, the object's convex pieces take its place.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +12,13 @@ from pydrake.geometry import (
     Box,
     CollisionFilterDeclaration,
     Convex,
+    Cylinder,
     GeometryId,
     GeometrySet,
     Mesh,
     PenetrationAsPointPair,
     QueryObject,
+    Sphere,
 )
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
@@ -22,6 +28,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.grasping.penetration import Polytope, penetration_depth
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
+from burg_drake.station.hollow import mesh_by_pieces
 
 TRAVEL_STEPS = (0.125, 0.025)
 """Steps of `free_travel`: 5 and 1 mm a finger of the Panda hand, both a fraction of a pad."""
@@ -124,12 +131,12 @@ class HandClearance:
         return penetration_depth(shapes[0], shapes[1], X_WA.InvertAndCompose(X_WB).GetAsMatrix4())
 
     def _polytope(self, query: QueryObject, geometry: GeometryId) -> Polytope | None:
-        """The polytope of a geometry; None if it is round."""
+        """The polytope or ball of a geometry; None if it is of another shape."""
         if geometry not in self._polytopes:
             inspector = query.inspector()
-            flat = isinstance(inspector.GetShape(geometry), (Box, Convex, Mesh))
+            known = isinstance(inspector.GetShape(geometry), (Box, Convex, Cylinder, Mesh, Sphere))
             self._polytopes[geometry] = (
-                Polytope.from_geometry(inspector, geometry) if flat else None
+                Polytope.from_geometry(inspector, geometry) if known else None
             )
         return self._polytopes[geometry]
 
@@ -152,7 +159,9 @@ def _names(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
 def _filter_scene(station_diagram: StationDiagram, context: Context) -> dict[GeometryId, BodyIndex]:
     """Leaves only the pairs hand against scene in the context; returns geometry -> body."""
     plant, scene_graph = station_diagram.plant, station_diagram.scene_graph
-    inspector = scene_graph.model_inspector()
+    mesh_by_pieces(station_diagram, context)
+    graph_context = scene_graph.GetMyMutableContextFromRoot(context)
+    inspector = scene_graph.get_query_output_port().Eval(graph_context).inspector()
     bodies = {
         geometry: plant.GetBodyFromFrameId(inspector.GetFrameId(geometry)).index()
         for geometry in inspector.GetAllGeometryIds()
@@ -166,6 +175,5 @@ def _filter_scene(station_diagram: StationDiagram, context: Context) -> dict[Geo
     declaration = CollisionFilterDeclaration()
     for side in sides:
         declaration.ExcludeWithin(side)
-    graph_context = scene_graph.GetMyMutableContextFromRoot(context)
     scene_graph.collision_filter_manager(graph_context).Apply(declaration)
     return bodies

@@ -17,8 +17,8 @@ import trimesh
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import Array
 from burg_drake.objects.coacd_process import DecompositionFailed, run_coacd
+from burg_drake.objects.entry import Decomposition
 from burg_drake.objects.hulls import convex_hull, reduced_hull, thickness
-from burg_drake.objects.library import Decomposition
 
 CONVEX_RATIO = 1.02
 """A mesh whose hull has at most this times its volume counts as convex."""

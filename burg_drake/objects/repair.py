@@ -15,6 +15,10 @@ HOLE = 0.15
 """A hole is small, and closed, when it is no wider than this share of the mesh's diagonal."""
 
 
+NO_VOLUME = 1e-9
+"""Share of its bounding box below which what a surface encloses is rounding error."""
+
+
 @dataclass
 class Repaired:
     """A repaired mesh.
@@ -41,8 +45,9 @@ def repair(raw: trimesh.Trimesh) -> Repaired:
     _merge(result)
     _drop_degenerate(result)
     _drop_specks(result)
+    _make_consistent(result)
     _fill_holes(result)
-    _fix_winding(result)
+    _turn_outward(result)
     result.mesh.remove_unreferenced_vertices()
     return result
 
@@ -62,8 +67,12 @@ def bodies(mesh: trimesh.Trimesh) -> list[NDArray[np.int64]]:
 
 def _merge(result: Repaired) -> None:
     mesh = result.mesh
+    given = mesh.copy()
     mesh.remove_unreferenced_vertices()
     before = len(mesh.vertices)
+    if before < len(given.vertices):
+        unused = len(given.vertices) - before
+        result.sentences.append(f"dropped {unused} vertices that no face uses")
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     merged = before - len(mesh.vertices)
     if merged:
@@ -77,6 +86,26 @@ def _merge(result: Repaired) -> None:
                 f"sewed {len(mesh.vertices) - len(sewn.vertices)} nearly coincident vertices"
             )
             result.mesh = sewn
+        else:
+            _keep_bodies_apart(result, given)
+
+
+def _keep_bodies_apart(result: Repaired, given: trimesh.Trimesh) -> None:
+    """Where bodies that the file keeps apart have corners in common, merging glues them together;
+    if each is closed by itself, its corners are merged with one another only."""
+    labels = trimesh.graph.connected_component_labels(given.edges, len(given.vertices))
+    if labels.max() < 1:
+        return
+    rows = np.column_stack([given.vertices, labels])
+    _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    faces = place.reshape(-1)[given.faces]
+    apart = trimesh.Trimesh(given.vertices[first], faces, process=False)
+    apart.remove_unreferenced_vertices()
+    if apart.is_watertight:
+        merged = len(np.unique(given.faces)) - len(apart.vertices)
+        result.sentences = [s for s in result.sentences if not s.startswith("merged")]
+        result.sentences += [f"merged {merged} duplicate vertices"] if merged else []
+        result.mesh = apart
 
 
 def _drop_degenerate(result: Repaired) -> None:
@@ -176,14 +205,19 @@ def boundary_loops(mesh: trimesh.Trimesh) -> list[list[int]]:
     return loops
 
 
-def _fix_winding(result: Repaired) -> None:
+def _make_consistent(result: Repaired) -> None:
     mesh = result.mesh
-    if not mesh.is_winding_consistent:
-        before = mesh.faces.copy()
-        trimesh.repair.fix_winding(mesh)
-        turned = int((mesh.faces != before).any(axis=1).sum())
-        if turned:
-            result.sentences.append(f"turned {turned} faces to a consistent winding")
+    if mesh.is_winding_consistent:
+        return
+    before = mesh.faces.copy()
+    trimesh.repair.fix_winding(mesh)
+    turned = int((mesh.faces != before).any(axis=1).sum())
+    if turned:
+        result.sentences.append(f"turned {turned} faces to a consistent winding")
+
+
+def _turn_outward(result: Repaired) -> None:
+    mesh = result.mesh
     groups = bodies(mesh) if len(mesh.faces) else []
     flips = _inside_out(mesh, groups)
     if not any(flips):
@@ -209,9 +243,11 @@ def _inside_out(mesh: trimesh.Trimesh, groups: list[NDArray[np.int64]]) -> list[
         hosts = [
             k
             for k in range(len(parts))
-            if size[k] > size[i] and len(parts) <= 64 and _encloses(parts[k], parts[i])
+            if size[k] > size[i] and len(parts) <= 64 and encloses(parts[k], parts[i])
         ]
-        flips[i] = flips[min(hosts, key=lambda k: size[k])] if hosts else volumes[i] < 0.0
+        flips[i] = (
+            flips[min(hosts, key=lambda k: size[k])] if hosts else volumes[i] < -NO_VOLUME * size[i]
+        )
     return flips
 
 
@@ -221,7 +257,8 @@ def signed_volume(mesh: trimesh.Trimesh) -> float:
     return float(np.einsum("ij,ij->", t[:, 0], np.cross(t[:, 1], t[:, 2])) / 6.0)
 
 
-def _encloses(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> bool:
+def encloses(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> bool:
+    """Whether a body lies inside another one, judged by its bounding box and one of its points."""
     low, high = outer.bounds
     if not outer.is_watertight or (inner.bounds[0] < low).any() or (inner.bounds[1] > high).any():
         return False

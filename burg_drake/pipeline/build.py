@@ -7,29 +7,29 @@ not built again: see `burg_drake.pipeline.stages`.
 
 from __future__ import annotations
 
+import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import trimesh
+
 from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.objects.library import (
-    LIBRARY_FILE,
-    LibraryDocument,
-    ObjectEntry,
-    ObjectLibrary,
-    load_library,
-)
+from burg_drake.objects.entry import ObjectEntry
+from burg_drake.objects.library import LIBRARY_FILE, LibraryDocument, ObjectLibrary, load_library
+from burg_drake.pipeline.keys import StageKeys, stage_keys
+from burg_drake.pipeline.pool import Work, build_all
 from burg_drake.pipeline.source import ObjectSource, object_name
-from burg_drake.pipeline.stages import Built, StageKeys, build_object, is_current, stage_keys
+from burg_drake.pipeline.stages import Built, is_current
 from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_folder
 
 Progress = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
 objects done and the number of all."""
 
-Work = tuple[ObjectSource, StageKeys]
+SAVING_INTERVAL = 1.0
+"""Least time between two writings of `library.yaml` during a build [s]."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ def build_library(
     out: str | Path,
     *,
     name: str | None = None,
+    confirm: bool = True,
     workers: int = 1,
     progress: Progress | None = None,
 ) -> BuildReport:
@@ -67,8 +68,9 @@ def build_library(
         sources: objects; a path stands for `ObjectSource.from_file(path)`.
         out: the library's folder; objects in it that are not among the sources stay.
         name: the library's name; by default what it has, or else the folder's name.
-        workers: number of objects to work on at a time; threads, as the long part of the work, the
-            convex decomposition, is done in processes of its own.
+        confirm: simulate the stable poses, and keep those that stand the test; otherwise the
+            quasi-static ones are taken as they are.
+        workers: number of objects to work on at a time, each in a process of its own.
         progress: called after each object.
 
     Returns:
@@ -87,16 +89,16 @@ def build_library(
         library = _open(root, name)
         check_targets(named, root, library.objects)
         tally = _Tally(_renamed(library, name), len(named), progress)
-        _build(named, tally, workers)
+        _build(named, tally, confirm, workers)
         return tally.report(named)
 
 
-def _build(named: Sequence[ObjectSource], tally: _Tally, workers: int) -> None:
+def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers: int) -> None:
     root = tally.library.root
-    work: list[Work] = []
+    todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
         try:
-            keys = stage_keys(source)
+            keys = stage_keys(source, confirm)
         except BurgError as error:
             tally.fail(source.name, error)
             continue
@@ -104,13 +106,31 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, workers: int) -> None:
         if entry is not None and is_current(entry, keys, source, root):
             tally.count(source.name, "cached")
         else:
-            work.append((source, keys))
+            todo.append((source, keys))
     with scratch_folder(root) as scratch:
-        for source, outcome in _outcomes(work, root, scratch, workers):
-            if isinstance(outcome, Built):
-                tally.publish(source, outcome, scratch)
-            else:
-                tally.fail(source.name, outcome)
+        work = [Work(s, keys, root, scratch / s.name, confirm) for s, keys in _longest_first(todo)]
+        try:
+            for item, outcome in build_all(work, workers):
+                if isinstance(outcome, Built):
+                    tally.publish(item.source, outcome, scratch)
+                else:
+                    tally.fail(item.source.name, outcome)
+        finally:
+            tally.save()
+
+
+def _longest_first(
+    todo: list[tuple[ObjectSource, StageKeys]],
+) -> list[tuple[ObjectSource, StageKeys]]:
+    """Objects whose pieces are not given first, larger files before smaller ones, so that workers
+    finish together."""
+
+    def cost(item: tuple[ObjectSource, StageKeys]) -> tuple[bool, int]:
+        mesh = item[0].mesh
+        size = len(mesh.faces) if isinstance(mesh, trimesh.Trimesh) else Path(mesh).stat().st_size
+        return item[0].pieces is None, size
+
+    return sorted(todo, key=cost, reverse=True)
 
 
 class _Tally:
@@ -121,6 +141,7 @@ class _Tally:
         self.entries: dict[str, ObjectEntry] = dict(library.objects)
         self.total = total
         self.progress = progress
+        self.saved = time.monotonic()
         self.state: dict[str, str] = {}
         self.failed: dict[str, str] = {}
         self.notes: dict[str, tuple[str, ...]] = {}
@@ -145,11 +166,18 @@ class _Tally:
                 home.rename(scratch / f"{source.name}.before")
             built.folder.rename(home)
         self.entries[source.name] = built.entry
-        self.library = _with_entries(self.library, self.entries)
-        self.library.save()
+        if time.monotonic() > self.saved + SAVING_INTERVAL:
+            self.save()
         self.notes[source.name] = built.notes
         self.seconds[source.name] = built.seconds
         self.count(source.name, "built")
+
+    def save(self) -> None:
+        """Writes the library if it has new objects."""
+        if self.entries != self.library.objects:
+            self.library = _with_entries(self.library, self.entries)
+            self.library.save()
+        self.saved = time.monotonic()
 
     def report(self, sources: Sequence[ObjectSource]) -> BuildReport:
         names = [s.name for s in sources]
@@ -189,27 +217,3 @@ def _renamed(library: ObjectLibrary, name: str | None) -> ObjectLibrary:
 def _with_entries(library: ObjectLibrary, entries: dict[str, ObjectEntry]) -> ObjectLibrary:
     ordered = {name: entries[name] for name in sorted(entries)}
     return ObjectLibrary(replace(library.document, objects=ordered), library.root)
-
-
-def _outcomes(
-    work: Sequence[Work], root: Path, scratch: Path, workers: int
-) -> Iterator[tuple[ObjectSource, Built | BaseException]]:
-    """Built objects or the reason why not, in the order in which they finish."""
-    with ThreadPoolExecutor(max(1, workers)) as pool:
-        futures = {pool.submit(_attempt, s, k, root, scratch): s for s, k in work}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _attempt(
-    source: ObjectSource, keys: StageKeys, root: Path, scratch: Path
-) -> Built | BaseException:
-    folder = scratch / source.name
-    folder.mkdir()
-    try:
-        return build_object(source, keys, root, folder)
-    except Exception as error:  # one broken mesh is one failure, whatever it broke
-        return error

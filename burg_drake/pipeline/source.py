@@ -5,12 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library import DEFAULT_FRICTION, Decomposition
+from burg_drake.core.schema import Vector3
+from burg_drake.objects.entry import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
 from burg_drake.objects.obj_file import Rgba
+
+Openings = Literal["wall", "close"]
 
 NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")
 
@@ -23,10 +27,17 @@ class ObjectSource:
         name: of the library entry: lower-case letters, digits and underscores.
         mesh: mesh file, or a mesh in memory.
         mass: [kg]; computed from the density if None.
-        density: [kg/m^3]; `mass.DEFAULT_DENSITY` if None.
-        friction: coefficient; `library.DEFAULT_FRICTION` if None.
+        density: of the material [kg/m^3]; `mass.DEFAULT_DENSITY` if None.
+        center_of_mass: `p_OOcm` [m], in place of the centroid.
+        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
+            place of that of uniform density.
+        wall_thickness: [m]. A closed surface becomes a hollow body whose mass is in its wall; an
+            open surface becomes a wall of this thickness (`meshes.Preparation` has the default).
+        openings: what becomes of an open surface: a `wall`, or a solid with flat caps (`close`).
+        friction: coefficient; `entry.DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
         pieces: convex pieces in O [m]; made by `decompose` if None.
+        contact: what touches others in simulation; chosen by the object's shape if None.
         rgba: colour, 0 to 1 each; by default what the mesh file says.
         description: for people.
         decomposition: parameters of the convex decomposition.
@@ -36,34 +47,27 @@ class ObjectSource:
     mesh: str | Path | trimesh.Trimesh
     mass: float | None = None
     density: float | None = None
+    center_of_mass: Vector3 | None = None
+    inertia: Inertia | None = None
+    wall_thickness: float | None = None
+    openings: Openings = "wall"
     friction: float | None = None
     scale: float = 1.0
     pieces: tuple[trimesh.Trimesh, ...] | None = None
+    contact: ContactKind | None = None
     rgba: Rgba | None = None
     description: str = ""
     decomposition: Decomposition = Decomposition()
 
     @classmethod
-    def from_file(
-        cls,
-        mesh: str | Path,
-        *,
-        mass: float | None = None,
-        density: float | None = None,
-        friction: float | None = None,
-        scale: float = 1.0,
-        description: str = "",
-    ) -> ObjectSource:
-        """A mesh file under the name of its stem, such as `003_cracker_box.obj`."""
-        return cls(
-            name=object_name(Path(mesh).stem),
-            mesh=Path(mesh),
-            mass=mass,
-            density=density,
-            friction=friction,
-            scale=scale,
-            description=description,
-        )
+    def from_file(cls, mesh: str | Path, **fields: Any) -> ObjectSource:
+        """A mesh file under the name of its stem, such as `003_cracker_box.obj`.
+
+        Args:
+            mesh: the file.
+            fields: any other attribute.
+        """
+        return cls(name=object_name(Path(mesh).stem), mesh=Path(mesh), **fields)
 
     @property
     def coefficient(self) -> float:
@@ -97,6 +101,7 @@ def check_source(source: ObjectSource) -> None:
     for label, value, unit in (
         ("mass", source.mass, " kg"),
         ("density", source.density, " kg/m^3"),
+        ("wall_thickness", source.wall_thickness, " m"),
         ("scale", source.scale, ""),
     ):
         if value is not None and not 0.0 < value < float("inf"):

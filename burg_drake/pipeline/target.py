@@ -19,8 +19,8 @@ import trimesh
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.objects.library import LIBRARY_FILE
+from burg_drake.pipeline.record import is_object_folder
 from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource
-from burg_drake.pipeline.stages import read_record
 
 LOCK_FILE = ".library.lock"
 """Exists while a build runs, and is empty; a lock on it ends with the process, however it ends."""
@@ -75,7 +75,7 @@ def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection
     """
     homes = [root / s.name for s in sources if NAME_PATTERN.fullmatch(s.name)]
     for home in homes:
-        if os.path.lexists(home) and home.name not in known and read_record(home) is None:
+        if os.path.lexists(home) and home.name not in known and not is_object_folder(home):
             raise InvalidInputError(
                 f"{home} exists and is no object of this library; move it away, rename the mesh,"
                 " or choose another output folder"

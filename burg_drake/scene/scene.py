@@ -12,7 +12,8 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 from burg_drake.core.frames import Array
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, dump_document, load_document, save_document
-from burg_drake.objects.library import ObjectEntry, ObjectLibrary, load_library
+from burg_drake.objects.entry import ObjectEntry
+from burg_drake.objects.library import ObjectLibrary, load_library
 
 NAME_PATTERN = re.compile(r"[\w.-]+")
 """Names of instances are parts of grasp ids, of file names and of paths in Meshcat."""

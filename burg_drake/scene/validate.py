@@ -88,7 +88,8 @@ def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
 
 def placed_vertices(scene: Scene, instance: str) -> Array:
     """(N, 3) vertices of an instance's surface in the scene frame [m]."""
-    mesh = scene.library.path(scene.entry(instance).mesh)
+    entry = scene.entry(instance)
+    mesh = scene.library.path(entry.surface or entry.mesh)
     return transform_points(scene.X_SO(instance), read_vertices(mesh))
 
 

@@ -8,6 +8,7 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE, SceneIssue, require_sound, validate_scene
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram, instance_pose
+from burg_drake.station.hollow import mesh_by_pieces
 from burg_drake.station.station import Station
 
 
@@ -63,6 +64,7 @@ def overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:
     names = _names(station_diagram)
     order = {name: i for i, name in enumerate(station_diagram.scene.instances)}
     context = station_diagram.diagram.CreateDefaultContext()
+    mesh_by_pieces(station_diagram, context)
     query = station_diagram.diagram.GetOutputPort("geometry_query").Eval(context)
     inspector = query.inspector()
     found: dict[tuple[str, str], float] = {}

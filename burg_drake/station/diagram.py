@@ -27,6 +27,7 @@ from burg_drake.core.resources import data_root
 from burg_drake.scene.scene import Scene
 from burg_drake.station.cameras import add_cameras
 from burg_drake.station.engine import ENGINES, Engine
+from burg_drake.station.hollow import is_mesh, sdf_by_pieces
 from burg_drake.station.robot import (
     ROBOT_MODELS,
     Robot,
@@ -121,7 +122,8 @@ def build_station_diagram(
         engine: time step and contact settings.
         meshcat: where to show the diagram live, if anywhere.
         cameras: add the station's cameras; needs the renderer's system libraries.
-        weld_objects: fix the free objects where they stand, for a plant of the robot alone.
+        weld_objects: fix the free objects where they stand, for a plant of the robot alone that is
+            not simulated; in it rigid meshes are replaced by pieces (see `station.hollow`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -146,8 +148,8 @@ def build_station_diagram(
 
     table = add_table(plant, station)
     add_board(plant, scene.board, station)
-    free = {name: _add_instance(builder, scene, name) for name in scene.instances}
-    fixed = {name: _add_instance(builder, scene, name) for name in scene.background}
+    free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
+    fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
     for name, body in {**fixed, **(free if weld_objects else {})}.items():
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
@@ -200,7 +202,9 @@ def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
     )
 
 
-def _add_instance(builder: RobotDiagramBuilder, scene: Scene, name: str) -> RigidBody:
+def _add_instance(
+    builder: RobotDiagramBuilder, scene: Scene, name: str, by_pieces: bool
+) -> RigidBody:
     """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
@@ -209,7 +213,10 @@ def _add_instance(builder: RobotDiagramBuilder, scene: Scene, name: str) -> Rigi
         )
     path = scene.library.path(scene.entry(name).sdf)
     try:
-        (model,) = parser.AddModels(str(path))
+        if by_pieces and is_mesh(scene, name):
+            (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
+        else:
+            (model,) = parser.AddModels(str(path))
     except RuntimeError as error:
         raise InvalidInputError(
             f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"

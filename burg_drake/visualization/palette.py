@@ -5,6 +5,7 @@ The hues are those of Okabe and Ito, "Color Universal Design" (2008).
 
 from __future__ import annotations
 
+import colorsys
 from dataclasses import dataclass
 
 from burg_drake.core.outcome import Outcome
@@ -63,3 +64,18 @@ def group_of(outcome: Outcome | None) -> Group:
     if outcome is None:
         return UNJUDGED
     return next((g for g in GROUPS if outcome in g.outcomes), UNJUDGED)
+
+
+GOLDEN_TURN = 0.381966
+"""Golden angle as a share of a turn: further hues fall into the largest gaps between the others."""
+FIRST_HUE = 0.56
+TONES = ((0.56, 0.60), (0.42, 0.62), (0.68, 0.55), (0.50, 0.42))
+"""Lightness and saturation of pieces in turn, as there are few hues that eyes tell apart."""
+
+
+def piece_colors(count: int) -> list[tuple[float, float, float]]:
+    """Colours (red, green, blue in [0, 1]) for convex pieces, all different."""
+    return [
+        colorsys.hls_to_rgb((FIRST_HUE + i * GOLDEN_TURN) % 1.0, *TONES[i % len(TONES)])
+        for i in range(count)
+    ]

@@ -87,7 +87,7 @@ def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
     assert build(tmp_path / "block.stl", "-o", tmp_path / "library") == 2
     _, line = capsys.readouterr().err.splitlines()
-    assert "looks like millimetres: scale=0.001 (--scale 0.001) makes it 60 mm" in line
+    assert "try --unit mm (scale=0.001 makes it 60 mm)" in line
     assert not (tmp_path / "library").exists()
 
 
@@ -180,7 +180,7 @@ def test_unwritable_output(mesh: Path, capsys: Capture) -> None:
 def test_folder_without_meshes(tmp_path: Path, capsys: Capture) -> None:
     (tmp_path / "empty").mkdir()
     assert build(tmp_path / "empty", "-o", tmp_path / "library") == 2
-    assert "holds no mesh (.obj, .ply, .stl, .glb, .gltf)" in capsys.readouterr().err
+    assert "holds no mesh (.obj, .ply, .stl, .off, .glb, .gltf)" in capsys.readouterr().err
 
 
 def test_the_help_describes_masses_files(capsys: Capture) -> None:

@@ -9,15 +9,8 @@ import pytest
 import trimesh
 
 from burg_drake.core.schema import Pose
-from burg_drake.objects.library import (
-    LibraryDocument,
-    MassProperties,
-    ObjectEntry,
-    ObjectLibrary,
-    Source,
-    StablePose,
-    load_library,
-)
+from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.station.station import Station, load_station
 

@@ -74,3 +74,48 @@ def test_depth_is_the_shortest_way_out_of_random_hulls() -> None:
         ways = [s * d for d in normals for s in (1, -1)]
         assert not all(overlap_exists(one, moved + 1.01 * depth * d) for d in ways)
     assert tried >= 5
+
+
+@pytest.mark.parametrize(
+    ("p_AB", "expected"),
+    [
+        ((0.0, 0.0, 0.6), 0.1),  # above a face
+        ((0.62, 0.64, 0.0), 0.2 - np.hypot(0.12, 0.14)),  # beside an edge
+        ((0.58, 0.59, 0.56), 0.2 - np.sqrt(0.08**2 + 0.09**2 + 0.06**2)),  # off a corner
+        ((0.65, 0.65, 0.0), 0.0),  # within the sum of extents, but past the edge
+        ((0.1, 0.2, -0.3), 0.2 + 0.2),  # centre inside: out through the nearest face
+    ],
+)
+def test_ball_and_cube(p_AB: tuple[float, ...], expected: float) -> None:
+    cube, ball = Polytope.from_points(CUBE), Polytope.ball(0.2)
+    for R in (np.eye(3), rotation_from_rpy((0.4, 1.0, -2.0))):
+        X_AB = make_pose(R, p_AB)
+        assert penetration_depth(cube, ball, X_AB) == pytest.approx(expected, abs=1e-12)
+        assert penetration_depth(ball, cube, inverse(X_AB)) == pytest.approx(expected, abs=1e-12)
+
+
+def test_two_balls() -> None:
+    one, other = Polytope.ball(0.2), Polytope.ball(0.3)
+    assert penetration_depth(one, other, make_pose(p_AB=(0.3, 0.0, -0.3))) == pytest.approx(
+        0.5 - np.hypot(0.3, 0.3)
+    )
+    assert penetration_depth(one, other, np.eye(4)) == 0.5
+    assert penetration_depth(one, other, make_pose(p_AB=(0.4, 0.4, 0.0))) == 0.0
+
+
+def test_prism_is_the_hull_of_its_corners_and_a_cylinder_to_a_hundredth() -> None:
+    prism = Polytope.prism(0.034, 0.1)
+    hull = Polytope.from_points(prism.vertices)
+    pad = Polytope.from_points(CUBE * (0.0175, 0.0152, 0.0185))
+    rng = np.random.default_rng(3)
+    touching = 0
+    for _ in range(30):
+        X_AB = make_pose(rotation_from_rpy(rng.uniform(-3, 3, 3)), rng.uniform(-0.05, 0.05, 3))
+        depth = penetration_depth(prism, pad, X_AB)
+        assert depth == pytest.approx(penetration_depth(hull, pad, X_AB), abs=1e-7)
+        touching += depth > 0.0
+    assert touching >= 10
+    for angle in np.linspace(0.0, 1.0, 7):  # a pad square to the side, anywhere around
+        out = np.array([np.cos(angle), np.sin(angle), 0.0])
+        X_AB = make_pose(rotation_from_rpy((0, 0, angle)), out * (0.034 + 0.00875 - 0.003))
+        assert penetration_depth(prism, pad, X_AB) == pytest.approx(0.003, abs=1.1e-5)

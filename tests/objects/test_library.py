@@ -10,15 +10,8 @@ import pytest
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.schema import Pose
-from burg_drake.objects.library import (
-    LibraryDocument,
-    MassProperties,
-    ObjectEntry,
-    ObjectLibrary,
-    Source,
-    StablePose,
-    load_library,
-)
+from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
 
 
 @pytest.fixture

@@ -11,15 +11,12 @@ from pydrake.multibody.tree import CalcSpatialInertia
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.objects.mass import (
     DEFAULT_DENSITY,
+    implausible,
+    inertia_matrix,
     mass_properties,
     solid_of_pieces,
     solid_of_surface,
 )
-
-
-def _tensor(inertia: tuple[float, ...]) -> np.ndarray:
-    xx, yy, zz, xy, xz, yz = inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def test_box() -> None:
@@ -38,7 +35,9 @@ def test_inertia_is_in_the_axes_of_O() -> None:
     box = trimesh.creation.box((a, b, c)).apply_transform(R)
     m = mass_properties(solid_of_surface(box), mass=1.0)
     principal = np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) / 12.0
-    np.testing.assert_allclose(_tensor(m.inertia), R[:3, :3] @ principal @ R[:3, :3].T, atol=1e-15)
+    np.testing.assert_allclose(
+        inertia_matrix(m.inertia), R[:3, :3] @ principal @ R[:3, :3].T, atol=1e-15
+    )
 
 
 def test_cylinder() -> None:
@@ -68,7 +67,7 @@ def test_agrees_with_drake(tmp_path) -> None:  # type: ignore[no-untyped-def]
     assert m.mass == pytest.approx(drake.get_mass(), rel=1e-6)
     np.testing.assert_allclose(m.center_of_mass, drake.get_com(), atol=1e-7)
     about_com = drake.Shift(drake.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
-    np.testing.assert_allclose(_tensor(m.inertia), about_com, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(inertia_matrix(m.inertia), about_com, rtol=1e-5, atol=1e-9)
 
 
 def test_pieces_add_up_to_the_whole() -> None:
@@ -102,3 +101,140 @@ def test_inside_out_is_refused() -> None:
     box.invert()
     with pytest.raises(InvalidInputError, match="normals must point outward"):
         solid_of_surface(box)
+
+
+def _lump() -> trimesh.Trimesh:
+    """A closed surface without any symmetry."""
+    lump = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
+    rng = np.random.default_rng(4)
+    lump.vertices *= rng.uniform(0.7, 1.3, (len(lump.vertices), 1))
+    return lump.apply_transform(np.diag([1.0, 0.6, 1.7, 1.0]))
+
+
+def test_turned_and_moved_meshes_have_turned_and_moved_mass_properties() -> None:
+    X = trimesh.transformations.rotation_matrix(1.1, [3, -1, 2])
+    X[:3, 3] = [0.4, -0.3, 0.2]
+    a = mass_properties(solid_of_surface(_lump()), mass=0.4)
+    b = mass_properties(solid_of_surface(_lump().apply_transform(X)), mass=0.4)
+    assert b.volume == pytest.approx(a.volume, rel=1e-12)
+    expected = X[:3, :3] @ np.array(a.center_of_mass) + X[:3, 3]
+    np.testing.assert_allclose(b.center_of_mass, expected, atol=1e-13)
+    turned = X[:3, :3] @ inertia_matrix(a.inertia) @ X[:3, :3].T
+    np.testing.assert_allclose(inertia_matrix(b.inertia), turned, atol=1e-15)
+
+
+def test_other_triangles_of_the_same_surface_have_the_same_mass_properties() -> None:
+    lump = _lump()
+    fine = lump.subdivide().subdivide()
+    order = np.random.default_rng(0).permutation(len(fine.faces))
+    shuffled = trimesh.Trimesh(fine.vertices, np.roll(fine.faces[order], 1, axis=1), process=False)
+    a, b = (mass_properties(solid_of_surface(m), density=500.0) for m in (lump, shuffled))
+    assert b.mass == pytest.approx(a.mass, rel=1e-12)
+    np.testing.assert_allclose(b.center_of_mass, a.center_of_mass, atol=1e-14)
+    np.testing.assert_allclose(b.inertia, a.inertia, rtol=1e-9, atol=1e-16)
+
+
+def test_what_is_given_goes_before_what_is_computed() -> None:
+    solid = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
+    given = (2e-4, 3e-4, 4e-4, 1e-5, 0.0, -1e-5)
+    m = mass_properties(
+        solid, mass=0.3, center_of_mass=(0.0, 0.01, 0.02), inertia=given, wall_thickness=0.001
+    )
+    assert (m.center_of_mass, m.inertia) == ((0.0, 0.01, 0.02), given)
+    assert m.overridden == ("center_of_mass", "inertia")
+    assert m.wall_thickness == 0.001
+    assert mass_properties(solid, mass=0.3).overridden == ()
+
+
+def test_a_given_centre_of_mass_alone_leaves_the_inertia() -> None:
+    solid = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
+    m = mass_properties(solid, mass=0.3, center_of_mass=(0.0, 0.0, 0.03))
+    np.testing.assert_allclose(m.inertia[:3], 0.3 * 0.1**2 / 6.0)
+    assert m.overridden == ("center_of_mass",)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "expected"),
+    [
+        (
+            (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0),
+            "inertia is that of no body: its principal moments are 0.0001, 0.0001 and 0.0003"
+            " kg m^2; the largest must not exceed the sum of the others",
+        ),
+        (
+            (1e-4, 1e-4, 1e-4, 2e-4, 0.0, 0.0),
+            "inertia is not positive definite: its principal moments are -0.0001, 0.0001 and"
+            " 0.0003 kg m^2; all must be > 0",
+        ),
+        (
+            (1e-4, 1e-4, float("nan"), 0.0, 0.0, 0.0),
+            "inertia is [0.0001, 0.0001, nan, 0.0, 0.0, 0.0]; expected Ixx, Iyy, Izz, Ixy, Ixz,"
+            " Iyz [kg m^2]",
+        ),
+        ((1e-4,), "inertia is [0.0001]; expected Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2]"),
+    ],
+)
+def test_inertias_that_no_body_has(inertia: tuple[float, ...], expected: str) -> None:
+    solid = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
+    with pytest.raises(InvalidInputError) as caught:
+        mass_properties(solid, mass=0.3, inertia=inertia)  # type: ignore[arg-type]
+    assert str(caught.value) == expected
+
+
+def test_a_flat_plate_just_meets_the_triangle_inequality() -> None:
+    solid = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
+    mass_properties(solid, mass=0.3, inertia=(1e-4, 2e-4, 3e-4, 0.0, 0.0, 0.0))
+
+
+def test_centres_of_mass_outside_the_bounding_box() -> None:
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    with pytest.raises(InvalidInputError) as caught:
+        mass_properties(
+            solid_of_surface(box), 0.3, center_of_mass=(0.0, 0.0, 10.0), bounds=box.bounds
+        )
+    assert str(caught.value) == (
+        "center_of_mass [0.0, 0.0, 10.0] lies outside the bounding box [-0.05, -0.05, -0.05] to"
+        " [0.05, 0.05, 0.05] (metres, object frame)"
+    )
+    with pytest.raises(InvalidInputError, match="expected three numbers"):
+        mass_properties(solid_of_surface(box), 0.3, center_of_mass=(0.0, float("nan"), 0.0))
+
+
+def _remarks(size: float, **given: object) -> tuple[str, ...]:
+    box = trimesh.creation.box((size, size, size))
+    m = mass_properties(solid_of_surface(box), **given)  # type: ignore[arg-type]
+    return implausible(m, *(tuple(b) for b in box.bounds.tolist()))
+
+
+@pytest.mark.parametrize("density", [15.0, 300.0, 1000.0, 7850.0, 8960.0])
+def test_foam_water_steel_and_copper_are_plausible(density: float) -> None:
+    assert _remarks(0.05, density=density) == ()
+
+
+def test_ycb_masses_are_plausible() -> None:
+    """A cracker box, 0.411 kg and 60 x 158 x 210 mm, as published with the YCB set."""
+    box = trimesh.creation.box((0.06, 0.158, 0.21))
+    m = mass_properties(solid_of_surface(box), mass=0.411)
+    assert implausible(m, *(tuple(b) for b in box.bounds.tolist())) == ()
+
+
+def test_what_is_implausible_is_said() -> None:
+    assert _remarks(0.1, mass=30.0) == (
+        "density is 3e+04 kg/m^3 (30 kg in 1e+03 cm^3), denser than copper: things have 10 to"
+        " 9000; check mass and unit of length",
+        "mass is 30 kg, more than its bounding box full of copper",
+    )
+    assert _remarks(0.1, mass=0.001) == (
+        "density is 1 kg/m^3 (0.001 kg in 1e+03 cm^3), lighter than foam: things have 10 to"
+        " 9000; check mass and unit of length",
+        "mass is 0.001 kg, less than the air in its bounding box",
+    )
+    g_mm2 = 1e9 * 0.3 * 0.1**2 / 6.0
+    for wrong in (g_mm2, 1e-9 * 0.3 * 0.1**2 / 6.0):
+        (remark,) = _remarks(0.1, mass=0.3, inertia=(wrong, wrong, wrong, 0.0, 0.0, 0.0))
+        assert remark.startswith("inertia gives a radius of gyration of ")
+        assert "half the diagonal of its bounding box is 86.6 mm" in remark
+    assert _remarks(0.1, mass=0.3, center_of_mass=(0.0, 0.0, 0.051)) == (
+        "centre of mass [0.0, 0.0, 0.051] lies outside the bounding box [-0.05, -0.05, -0.05] to"
+        " [0.05, 0.05, 0.05] (metres, object frame)",
+    )

@@ -10,8 +10,14 @@ import pytest
 import trimesh
 from PIL import Image
 
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.meshes import load_mesh, mesh_hash, texture_image
+from burg_drake.core.errors import MeshError, UnknownNameError
+from burg_drake.objects.meshes import (
+    Preparation,
+    load_mesh,
+    mesh_hash,
+    texture_image,
+    unit_scale,
+)
 
 SIZE = (0.10, 0.06, 0.03)
 
@@ -21,7 +27,7 @@ def box() -> trimesh.Trimesh:
     return trimesh.creation.box(SIZE).apply_translation([0.01, 0.02, 0.03])
 
 
-@pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off"])
 def test_formats_keep_the_frame(tmp_path: Path, box: trimesh.Trimesh, suffix: str) -> None:
     box.export(tmp_path / f"box.{suffix}")
     mesh = load_mesh(tmp_path / f"box.{suffix}")
@@ -101,18 +107,21 @@ def _message(source: Path | trimesh.Trimesh, scale: float = 1.0) -> str:
     return text
 
 
-MM, CM, M = (f"scale={s} (--scale {s}) makes it" for s in ("0.001", "0.01", "1"))
+MM, CM, M, INCH = (
+    f"--unit {unit} (scale={scale} makes it"
+    for unit, scale in (("mm", "0.001"), ("cm", "0.01"), ("m", "1"), ("in", "0.0254"))
+)
 
 
 @pytest.mark.parametrize(
     ("extent", "scale", "expected"),
     [
-        (200.0, 1.0, f"is 200 m, but lengths are in metres; looks like millimetres: {MM} 200 mm"),
-        (2000.0, 1.0, f"is 2000 m, but lengths are in metres; looks like millimetres: {MM} 2 m"),
-        (20.0, 1.0, f"looks like millimetres: {MM} 20 mm, or centimetres: {CM} 200 mm"),
-        (5.0, 1.0, f"is 5 m, but lengths are in metres; looks like centimetres: {CM} 50 mm"),
-        (0.1, 1000.0, f"is 100 m, but lengths are in metres; looks like metres: {M} 100 mm"),
-        (0.1, 0.001, f"is 0.1 mm, but lengths are in metres; looks like metres: {M} 100 mm"),
+        (200.0, 1.0, f"is 200 m, but lengths are in metres; try {MM} 200 mm)"),
+        (2000.0, 1.0, f"is 2000 m, but lengths are in metres; try {MM} 2 m)"),
+        (20.0, 1.0, f"try {MM} 20 mm) or {CM} 200 mm) or {INCH} 508 mm)"),
+        (5.0, 1.0, f"is 5 m, but lengths are in metres; try {CM} 50 mm) or {INCH} 127 mm)"),
+        (0.1, 1000.0, f"is 100 m, but lengths are in metres; try {M} 100 mm)"),
+        (0.1, 0.001, f"is 0.1 mm, but lengths are in metres; try {M} 100 mm)"),
         (1e-4, 1.0, "is 0.1 mm, but lengths are in metres; try scale=1000 (--scale 1000)"),
     ],
 )
@@ -144,7 +153,7 @@ def test_missing_file(tmp_path: Path) -> None:
         ("a.stl", b"\x00\x01\x02 this is no mesh", "the mesh file has no triangles"),
         ("a.glb", b"glTF but not really", "not a readable .glb mesh"),
         ("a.gltf", b"{]", "not a readable .gltf mesh"),
-        ("a.dae", b"<x/>", ".dae is not one of .obj, .ply, .stl, .glb, .gltf"),
+        ("a.dae", b"<x/>", ".dae is not one of .obj, .ply, .stl, .off, .glb, .gltf"),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 0), "the mesh"),
     ],
 )
@@ -162,6 +171,38 @@ def test_nan_vertices(box: trimesh.Trimesh) -> None:
     assert _message(broken) == "mesh in memory: 1 of 8 vertices are NaN or infinite"
 
 
+def test_unit_names() -> None:
+    assert [unit_scale(u) for u in ("mm", "cm", "m", "in")] == [0.001, 0.01, 1.0, 0.0254]
+    with pytest.raises(UnknownNameError) as caught:
+        unit_scale("inch")
+    assert str(caught.value) == "unit 'inch' is not known; did you mean 'in'? Known: cm, in, m, mm"
+
+
+def test_a_texture_stays_on_the_given_sheet() -> None:
+    """A textured towel: the wall is for physics, the sheet with its picture for display."""
+    dome = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    dome.update_faces(dome.triangles_center[:, 2] > 0.03)
+    dome.remove_unreferenced_vertices()
+    uv = np.random.default_rng(0).random((len(dome.vertices), 2))
+    image = Image.new("RGB", (8, 8), (10, 200, 30))
+    dome.visual = trimesh.visual.TextureVisuals(uv=uv, image=image)
+    mesh = load_mesh(dome)
+    assert mesh.closed and mesh.surface.volume > 0.0
+    np.testing.assert_array_equal(mesh.visual.faces, dome.faces)
+    assert texture_image(mesh.visual) is not None
+
+
+@pytest.mark.parametrize("thickness", [0.0, -1.0, float("nan"), float("inf")])
+def test_walls_that_are_none(thickness: float) -> None:
+    with pytest.raises(MeshError, match=r"wall_thickness is .* m; it must be above 0"):
+        Preparation(wall_thickness=thickness)
+
+
+def test_ways_to_close_that_are_none() -> None:
+    with pytest.raises(MeshError, match="openings is 'cap'; it must be 'wall' or 'close'"):
+        Preparation(openings="cap")  # type: ignore[arg-type]
+
+
 def test_flat_meshes(box: trimesh.Trimesh) -> None:
     assert "is flat (100 x 60 x 0 mm)" in _message(box.apply_transform(np.diag([1, 1, 0, 1.0])))
 
@@ -171,17 +212,16 @@ def test_single_triangles_are_flat() -> None:
     assert "is flat" in _message(triangle)
 
 
-def test_sheets_with_a_face_on_both_sides_are_open() -> None:
+def test_sheets_with_a_face_on_both_sides_become_a_wall() -> None:
     bent = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
     half = bent.faces[bent.triangles_center[:, 2] > 0]
     mesh = load_mesh(
         trimesh.Trimesh(bent.vertices, np.vstack([half, half[:, ::-1]]), process=False)
     )
-    assert not mesh.closed
-    assert mesh.repairs == (
-        f"dropped {len(half)} duplicate faces",
-        "left open: the volume is taken from the convex pieces",
-    )
+    assert mesh.closed
+    assert mesh.wall == 0.002
+    assert mesh.repairs[1] == f"dropped {len(half)} duplicate faces"
+    assert mesh.repairs[2].startswith("made the open surface (largest opening 100 mm wide) a wall")
 
 
 def test_closed_sheets_without_thickness() -> None:

@@ -26,9 +26,12 @@ from pydrake.multibody.plant import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from burg_drake.core.frames import make_pose, rotation_from_rpy
+from burg_drake.core.schema import Pose
+from burg_drake.objects.entry import ContactGeometry, Primitive
 from burg_drake.objects.mass import mass_properties, solid_of_surface
 from burg_drake.objects.obj_file import write_piece, write_visual
-from burg_drake.objects.sdf import DEFAULT_CONTACT, Contact, model_sdf
+from burg_drake.objects.sdf import DEFAULT_CONTACT, Contact, model_sdf, resolution_hint
 
 
 @pytest.fixture
@@ -43,9 +46,15 @@ def _box() -> trimesh.Trimesh:
     return trimesh.creation.box((0.1, 0.06, 0.03)).apply_translation([0.01, 0.02, 0.03])
 
 
-def _text(contact: Contact = DEFAULT_CONTACT) -> str:
+def _text(contact: ContactGeometry = ContactGeometry(), material: Contact = DEFAULT_CONTACT) -> str:
     m = mass_properties(solid_of_surface(_box()), mass=0.2)
-    return model_sdf("box", m, 0.31, "mesh.obj", ["pieces/000.obj"], contact)
+    return model_sdf("box", m, 0.31, "mesh.obj", ["pieces/000.obj"], contact, material)
+
+
+BOX = ContactGeometry(
+    kind="primitive",
+    primitive=Primitive(shape="box", size=(0.1, 0.06, 0.03), X_OP=Pose((0.01, 0.02, 0.03))),
+)
 
 
 @dataclass
@@ -123,8 +132,93 @@ def test_compliant_things_meet_the_pieces_by_a_surface(folder: Path) -> None:
 
 def test_compliant_pieces_yield_as_well(folder: Path) -> None:
     _, rigid = Parsed(_text(), folder).settled()
-    _, soft = Parsed(_text(Contact(hydroelastic="compliant", modulus=1e5)), folder).settled()
+    compliant = ContactGeometry(kind="compliant_pieces")
+    _, soft = Parsed(_text(compliant, Contact(modulus=1e5)), folder).settled()
     assert soft > 2.0 * rigid
+
+
+@pytest.mark.parametrize("contact", [BOX, ContactGeometry(kind="mesh", mesh="box/contact.obj")])
+def test_a_primitive_and_a_mesh_rest_like_the_piece(folder: Path, contact: ContactGeometry) -> None:
+    write_piece(_box(), folder / "contact.obj")
+    contacts, depth = Parsed(_text(contact), folder).settled()
+    assert contacts.num_point_pair_contacts() == 0
+    assert contacts.num_hydroelastic_contacts() == 1
+    assert depth == pytest.approx(0.2 * 9.81 / (0.1 * 0.06) * 0.05 / 1e6, rel=0.02)
+
+
+def test_a_mesh_keeps_its_hollows(folder: Path) -> None:
+    """Of a U on the ground, legs down, Drake makes a surface that is not its convex hull."""
+    u = trimesh.boolean.union(
+        [
+            trimesh.creation.box((0.1, 0.06, 0.01)),
+            *(
+                trimesh.creation.box((0.01, 0.06, 0.03)).apply_translation((x, 0, -0.015))
+                for x in (-0.045, 0.045)
+            ),
+        ]
+    )
+    write_piece(u, folder / "contact.obj")
+    parsed = Parsed(_text(ContactGeometry(kind="mesh", mesh="contact.obj")), folder)
+    surface = _hydroelastic_mesh(parsed)
+    assert surface.volume == pytest.approx(u.volume, rel=1e-9)
+    assert surface.volume < 0.5 * u.convex_hull.volume
+
+
+def _hydroelastic_mesh(parsed: Parsed) -> trimesh.Trimesh:
+    """The surface that Drake cuts of the model's only collision geometry, in its own frame."""
+    (collision,) = parsed.plant.GetCollisionGeometriesForBody(parsed.body)
+    mesh = parsed.scene_graph.model_inspector().maybe_get_hydroelastic_mesh(collision)
+    vertices = [mesh.vertex(i) for i in range(mesh.num_vertices())]
+    faces = [[mesh.element(i).vertex(k) for k in range(3)] for i in range(mesh.num_elements())]
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+@pytest.mark.parametrize(
+    "primitive",
+    [
+        Primitive(shape="box", size=(0.1, 0.06, 0.03)),
+        Primitive(shape="cylinder", size=(0.034, 0.1)),
+        Primitive(shape="cylinder", size=(0.004, 0.15)),
+        Primitive(shape="sphere", size=(0.015,)),
+        Primitive(shape="sphere", size=(0.05,)),
+    ],
+)
+def test_primitives_arrive_in_place_and_fine_enough(folder: Path, primitive: Primitive) -> None:
+    X_OP = make_pose(rotation_from_rpy((0.3, -1.2, 2.5)), (0.011, -0.023, 0.17))
+    placed = Primitive(
+        shape=primitive.shape,
+        size=primitive.size,
+        X_OP=Pose.from_matrix(X_OP, quaternion=True),
+    )
+    parsed = Parsed(_text(ContactGeometry(kind="primitive", primitive=placed)), folder)
+    inspector = parsed.scene_graph.model_inspector()
+    (collision,) = parsed.plant.GetCollisionGeometriesForBody(parsed.body)
+    np.testing.assert_allclose(inspector.GetPoseInFrame(collision).GetAsMatrix4(), X_OP, atol=1e-15)
+    shape = inspector.GetShape(collision)
+    size = {
+        "Box": lambda: tuple(shape.size()),
+        "Cylinder": lambda: (shape.radius(), shape.length()),
+        "Sphere": lambda: (shape.radius(),),
+    }[type(shape).__name__]()
+    assert size == primitive.size
+    if primitive.shape == "box":
+        return
+    # the middle of each facet is as far inside as the facets' planes are
+    surface = _hydroelastic_mesh(parsed)
+    planes = (surface.triangles[:, 0] * surface.face_normals).sum(axis=1)
+    side = (
+        np.abs(surface.face_normals[:, 2]) < 0.99 if primitive.shape == "cylinder" else planes > 0
+    )
+    inside = primitive.size[0] - planes[side]
+    assert 0.2 * DEFAULT_CONTACT.faceting < inside.max() <= DEFAULT_CONTACT.faceting
+
+
+def test_coarser_facets_need_a_longer_hint() -> None:
+    cylinder = Primitive(shape="cylinder", size=(0.03, 0.1))
+    sphere = Primitive(shape="sphere", size=(0.03,))
+    for primitive in (cylinder, sphere):
+        assert resolution_hint(primitive, 1e-3) > resolution_hint(primitive, 1e-4)
+        assert resolution_hint(primitive, 1.0) <= 2 * np.pi * 0.03 / 3 + 1e-9
 
 
 def test_visual_is_the_mesh(folder: Path) -> None:

@@ -8,8 +8,9 @@ import trimesh
 from trimesh.poses import compute_stable_poses
 
 from burg_drake.core.frames import Array, rotation_angle, transform_points
-from burg_drake.objects.library import StablePose
-from burg_drake.objects.stable_poses import resting_facets, resting_pose, stable_poses
+from burg_drake.objects.entry import StablePose
+from burg_drake.objects.landscape import Landscape
+from burg_drake.objects.stable_poses import resting_pose, stable_poses
 
 
 def _poses(mesh: trimesh.Trimesh, p_OOcm: Array | None = None) -> tuple[StablePose, ...]:
@@ -24,7 +25,7 @@ def _solid_angle_of_rectangle(a: float, b: float, d: float) -> float:
 
 def test_icosahedron() -> None:
     ico = trimesh.creation.icosahedron().apply_scale(0.05)
-    facets = resting_facets(np.asarray(ico.vertices), np.zeros(3))
+    facets = Landscape(np.asarray(ico.vertices), np.zeros(3)).minima()
     assert len(facets) == 20
     np.testing.assert_allclose([f.probability for f in facets], 1.0 / 20.0, rtol=1e-9)
     np.testing.assert_allclose([f.height for f in facets], 0.05 * 0.7946544722917661, rtol=1e-9)
@@ -109,7 +110,7 @@ def test_probabilities_are_those_of_trimesh() -> None:
     for _ in range(5):
         hull = trimesh.convex.convex_hull(rng.normal(size=(10, 3)) * [0.05, 0.04, 0.03])
         center = np.asarray(hull.center_mass)
-        facets = resting_facets(np.asarray(hull.vertices), center, tilt_margin=0.0)
+        facets = Landscape(np.asarray(hull.vertices), center).minima(tilt_margin=0.0)
         X, probability = compute_stable_poses(hull, center_mass=center, n_samples=1)
         assert len(facets) == len(probability)
         np.testing.assert_allclose([f.probability for f in facets], probability, atol=1e-9)
@@ -161,3 +162,72 @@ def test_rare_poses_are_left_out() -> None:
     thicker = _poses(trimesh.creation.box((0.2, 0.2, 0.03)))
     assert len(thicker) == 2
     assert sum(p.probability for p in thicker) == pytest.approx(1.0)
+
+
+LEANING = np.array(
+    [
+        (3.0 * np.cos(a) + 8.0 * level, 3.0 * np.sin(a), 8.0 * level)
+        for level in (0.0, 1.0)
+        for a in np.arange(6) * np.pi / 3.0
+    ]
+)
+"""A hexagonal prism that leans so far that it stands on neither end [cm]."""
+
+
+def test_how_a_face_is_cut_into_triangles_does_not_matter() -> None:
+    """Qhull cuts the hexagons otherwise in every orientation; what lands on one topples as one."""
+    corners = 0.01 * LEANING
+    center = np.asarray(trimesh.convex.convex_hull(corners).center_mass)
+    first = [m.probability for m in Landscape(corners, center).minima()]
+    assert first[0] == pytest.approx(first[1], abs=1e-9)  # mirror images of each other
+    assert first[2] == pytest.approx(first[3], abs=1e-9)
+    rng = np.random.default_rng(1)
+    for _ in range(8):
+        R = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+        turned = np.round(corners @ R.T, 9)
+        again = [m.probability for m in Landscape(turned, R @ center).minima()]
+        assert again == pytest.approx(first, abs=1e-6)
+
+
+def test_subdividing_the_mesh_changes_nothing() -> None:
+    prism = trimesh.convex.convex_hull(0.01 * LEANING)
+    for mesh in (trimesh.creation.box((0.1, 0.07, 0.04)), prism):
+        before, after = _poses(mesh), _poses(mesh.subdivide().subdivide())
+        assert [p.probability for p in after] == pytest.approx([p.probability for p in before])
+        for a, b in zip(before, after, strict=True):
+            np.testing.assert_allclose(abs(a.X_SO.matrix()), abs(b.X_SO.matrix()), atol=1e-6)
+
+
+@pytest.mark.parametrize("sections", [24, 32, 64])
+def test_cans_lie_and_roll_however_finely_they_are_cut(sections: int) -> None:
+    lying, upright = _poses(trimesh.creation.cylinder(0.03, 0.1, sections=sections))
+    assert (lying.rolls, upright.rolls) == (True, False)
+
+
+def test_what_rolls() -> None:
+    (ball,) = _poses(trimesh.creation.icosphere(3, 0.02))
+    assert ball.rolls
+    (pencil,) = _poses(trimesh.creation.cylinder(0.004, 0.18, sections=6))
+    assert not pencil.rolls
+    assert not any(p.rolls for p in _poses(trimesh.creation.box((0.1, 0.08, 0.06))))
+    # an egg rolls about its long axis; on its end it does not stand
+    egg = trimesh.creation.icosphere(4, 0.02).apply_scale([1.0, 1.0, 1.4])
+    (lying,) = _poses(egg)
+    assert lying.rolls
+
+
+def test_tall_boxes_that_hardly_stand_do_not_roll() -> None:
+    """To fall over is not to roll on, though the pass is low."""
+    for pose in _poses(trimesh.creation.box((0.03, 0.04, 0.2))):
+        assert not pose.rolls
+
+
+def test_dents_do_not_make_poses_of_their_own() -> None:
+    """A box with faces bent outward by a degree, as scans have them."""
+    box = trimesh.creation.box((0.1, 0.08, 0.06)).subdivide()
+    bulge = 1.0 + 0.012 * (np.linalg.norm(box.vertices / [0.05, 0.04, 0.03], axis=1) < 1.2)
+    bent = trimesh.convex.convex_hull(box.vertices * bulge[:, None])
+    assert len(bent.facets) == 0  # no two triangles are in one plane any more
+    poses, flat = _poses(bent), _poses(trimesh.creation.box((0.1, 0.08, 0.06)))
+    assert len(poses) == 3
+    assert [p.probability for p in poses] == pytest.approx([p.probability for p in flat], abs=0.02)

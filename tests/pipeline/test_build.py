@@ -13,8 +13,8 @@ import trimesh
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.objects.library import load_library
-from burg_drake.pipeline import stages
-from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline import geometry, keys
+from burg_drake.pipeline.build import BuildReport, build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.target import SCRATCH
 
@@ -47,8 +47,13 @@ def _contents(root: Path) -> dict[str, bytes]:
     return {str(p.relative_to(root)): p.read_bytes() for p in root.rglob("*") if p.is_file()}
 
 
+def build(sources: object, out: Path, **options: object) -> BuildReport:
+    """Builds without the simulation of stable poses, which has tests of its own."""
+    return build_library(sources, out, **{"confirm": False, **options})  # type: ignore[arg-type]
+
+
 def test_entries_say_what_was_built(meshes: Path, tmp_path: Path) -> None:
-    report = build_library(_sources(meshes), tmp_path / "lib", name="things")
+    report = build(_sources(meshes), tmp_path / "lib", name="things")
     assert report.built == ("box", "can")
     assert (report.cached, report.failed) == ((), {})
     box = report.library.entry("box")
@@ -65,16 +70,16 @@ def test_entries_say_what_was_built(meshes: Path, tmp_path: Path) -> None:
 
 
 def test_a_density_that_was_assumed_is_reported(meshes: Path, tmp_path: Path) -> None:
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     mass = 300.0 * 16 * np.sin(2 * np.pi / 32) * 0.03**2 * 0.1  # a prism with 32 sides
     assert report.notes["can"] == (f"no mass or density given: {mass:.4g} kg from 300 kg/m^3",)
     assert "box" not in report.notes
 
 
 def test_what_has_not_changed_is_not_touched(meshes: Path, tmp_path: Path) -> None:
-    build_library(_sources(meshes), tmp_path / "lib")
+    build(_sources(meshes), tmp_path / "lib")
     before = _times(tmp_path / "lib")
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     assert report.cached == ("box", "can")
     assert _times(tmp_path / "lib") == before
 
@@ -82,10 +87,10 @@ def test_what_has_not_changed_is_not_touched(meshes: Path, tmp_path: Path) -> No
 def test_a_new_mass_rewrites_the_sdf_and_nothing_else(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = build_library(_sources(meshes), tmp_path / "lib").library.entry("box")
+    first = build(_sources(meshes), tmp_path / "lib").library.entry("box")
     before = _times(tmp_path / "lib")
-    monkeypatch.setattr(stages, "load_mesh", None)  # neither the mesh nor the pieces are needed
-    report = build_library(_sources(meshes, mass=0.4), tmp_path / "lib")
+    monkeypatch.setattr(geometry, "load_mesh", None)  # neither the mesh nor the pieces are needed
+    report = build(_sources(meshes, mass=0.4), tmp_path / "lib")
     assert (report.built, report.cached) == (("box",), ("can",))
     changed = {k for k, t in _times(tmp_path / "lib").items() if before.get(k) != t}
     assert changed == {"library.yaml", "box/box.sdf", "box/build.json"}
@@ -101,50 +106,50 @@ def test_a_new_colour_keeps_the_pieces(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = _sources(meshes)[0]
-    build_library([source], tmp_path / "lib")
+    build([source], tmp_path / "lib")
     pieces = (tmp_path / "lib/box/pieces/000.obj").read_bytes()
-    monkeypatch.setattr(stages, "convex_pieces", None)
-    report = build_library([replace(source, rgba=(1.0, 0.0, 0.0, 1.0))], tmp_path / "lib")
+    monkeypatch.setattr(geometry, "convex_pieces", None)
+    report = build([replace(source, rgba=(1.0, 0.0, 0.0, 1.0))], tmp_path / "lib")
     assert report.built == ("box",)
     assert "Kd 1 0 0" in (tmp_path / "lib/box/mesh.mtl").read_text()
     assert (tmp_path / "lib/box/pieces/000.obj").read_bytes() == pieces
 
 
 def test_a_changed_mesh_is_built_again(meshes: Path, tmp_path: Path) -> None:
-    build_library(_sources(meshes), tmp_path / "lib")
+    build(_sources(meshes), tmp_path / "lib")
     _box((0.12, 0.06, 0.03)).export(meshes / "Box.stl")
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
     assert report.library.entry("box").upper[0] == pytest.approx(0.06)
 
 
 def test_lost_files_are_built_again(meshes: Path, tmp_path: Path) -> None:
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     report.library.path(report.library.entry("box").pieces[0]).unlink()
-    assert build_library(_sources(meshes), tmp_path / "lib").built == ("box",)
+    assert build(_sources(meshes), tmp_path / "lib").built == ("box",)
     report.library.path(report.library.entry("box").mesh).unlink()
-    assert build_library(_sources(meshes), tmp_path / "lib").built == ("box",)
+    assert build(_sources(meshes), tmp_path / "lib").built == ("box",)
 
 
 def test_a_new_description_is_taken_over(meshes: Path, tmp_path: Path) -> None:
     source = _sources(meshes)[0]
-    before = build_library([source], tmp_path / "lib").library.entry("box")
-    report = build_library([replace(source, description="a box")], tmp_path / "lib")
+    before = build([source], tmp_path / "lib").library.entry("box")
+    report = build([replace(source, description="a box")], tmp_path / "lib")
     assert report.library.entry("box").description == "a box"
     assert report.library.entry("box").build == before.build  # results stay valid
 
 
 def test_objects_of_earlier_builds_stay(meshes: Path, tmp_path: Path) -> None:
     first, second = _sources(meshes)
-    build_library([second], tmp_path / "lib", name="things")
-    report = build_library([first], tmp_path / "lib")
+    build([second], tmp_path / "lib", name="things")
+    report = build([first], tmp_path / "lib")
     assert list(report.library.objects) == ["box", "can"]
     assert report.library.name == "things"
 
 
 def test_the_same_input_gives_the_same_bytes(meshes: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
-        build_library(_sources(meshes), tmp_path / name, name="things", workers=1 + (name == "b"))
+        build(_sources(meshes), tmp_path / name, name="things", workers=1 + (name == "b"))
     assert _contents(tmp_path / "a") == _contents(tmp_path / "b")
 
 
@@ -157,7 +162,7 @@ def test_one_broken_mesh_fails_alone(meshes: Path, tmp_path: Path) -> None:
         ObjectSource.from_file(meshes / "missing.obj"),
         ObjectSource(name="nothing", mesh=_box(), mass=0.0),
     ]
-    report = build_library(sources, tmp_path / "lib", progress=lambda *event: seen.append(event))
+    report = build(sources, tmp_path / "lib", progress=lambda *event: seen.append(event))
     assert report.built == ("box", "can")
     assert report.failed == {
         "broken": f"{meshes / 'broken.obj'}: the mesh file has no triangles",
@@ -170,9 +175,9 @@ def test_one_broken_mesh_fails_alone(meshes: Path, tmp_path: Path) -> None:
 
 
 def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> None:
-    build_library(_sources(meshes), tmp_path / "lib")
+    build(_sources(meshes), tmp_path / "lib")
     (meshes / "Box.stl").write_bytes(b"")
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     assert list(report.failed) == ["box"]
     assert report.library.path(report.library.entry("box").sdf).is_file()
 
@@ -180,15 +185,15 @@ def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> Non
 def test_programming_errors_in_one_object_do_not_stop_the_others(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = stages.convex_pieces
+    original = geometry.convex_pieces
 
     def fails_for_cans(surface, *args):  # type: ignore[no-untyped-def]
         if len(surface.vertices) > 8:
             raise RuntimeError("unheard of\nwith details")
         return original(surface, *args)
 
-    monkeypatch.setattr(stages, "convex_pieces", fails_for_cans)
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    monkeypatch.setattr(geometry, "convex_pieces", fails_for_cans)
+    report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
     assert report.failed == {"can": "RuntimeError: unheard of"}
 
@@ -200,9 +205,9 @@ def test_a_kill_loses_nothing_that_was_finished(
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        build_library(_sources(meshes), tmp_path / "lib", progress=killed)
+        build(_sources(meshes), tmp_path / "lib", progress=killed)
     assert len(load_library(tmp_path / "lib").objects) == 1
-    report = build_library(_sources(meshes), tmp_path / "lib")
+    report = build(_sources(meshes), tmp_path / "lib")
     assert len(report.cached) == 1
     assert len(report.built) == 1
 
@@ -210,8 +215,13 @@ def test_a_kill_loses_nothing_that_was_finished(
 def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path) -> None:
     dead = tmp_path / "lib" / f"{SCRATCH}999999999-abc"
     (dead / "box").mkdir(parents=True)
-    build_library(_sources(meshes), tmp_path / "lib")
-    assert sorted(p.name for p in (tmp_path / "lib").iterdir()) == ["box", "can", "library.yaml"]
+    build(_sources(meshes), tmp_path / "lib")
+    assert sorted(p.name for p in (tmp_path / "lib").iterdir()) == [
+        "box",
+        "can",
+        "library.yaml",
+        "package.xml",
+    ]
 
 
 def test_names_that_collide(meshes: Path, tmp_path: Path) -> None:
@@ -219,47 +229,57 @@ def test_names_that_collide(meshes: Path, tmp_path: Path) -> None:
     with pytest.raises(
         InvalidInputError, match=r"2 meshes make the same object 'box': .*Box\.stl, "
     ):
-        build_library([meshes / "Box.stl", meshes / "box.ply"], tmp_path / "lib")
+        build([meshes / "Box.stl", meshes / "box.ply"], tmp_path / "lib")
 
 
 def test_places_that_cannot_be_written_to(meshes: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidInputError, match=r"cannot write to folder .*file"):
-        build_library(_sources(meshes), tmp_path / "file")
+        build(_sources(meshes), tmp_path / "file")
 
 
 def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
     halves = tuple(_box((0.05, 0.06, 0.03)).apply_translation([x, 0, 0]) for x in (-0.025, 0.025))
-    source = ObjectSource(name="box", mesh=_box(), pieces=halves, mass=0.1)
-    report = build_library([source], tmp_path / "lib")
+    source = ObjectSource(name="box", mesh=_box(), pieces=halves, mass=0.1, contact="pieces")
+    report = build([source], tmp_path / "lib")
     entry = report.library.entry("box")
     assert len(entry.pieces) == 2
     assert report.library.path(entry.sdf).read_text().count("<drake:declare_convex/>") == 2
 
 
-def test_open_meshes_take_their_volume_from_the_pieces(tmp_path: Path) -> None:
+def test_open_meshes_become_walls(tmp_path: Path) -> None:
     lidless = _box()
     lidless.update_faces(lidless.triangles_center[:, 2] < 0.0149)
-    source = ObjectSource(name="box", mesh=lidless, pieces=(_box(),), mass=0.1)
-    report = build_library([source], tmp_path / "lib")
+    source = ObjectSource(name="box", mesh=lidless, mass=0.1, wall_thickness=0.001)
+    report = build([source], tmp_path / "lib")
     properties = report.library.entry("box").mass_properties
-    assert properties.volume == pytest.approx(0.1 * 0.06 * 0.03, rel=1e-6)
-    assert report.notes["box"] == (
-        "the mesh is not closed; its volume is that of the convex pieces",
-    )
+    area = 0.1 * 0.06 + 2.0 * (0.1 + 0.06) * 0.03
+    assert properties.volume == pytest.approx(0.001 * area, rel=0.05)
+    assert properties.wall_thickness == 0.001
+    assert properties.center_of_mass[2] < -0.004  # lower than that of the full box
+
+
+def test_closed_meshes_become_hollow(tmp_path: Path) -> None:
+    source = ObjectSource(name="box", mesh=_box(), mass=0.1, wall_thickness=0.002)
+    properties = build([source], tmp_path / "lib").library.entry("box").mass_properties
+    outer, inner = (0.1, 0.06, 0.03), (0.096, 0.056, 0.026)
+    assert properties.volume == pytest.approx(np.prod(outer) - np.prod(inner), rel=1e-6)
+    assert properties.mass == 0.1
 
 
 def test_fifty_unchanged_objects_take_less_than_a_second(tmp_path: Path) -> None:
     mesh = _box()
-    sources = [ObjectSource(name=f"box_{i}", mesh=mesh, mass=0.1) for i in range(50)]
-    build_library(sources, tmp_path / "lib")
+    sources = [
+        ObjectSource(name=f"box_{i}", mesh=mesh, mass=0.1, contact="pieces") for i in range(50)
+    ]
+    build(sources, tmp_path / "lib")
     start = time.process_time()
-    assert len(build_library(sources, tmp_path / "lib").cached) == 50
+    assert len(build(sources, tmp_path / "lib").cached) == 50
     assert time.process_time() - start < 1.0
 
 
 def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> None:
-    build_library(_sources(meshes), tmp_path / "lib")
+    build(_sources(meshes), tmp_path / "lib")
     umask = os.umask(0)
     os.umask(umask)
     assert (tmp_path / "lib/box").stat().st_mode & 0o777 == 0o777 & ~umask
@@ -270,7 +290,62 @@ def test_another_coacd_version_cuts_again_what_it_cut(
 ) -> None:
     given = ObjectSource(name="given", mesh=_box(), pieces=(_box(),), mass=0.1)
     sources = [*_sources(meshes), given]
-    build_library(sources, tmp_path / "lib")
-    monkeypatch.setattr(stages.metadata, "version", lambda name: f"another {name}")
-    report = build_library(sources, tmp_path / "lib")
+    build(sources, tmp_path / "lib")
+    monkeypatch.setattr(keys.metadata, "version", lambda name: f"another {name}")
+    report = build(sources, tmp_path / "lib")
     assert (report.built, report.cached) == (("box", "can"), ("given",))
+
+
+def test_stable_poses_are_confirmed_in_simulation(tmp_path: Path) -> None:
+    source = ObjectSource(name="box", mesh=_box(), mass=0.1)
+    poses = build_library([source], tmp_path / "lib").library.entry("box").stable_poses
+    assert len(poses) == 3
+    assert all(pose.residual is not None and pose.residual < np.deg2rad(1.0) for pose in poses)
+    assert not any(pose.rolls for pose in poses)
+    unconfirmed = build([source], tmp_path / "lib")
+    assert unconfirmed.built == ("box",)
+    assert all(p.residual is None for p in unconfirmed.library.entry("box").stable_poses)
+
+
+def test_a_new_mass_needs_no_new_simulation(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = _sources(meshes)[0]
+    first = build_library([source], tmp_path / "lib").library.entry("box")
+    monkeypatch.setattr(geometry, "_confirmed", None)
+    changed = replace(source, mass=2.0, friction=0.7, inertia=(2e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0))
+    second = build_library([changed], tmp_path / "lib").library.entry("box")
+    assert second.stable_poses == first.stable_poses
+    assert second.mass_properties.overridden == ("inertia",)
+    assert second.friction == 0.7
+
+
+def test_the_centre_of_mass_decides_how_it_rests(tmp_path: Path) -> None:
+    tall = _box((0.04, 0.04, 0.2))
+    source = ObjectSource(name="post", mesh=tall, mass=0.1, center_of_mass=(0.0, 0.0, -0.09))
+    report = build([source], tmp_path / "lib")
+    entry = report.library.entry("post")
+    assert entry.mass_properties.center_of_mass == (0.0, 0.0, -0.09)
+    upright = [p for p in entry.stable_poses if p.X_SO.matrix()[2, 2] > 0.99]
+    solid_angle = 4.0 * np.arctan(0.02 * 0.02 / (0.01 * np.sqrt(2 * 0.02**2 + 0.01**2)))
+    assert [p.probability for p in upright] == pytest.approx([solid_angle / (4 * np.pi)], abs=2e-3)
+    assert not [p for p in entry.stable_poses if p.X_SO.matrix()[2, 2] < -0.99]
+
+
+def test_where_a_mesh_came_from_is_told_from_the_library(meshes: Path, tmp_path: Path) -> None:
+    entry = build(_sources(meshes), tmp_path / "lib").library.entry("can")
+    assert (entry.source.file, entry.source.path) == ("can.obj", "../meshes/can.obj")
+
+
+def test_a_library_is_a_package(meshes: Path, tmp_path: Path) -> None:
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    build(_sources(meshes), tmp_path / "lib", name="My Things")
+    moved = tmp_path / "moved"
+    (tmp_path / "lib").rename(moved)
+    plant = MultibodyPlant(0.001)
+    parser = Parser(plant)
+    parser.package_map().AddPackageXml(str(moved / "package.xml"))
+    (model,) = parser.AddModelsFromUrl("package://my_things/can/can.sdf")
+    assert plant.HasBodyNamed("body", model)

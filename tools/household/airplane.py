@@ -33,7 +33,7 @@ FUSELAGE = np.array(
 )
 # radius, distance before the front of the fuselage [m]
 SPINNER = ((0.0125, -0.002), (0.0118, 0.005), (0.0090, 0.011), (0.0045, 0.0145), (0.0, 0.0155))
-WHEELS = ((0.022, -0.040), (0.022, 0.040), (0.088, 0.0))  # x, y [m]
+WHEELS = ((0.008, -0.040), (0.008, 0.040), (0.088, 0.0))  # x, y [m]
 WHEEL_RADIUS, WHEEL_WIDTH = 0.013, 0.011  # [m]
 CANOPY = ((0.040, 0.0, AXIS + 0.0235), (0.030, 0.0165, 0.0170))  # centre, half axes [m]
 

@@ -1,0 +1,95 @@
+"""Runs the verbs of `burg-drake library` that look: list, check, show."""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from burg_drake.objects.library import ObjectLibrary
+
+
+def run_list(arguments: argparse.Namespace) -> int:
+    """Prints a library as a table."""
+    from burg_drake.objects.library import load_library
+
+    library = load_library(arguments.library)
+    print_library(library)
+    count = len(library.objects)
+    print(f"{count} object{'' if count == 1 else 's'} in {library.root}")
+    return 0
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Prints what is wrong with a library; 1 if there are errors."""
+    from burg_drake.objects.library import load_library
+    from burg_drake.pipeline.check import check_library
+
+    library = load_library(arguments.library)
+    issues = check_library(library)
+    for issue in issues:
+        where = f"{issue.object}: " if issue.object else ""
+        print(f"{'error' if issue.is_error else 'warning'}: {where}{issue.kind}: {issue.message}")
+    errors = sum(issue.is_error for issue in issues)
+    count = len(library.objects)
+    print(
+        f"{library.root}: {count} object{'' if count == 1 else 's'}, {errors} errors,"
+        f" {len(issues) - errors} warnings"
+    )
+    return 1 if errors else 0
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Shows a library in Meshcat, or writes pages of it."""
+    from burg_drake.apps.live import open_view, present
+    from burg_drake.objects.library import load_library
+    from burg_drake.pipeline.check import check_library
+    from burg_drake.visualization.contact_sheet import write_contact_sheet
+    from burg_drake.visualization.gallery import show_library
+
+    library = load_library(arguments.library)
+    for name in arguments.only or ():
+        library.entry(name)
+    if arguments.sheet is not None:
+        remarks: dict[str, list[str]] = defaultdict(list)
+        for issue in check_library(library):
+            remarks[issue.object].append(issue.message)
+        write_contact_sheet(library, arguments.sheet, arguments.only, remarks=remarks)
+        print(f"wrote {arguments.sheet}")
+        if arguments.html is None:
+            return 0
+    meshcat = open_view(arguments)
+    legend = show_library(library, meshcat, arguments.only)
+    count = len(arguments.only or library.objects)
+    present(meshcat, arguments, title=library.name, caption=[f"{count} objects"], legend=legend)
+    return 0
+
+
+def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> None:
+    """Prints objects as a table."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = library.objects if only is None else [n for n in library.objects if n in set(only)]
+    table = Table(box=box.SIMPLE_HEAD, title_justify="left")
+    table.add_column("object", no_wrap=True)
+    for column in ("mass [g]", "size [mm]", "mu", "pieces", "poses"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name in shown:
+        entry = library.objects[name]
+        size = [1e3 * (b - a) for a, b in zip(entry.lower, entry.upper, strict=True)]
+        mass = f"{1e3 * entry.mass:.1f}"
+        table.add_row(
+            name,
+            mass if entry.mass_properties.source == "given" else f"~{mass}",
+            " x ".join(f"{s:.0f}" for s in size),
+            f"{entry.friction:g}",
+            str(len(entry.pieces)),
+            str(len(entry.stable_poses)),
+        )
+    Console().print(table)
+    if any(library.objects[n].mass_properties.source == "density" for n in shown):
+        print("~ mass from volume and density; give the true one with --mass NAME=KG")

@@ -1,0 +1,66 @@
+"""Worker processes: fresh interpreters that talk over a pipe.
+
+Unlike multiprocessing's they never import the user's main module, so that scripts and notebooks
+need no special guard; and they are never forked, which Drake does not survive.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from multiprocessing.connection import Connection, Pipe
+
+ONE_THREAD = {
+    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
+}
+"""Environment of a worker: parallelism is in the processes, and sums keep their order."""
+
+
+def default_workers() -> int:
+    """Number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
+    """Starts a process with our import path.
+
+    An interrupt from the keyboard reaches the whole group of processes. Workers start with it
+    blocked: the parent alone decides what it means.
+
+    Args:
+        module: has a function `main(handle: int)`, called with the file descriptor of its end of
+            the pipe.
+
+    Returns:
+        The process and our end of the pipe.
+    """
+    ours, theirs = Pipe()
+    program = (
+        f"import sys; sys.path[:] = {sys.path!r};"
+        f" from {module} import main; main({theirs.fileno()})"
+    )
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", program],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=[theirs.fileno()],
+            env={**os.environ, **ONE_THREAD},
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    theirs.close()
+    return process, ours
+
+
+def cause_of_death(process: subprocess.Popen[bytes], last_words: str = "") -> str:
+    """Why a worker process ended, in half a sentence; waits for its end."""
+    code = process.wait()
+    if code < 0:
+        return f"the worker process was ended by {signal.Signals(-code).name}"
+    return f"the worker process ended: {last_words or f'exit code {code}'}"

@@ -1,0 +1,147 @@
+"""Turns YAML nodes, which know their line, into typed values; every error names file, line, key."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+import types
+import typing
+from typing import Any
+
+import yaml
+
+from burg_drake.core.errors import DocumentError, InvalidInputError, nearest
+
+
+class Reader:
+    """Turns YAML nodes into typed values; every error names file, line and key."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def fail(self, node: yaml.Node, where: str, what: str) -> DocumentError:
+        key = f" {where}:" if where else ""
+        return DocumentError(f"{self.name}:{node.start_mark.line + 1}:{key} {what}")
+
+    def check_version(self, node: yaml.MappingNode, schema: type) -> None:
+        current = next(f.default for f in dataclasses.fields(schema) if f.name == "version")
+        for key, value in node.value:
+            if key.value == "version":
+                given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
+                if given != str(current):
+                    what = f"{given} cannot be read; this release reads version {current}"
+                    raise self.fail(value, "version", what)
+                return
+        raise self.fail(node, "version", f"missing; add 'version: {current}'")
+
+    def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
+        origin = typing.get_origin(kind)
+        if origin in (typing.Union, types.UnionType):
+            return self.read_optional(node, kind, where)
+        if origin is typing.Literal:
+            allowed = [str(a) for a in typing.get_args(kind)]
+            return self.choice(node, where, dict(zip(allowed, typing.get_args(kind), strict=True)))
+        if origin in (list, tuple):
+            return self.read_sequence(node, kind, origin, where)
+        if origin is dict:
+            return self.read_dict(node, typing.get_args(kind)[1], where)
+        if dataclasses.is_dataclass(kind):
+            return self.read_dataclass(node, typing.cast(type, kind), where)
+        if isinstance(kind, type) and issubclass(kind, enum.Enum):
+            return self.choice(node, where, {str(m.value): m for m in kind})
+        return self.read_scalar(node, kind, where)
+
+    def read_optional(self, node: yaml.Node, kind: Any, where: str) -> Any:
+        options = [a for a in typing.get_args(kind) if a is not type(None)]
+        if node.tag == "tag:yaml.org,2002:null":
+            return None
+        if len(options) != 1:
+            raise TypeError(f"schema type {kind} is not supported")
+        return self.read(node, options[0], where)
+
+    def choice(self, node: yaml.Node, where: str, options: dict[str, Any]) -> Any:
+        if not isinstance(node, yaml.ScalarNode) or node.value not in options:
+            given = node.value if isinstance(node, yaml.ScalarNode) else "a structure"
+            raise self.fail(node, where, f"{given!r} is not valid; {nearest(str(given), options)}")
+        return options[node.value]
+
+    def read_sequence(self, node: yaml.Node, kind: Any, origin: Any, where: str) -> Any:
+        if not isinstance(node, yaml.SequenceNode):
+            raise self.fail(node, where, "expected a list such as [a, b, c]")
+        arguments = typing.get_args(kind)
+        if origin is tuple and Ellipsis not in arguments:
+            if len(node.value) != len(arguments):
+                raise self.fail(
+                    node, where, f"has {len(node.value)} entries; expected {len(arguments)}"
+                )
+            kinds = list(arguments)
+        else:
+            kinds = [arguments[0]] * len(node.value)
+        pairs = enumerate(zip(node.value, kinds, strict=True))
+        return origin(self.read(item, k, f"{where}[{i}]") for i, (item, k) in pairs)
+
+    def entries(self, node: yaml.Node, where: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+        if not isinstance(node, yaml.MappingNode):
+            raise self.fail(node, where, "expected keys with values ('key: value' lines)")
+        found: dict[str, tuple[yaml.Node, yaml.Node]] = {}
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise self.fail(key, where, "a key has to be a text, not a structure")
+            if key.value in found:
+                raise self.fail(key, where, f"key {key.value!r} is given twice")
+            found[key.value] = (key, value)
+        return found
+
+    def read_dict(self, node: yaml.Node, kind: Any, where: str) -> dict[str, Any]:
+        prefix = f"{where}." if where else ""
+        return {
+            name: self.read(value, kind, f"{prefix}{name}")
+            for name, (_, value) in self.entries(node, where).items()
+        }
+
+    def read_dataclass(self, node: yaml.Node, kind: type, where: str) -> Any:
+        entries = self.entries(node, where)
+        hints = typing.get_type_hints(kind)
+        fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
+        prefix = f"{where}." if where else ""
+        for name, (key, _) in entries.items():
+            if name not in fields:
+                raise self.fail(key, where, f"unknown key {name!r}; {nearest(name, fields)}")
+        for name, field in fields.items():
+            if name not in entries and field.default is field.default_factory:
+                raise self.fail(node, where, f"key {name!r} is missing")
+        values = {
+            name: self.read(value, hints[name], f"{prefix}{name}")
+            for name, (_, value) in entries.items()
+        }
+        try:
+            return kind(**values)
+        except DocumentError:
+            raise
+        except InvalidInputError as error:
+            raise self.fail(node, where, str(error)) from error
+
+    def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
+        expected = {
+            bool: "true or false",
+            int: "a whole number",
+            float: "a finite number",
+            str: "a text",
+        }
+        if kind not in expected:
+            raise TypeError(f"schema type {kind} is not supported")
+        if not isinstance(node, yaml.ScalarNode) or node.tag == "tag:yaml.org,2002:null":
+            raise self.fail(node, where, f"expected {expected[kind]}")
+        if kind is str:
+            return node.value
+        if kind is bool and node.value.lower() in ("true", "false"):
+            return node.value.lower() == "true"
+        try:
+            if kind is not bool:
+                value = kind(node.value)
+                if math.isfinite(value):
+                    return value
+        except (ValueError, OverflowError):
+            pass
+        raise self.fail(node, where, f"{node.value!r} is not {expected[kind]}")

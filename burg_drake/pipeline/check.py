@@ -1,0 +1,198 @@
+"""What is missing, stale or implausible in an object library."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.objects.entry import ObjectEntry
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.objects.mass import implausible
+from burg_drake.objects.sdf import model_sdf
+from burg_drake.pipeline.record import Record, file_hashes, is_object_folder, read_record
+
+IssueKind = Literal["missing", "changed", "stale", "broken", "implausible", "unsure"]
+
+MOST_VOLUME = 1.25
+"""Volume of the convex pieces over that of the surface from which on they are called coarse."""
+
+MOST_DEVIATION = 0.05
+"""Hausdorff distance over the object's diagonal from which on the pieces are called coarse."""
+
+USUAL_FRICTION = (0.05, 1.5)
+"""Coefficients of dry household materials, ice and soft rubber left out."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LibraryIssue:
+    """Something about a library that its user should know.
+
+    Attributes:
+        object: name of the object; empty where it is about the library's folder.
+        kind: `missing` or `changed` files, `stale` against its source or this release, `broken`
+            for Drake: errors. `implausible` values, `unsure` ones that were assumed: warnings.
+        message: one clear line.
+    """
+
+    object: str
+    kind: IssueKind
+    message: str
+
+    @property
+    def is_error(self) -> bool:
+        """The object cannot be trusted as it is."""
+        return self.kind in ("missing", "changed", "stale", "broken")
+
+
+def check_library(library: ObjectLibrary) -> tuple[LibraryIssue, ...]:
+    """Checks all objects of a library; nothing is changed.
+
+    Args:
+        library: the library.
+
+    Returns:
+        What was found, object by object, errors first; nothing if all is well.
+    """
+    issues: list[LibraryIssue] = []
+    for name, entry in library.objects.items():
+        found = [*_file_issues(library, name, entry), *_value_issues(name, entry)]
+        issues += sorted(found, key=lambda issue: not issue.is_error)
+    for folder in sorted(p for p in library.root.iterdir() if p.is_dir()):
+        if folder.name not in library.objects and is_object_folder(folder):
+            text = f"{folder} is an object that library.yaml does not list; add it again"
+            issues.append(LibraryIssue(object="", kind="missing", message=text))
+    return tuple(issues)
+
+
+def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
+    home = library.root / Path(entry.sdf).parent
+    record = read_record(home)
+    missing = [p for p in entry.files if not (library.root / p).is_file()]
+    if missing:
+        more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+        yield _issue(
+            name, "missing", f"{library.root / missing[0]} is missing{more}; build it again"
+        )
+    if record is None:
+        text = f"{home} was built by another release; build it again"
+        yield _issue(name, "stale", text)
+    else:
+        yield from _record_issues(library, name, entry, record, home)
+    if (library.root / entry.source.path).is_file() and entry.source.path:
+        source = library.root / entry.source.path
+        if hashlib.sha256(source.read_bytes()).hexdigest() != entry.source.sha256:
+            yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
+    if not missing:
+        complaint = drake_complaint(library.root / entry.sdf)
+        if complaint:
+            yield _issue(name, "broken", f"Drake about {library.root / entry.sdf}: {complaint}")
+
+
+def _record_issues(
+    library: ObjectLibrary, name: str, entry: ObjectEntry, record: Record, home: Path
+) -> Iterator[LibraryIssue]:
+    found = file_hashes(home)
+    changed = sorted(f for f, sha in record.files.items() if found.get(f, sha) != sha)
+    if changed:
+        more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
+        text = f"{home / changed[0]} was changed after it was built{more}; build it again"
+        yield _issue(name, "changed", text)
+    if record.keys.build != entry.build:
+        text = f"{home} and library.yaml are of different builds; build it again"
+        yield _issue(name, "stale", text)
+        return
+    base = home.relative_to(library.root).as_posix()
+    sdf = model_sdf(
+        name,
+        entry.mass_properties,
+        entry.friction,
+        entry.mesh.removeprefix(f"{base}/"),
+        [piece.removeprefix(f"{base}/") for piece in entry.pieces],
+        record.geometry.contact,
+    )
+    if record.files.get(Path(entry.sdf).name) != hashlib.sha256(sdf.encode()).hexdigest():
+        text = f"library.yaml says other than {entry.sdf}; change values by building it again"
+        yield _issue(name, "changed", text)
+
+
+def _value_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
+    properties = entry.mass_properties
+    for sentence in implausible(properties, entry.lower, entry.upper):
+        yield _issue(name, "implausible", sentence)
+    if properties.source == "density":
+        density = properties.mass / properties.volume
+        text = f"mass {properties.mass:.3g} kg was not given; it follows from {density:.0f} kg/m^3"
+        yield _issue(name, "unsure", text)
+    low, high = USUAL_FRICTION
+    if not low <= entry.friction <= high:
+        text = f"friction {entry.friction:g} is not that of household materials ({low} to {high})"
+        yield _issue(name, "implausible", text)
+    yield from _fit_issues(name, entry)
+    yield from _pose_issues(name, entry)
+
+
+def _fit_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
+    if entry.fit is None:
+        text = "the surface is not closed; volume and inertia are those of the convex pieces"
+        yield _issue(name, "unsure", text)
+        return
+    diagonal = float(np.linalg.norm(np.subtract(entry.upper, entry.lower)))
+    if entry.fit.volume_ratio > MOST_VOLUME or entry.fit.hausdorff > MOST_DEVIATION * diagonal:
+        text = (
+            f"the convex pieces are coarse: {entry.fit.volume_ratio:.2f} times the volume,"
+            f" up to {1e3 * entry.fit.hausdorff:.1f} mm off; a lower decomposition.threshold"
+            " cuts finer"
+        )
+        yield _issue(name, "implausible", text)
+
+
+def _pose_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
+    total = sum(pose.probability for pose in entry.stable_poses)
+    if abs(total - 1.0) > 1e-3:
+        text = f"probabilities of the stable poses sum to {total:.3f} instead of 1"
+        yield _issue(name, "implausible", text)
+    if any(pose.residual is None for pose in entry.stable_poses):
+        text = "its stable poses were not confirmed in simulation"
+        yield _issue(name, "unsure", text)
+
+
+def _issue(name: str, kind: IssueKind, message: str) -> LibraryIssue:
+    return LibraryIssue(object=name, kind=kind, message=message)
+
+
+class _Remarks(logging.Handler):
+    """Collects what is logged."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(record.getMessage())
+
+
+def drake_complaint(sdf: Path) -> str:
+    """What Drake's parser says against a model: its error or first warning; empty if nothing."""
+    from pydrake.geometry import SceneGraph
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    plant, graph = MultibodyPlant(0.001), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(graph)
+    remarks = _Remarks()
+    logger = logging.getLogger("drake")
+    logger.addHandler(remarks)
+    try:
+        Parser(plant).AddModels(str(sdf))
+        plant.Finalize()
+    except (RuntimeError, SystemExit) as error:
+        return " ".join(str(error).split())
+    finally:
+        logger.removeHandler(remarks)
+    return " ".join(remarks.texts[0].split()) if remarks.texts else ""

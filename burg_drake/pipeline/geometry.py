@@ -1,0 +1,197 @@
+"""An object's geometry: surface, convex pieces, what touches, volume, stable poses, visual."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import trimesh
+
+from burg_drake.core.files import atomic_write
+from burg_drake.core.frames import Array
+from burg_drake.core.schema import Vector3
+from burg_drake.objects.contact import contact_geometry
+from burg_drake.objects.decompose import convex_pieces, given_pieces
+from burg_drake.objects.entry import ContactGeometry, ObjectEntry, Source, StablePose
+from burg_drake.objects.fit import measure_fit
+from burg_drake.objects.library import LibraryDocument, ObjectLibrary
+from burg_drake.objects.mass import Solid, mass_properties, solid_of_pieces, solid_of_surface
+from burg_drake.objects.meshes import Preparation, SurfaceMesh, load_mesh, texture_image
+from burg_drake.objects.obj_file import write_piece, write_visual
+from burg_drake.objects.primitive import primitive_mesh
+from burg_drake.objects.sdf import model_sdf
+from burg_drake.objects.shell import solid_of_shell
+from burg_drake.objects.stable_poses import stable_poses
+from burg_drake.pipeline.keys import StageKeys
+from burg_drake.pipeline.record import Geometry, read_record
+from burg_drake.pipeline.source import ObjectSource
+
+MESH_FILE = "mesh.obj"
+SURFACE_FILE = "surface.obj"
+PIECES_FOLDER = "pieces"
+PIECE_DECIMALS = 7
+"""Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
+
+RESTING_DENSITY = 300.0
+"""Density of the objects whose resting is simulated [kg/m^3]: whether a pose is stable does not
+depend on it, and a new mass shall not need a new simulation."""
+
+RESTING_FRICTION = 0.5
+"""Friction of the same; it does not decide which pose is stable on a horizontal plane either."""
+
+Pieces = tuple[trimesh.Trimesh, ...]
+
+
+def build_geometry(
+    source: ObjectSource,
+    keys: StageKeys,
+    home: Path,
+    folder: Path,
+    confirm: bool,
+    seconds: dict[str, float],
+) -> Geometry:
+    """Builds everything but the final SDF.
+
+    Args:
+        source: what to build.
+        keys: its stage keys.
+        home: the object's folder in the library; pieces in it are used again where they can.
+        folder: where to write; has the object's name.
+        confirm: simulate the stable poses.
+        seconds: gets the CPU time by stage.
+
+    Raises:
+        BurgError: the object cannot be built.
+    """
+    with _timed(seconds, "mesh"):
+        preparation = Preparation(wall_thickness=source.wall_thickness, openings=source.openings)
+        mesh = load_mesh(source.mesh, source.scale, preparation)
+    with _timed(seconds, "pieces"):
+        pieces, child = _pieces(source, keys, home, mesh)
+        names = tuple(f"{PIECES_FOLDER}/{i:03d}.obj" for i in range(len(pieces)))
+        for name, piece in zip(names, pieces, strict=True):
+            write_piece(piece, folder / name)
+    seconds["pieces"] += child
+    with _timed(seconds, "mass"):
+        solid, wall = _solid(source, mesh, pieces)
+    with _timed(seconds, "fit"):
+        fit = measure_fit(mesh.surface, pieces, mesh.surface.volume) if mesh.closed else None
+        contact, _ = contact_geometry(source.contact, mesh.surface, mesh.closed, pieces, folder)
+    with _timed(seconds, "visual"):
+        image = texture_image(mesh.visual)
+        rgba = source.rgba if source.rgba is not None else mesh.rgba
+        write_visual(mesh.visual, folder / MESH_FILE, rgba=rgba, image=image)
+        apart = mesh.wall is not None or len(mesh.surface.faces) != len(mesh.visual.faces)
+        if apart:
+            write_piece(mesh.surface, folder / SURFACE_FILE)
+    with _timed(seconds, "stable_poses"):
+        p_OOcm = solid.p_OOcm if source.center_of_mass is None else np.array(source.center_of_mass)
+        poses = stable_poses(mesh.surface, _support(contact, pieces), p_OOcm)
+    lower, upper = mesh.surface.bounds
+    geometry = Geometry(
+        repairs=mesh.repairs,
+        surface=SURFACE_FILE if apart else "",
+        closed=mesh.closed,
+        wall=wall,
+        lower=_vector(lower),
+        upper=_vector(upper),
+        volume=solid.volume,
+        p_OOcm=_vector(solid.p_OOcm),
+        G_OOcm=tuple(solid.G_OOcm.reshape(-1).tolist()),
+        pieces=names,
+        fit=fit,
+        contact=contact,
+        stable_poses=poses,
+    )
+    if not confirm:
+        return geometry
+    with _timed(seconds, "confirm"):
+        poses, notes = _confirmed(source, geometry, folder)
+    return replace(geometry, stable_poses=poses, notes=notes)
+
+
+def _pieces(
+    source: ObjectSource, keys: StageKeys, home: Path, mesh: SurfaceMesh
+) -> tuple[Pieces, float]:
+    """The pieces, rounded as they are written, and the CPU time of child processes [s]."""
+    before = read_record(home)
+    if before is not None and before.keys.pieces == keys.pieces:
+        files = [home / name for name in before.geometry.pieces]
+        if all(file.exists() for file in files):
+            return tuple(trimesh.load_mesh(file, process=False) for file in files), 0.0
+    if source.pieces is not None:
+        pieces = given_pieces(source.pieces)
+    else:
+        pieces = convex_pieces(mesh.surface, mesh.closed, source.decomposition)
+    rounded = (np.round(p.vertices, PIECE_DECIMALS) + 0.0 for p in pieces.meshes)
+    meshes = (
+        trimesh.Trimesh(vertices, piece.faces, process=False)
+        for vertices, piece in zip(rounded, pieces.meshes, strict=True)
+    )
+    return tuple(meshes), pieces.seconds
+
+
+def _solid(
+    source: ObjectSource, mesh: SurfaceMesh, pieces: Sequence[trimesh.Trimesh]
+) -> tuple[Solid, float | None]:
+    """The material, and the thickness of its wall if it is hollow [m]."""
+    if not mesh.closed:
+        return solid_of_pieces(pieces), None
+    if mesh.wall is not None or source.wall_thickness is None:
+        return solid_of_surface(mesh.surface), mesh.wall
+    return solid_of_shell(mesh.surface, source.wall_thickness), source.wall_thickness
+
+
+def _support(contact: ContactGeometry, pieces: Pieces) -> Array:
+    """(N, 3) points of O whose hull rests on a plane [m]."""
+    if contact.primitive is not None:
+        return np.asarray(primitive_mesh(contact.primitive).vertices)
+    return np.vstack([piece.vertices for piece in pieces])
+
+
+def _confirmed(
+    source: ObjectSource, geometry: Geometry, folder: Path
+) -> tuple[tuple[StablePose, ...], tuple[str, ...]]:
+    """The poses that stand the test of simulation, and remarks on the others."""
+    from burg_drake.simulation.resting import confirm_poses  # imports Drake
+
+    properties = mass_properties(
+        geometry.solid, density=RESTING_DENSITY, center_of_mass=source.center_of_mass
+    )
+    name = source.name
+    sdf = model_sdf(
+        name, properties, RESTING_FRICTION, MESH_FILE, geometry.pieces, geometry.contact
+    )
+    atomic_write(folder / f"{name}.sdf", sdf)
+    entry = ObjectEntry(
+        mesh=f"{name}/{MESH_FILE}",
+        sdf=f"{name}/{name}.sdf",
+        pieces=tuple(f"{name}/{piece}" for piece in geometry.pieces),
+        contact=geometry.contact,
+        friction=RESTING_FRICTION,
+        lower=geometry.lower,
+        upper=geometry.upper,
+        mass_properties=properties,
+        stable_poses=geometry.stable_poses,
+        source=Source(file="", sha256=""),
+        build="",
+    )
+    document = LibraryDocument(name="resting", objects={name: entry})
+    confirmation = confirm_poses(ObjectLibrary(document, folder.parent), name)
+    return confirmation.poses, confirmation.notes
+
+
+def _vector(values: Any) -> Vector3:
+    return cast(Vector3, tuple(np.asarray(values, dtype=float).tolist()))
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.thread_time()
+    yield
+    seconds[stage] = time.thread_time() - start

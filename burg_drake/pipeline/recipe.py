@@ -1,0 +1,253 @@
+"""The recipe of a library, `objects.yaml`: which meshes, and what the meshes cannot tell.
+
+    version: 1
+    defaults:
+      unit: mm
+      friction: 0.4
+    objects:
+      mug:
+        mesh: scans/mug.stl
+        mass: 0.118
+      tray:
+        mesh: cad/tray.obj
+        unit: cm
+        density: 900
+        wall_thickness: 0.002
+
+Paths are relative to the document. An object's own values go before the defaults; its mass goes
+before a default density, its unit before a default scale, and the other way about.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import yaml
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.reader import Reader
+from burg_drake.core.schema import Vector3
+from burg_drake.core.yaml_nodes import load_nodes
+from burg_drake.objects.entry import ContactKind, Decomposition, Inertia
+from burg_drake.objects.meshes import UNITS
+from burg_drake.objects.obj_file import Rgba
+from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource, Openings, object_name
+
+Unit = Literal["mm", "cm", "m", "in"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cutting:
+    """Parameters of the convex decomposition that differ from the pipeline's; see `Decomposition`.
+
+    Attributes:
+        threshold, join, max_vertices, tolerance, min_thickness, timeout, seed: as there.
+    """
+
+    threshold: float | None = None
+    join: float | None = None
+    max_vertices: int | None = None
+    tolerance: float | None = None
+    min_thickness: float | None = None
+    timeout: float | None = None
+    seed: int | None = None
+
+    def parameters(self) -> Decomposition:
+        """With the pipeline's values where there are none."""
+        return Decomposition(**_given(self))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Defaults:
+    """What holds for every object that does not say otherwise.
+
+    Attributes:
+        unit: of the mesh.
+        scale: factor from the mesh's unit to metres, in place of `unit`.
+        density: of the material, for objects without a mass [kg/m^3].
+        friction: coefficient.
+        wall_thickness: of a hollow object, or of an open surface [m].
+        openings: what becomes of an open surface: `wall` or `close`.
+        contact: what of the object touches others in simulation.
+        decomposition: parameters of the convex decomposition.
+        rgba: colour, 0 to 1 each.
+    """
+
+    unit: Unit | None = None
+    scale: float | None = None
+    density: float | None = None
+    friction: float | None = None
+    wall_thickness: float | None = None
+    openings: Openings | None = None
+    contact: ContactKind | None = None
+    decomposition: Cutting | None = None
+    rgba: Rgba | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit is not None and self.scale is not None:
+            raise InvalidInputError("give unit or scale, not both")
+        for label, unit in (("scale", ""), ("density", " kg/m^3"), ("wall_thickness", " m")):
+            _check_positive(label, getattr(self, label), unit)
+        if self.friction is not None and self.friction < 0.0:
+            raise InvalidInputError(f"friction is {self.friction:g}; it must be 0 or more")
+        if self.rgba is not None and not all(0.0 <= c <= 1.0 for c in self.rgba):
+            raise InvalidInputError(f"rgba is {list(self.rgba)}; each must be in [0, 1]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecipeObject(Defaults):
+    """One object.
+
+    Attributes:
+        mesh: mesh file, relative to the document.
+        mass: [kg].
+        center_of_mass: `p_OOcm` [m], in place of the centroid.
+        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2].
+        description: for people.
+    """
+
+    mesh: str
+    mass: float | None = None
+    center_of_mass: Vector3 | None = None
+    inertia: Inertia | None = None
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.mesh:
+            raise InvalidInputError("mesh is empty; give a mesh file")
+        if self.mass is not None and self.density is not None:
+            raise InvalidInputError("give mass or density, not both")
+        _check_positive("mass", self.mass, " kg")
+        if self.inertia is not None and min(self.inertia[:3]) <= 0.0:
+            raise InvalidInputError(
+                f"inertia is {list(self.inertia)}; its moments Ixx, Iyy, Izz must be above 0"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecipeDocument:
+    """Schema of `objects.yaml`.
+
+    Attributes:
+        name: of the library; None for that of its folder.
+        defaults: for all objects.
+        objects: by object name.
+    """
+
+    version: int = 1
+    name: str | None = None
+    defaults: Defaults = field(default_factory=Defaults)
+    objects: dict[str, RecipeObject] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.objects:
+            raise InvalidInputError("objects is empty; add lines such as 'mug: {mesh: mug.obj}'")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A recipe on disk.
+
+    Attributes:
+        document: contents of the file.
+        root: folder that its paths start from.
+    """
+
+    document: RecipeDocument
+    root: Path
+
+    @property
+    def name(self) -> str | None:
+        """The library's name, if the recipe gives one."""
+        return self.document.name
+
+    def sources(self) -> list[ObjectSource]:
+        """What to build, in the document's order."""
+        defaults = self.document.defaults
+        return [
+            _source(name, _completed(item, defaults), self.root)
+            for name, item in self.document.objects.items()
+        ]
+
+
+def load_recipe(path: str | Path) -> Recipe:
+    """Reads a recipe.
+
+    Raises:
+        DocumentError: it cannot be read, or a key or value does not fit; the message names file,
+            line and key.
+    """
+    path = Path(path)
+    node = load_nodes(path)
+    reader = _RecipeReader(str(path))
+    if isinstance(node, yaml.MappingNode):
+        reader.check_version(node, RecipeDocument)
+    return Recipe(cast(RecipeDocument, reader.read(node, RecipeDocument, "")), path.parent)
+
+
+class _RecipeReader(Reader):
+    """Also checks the names of the objects."""
+
+    def read_dict(self, node: yaml.Node, kind: Any, where: str) -> dict[str, Any]:
+        for name, (key, _) in self.entries(node, where).items():
+            if not NAME_PATTERN.fullmatch(name):
+                raise self.fail(key, where, _bad_name(name))
+        return super().read_dict(node, kind, where)
+
+
+def _bad_name(name: str) -> str:
+    try:
+        hint = f", such as {object_name(name)!r}"
+    except InvalidInputError:
+        hint = ""
+    return f"{name!r} is no object name; use a-z, 0-9 and underscores{hint}"
+
+
+def _check_positive(label: str, value: float | None, unit: str) -> None:
+    if value is not None and value <= 0.0:
+        raise InvalidInputError(f"{label} is {value:g}{unit}; it must be above 0")
+
+
+def _given(values: Any) -> dict[str, Any]:
+    """The fields of a dataclass that are not None."""
+    pairs = ((f.name, getattr(values, f.name)) for f in dataclasses.fields(values))
+    return {name: value for name, value in pairs if value is not None}
+
+
+def _completed(item: RecipeObject, defaults: Defaults) -> RecipeObject:
+    """The object with the defaults where it says nothing."""
+    own = _given(item)
+    missing = {name: value for name, value in _given(defaults).items() if name not in own}
+    if "mass" in own:
+        missing.pop("density", None)
+    if "unit" in own or "scale" in own:
+        missing.pop("unit", None)
+        missing.pop("scale", None)
+    if item.decomposition is not None and defaults.decomposition is not None:
+        both = _given(defaults.decomposition) | _given(item.decomposition)
+        missing["decomposition"] = Cutting(**both)
+    return dataclasses.replace(item, **missing)
+
+
+def _source(name: str, item: RecipeObject, root: Path) -> ObjectSource:
+    scale = item.scale if item.scale is not None else UNITS[item.unit or "m"]
+    return ObjectSource(
+        name=name,
+        mesh=root / item.mesh,
+        mass=item.mass,
+        density=item.density,
+        center_of_mass=item.center_of_mass,
+        inertia=item.inertia,
+        wall_thickness=item.wall_thickness,
+        openings=item.openings or "wall",
+        friction=item.friction,
+        scale=scale,
+        contact=item.contact,
+        rgba=item.rgba,
+        description=item.description,
+        decomposition=(item.decomposition or Cutting()).parameters(),
+    )

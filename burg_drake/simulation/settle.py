@@ -1,0 +1,123 @@
+"""Simulates until everything is at rest, and tells what still moves and how fast."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core.frames import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestCriterion:
+    """When a body counts as at rest.
+
+    Speeds are means over the poll interval: at large time steps the momentary velocity of an object
+    at rest alternates from step to step.
+
+    Attributes:
+        speed: of its centre of mass, below this [m/s] ...
+        turning: ... and of its rotation, below this [rad/s] ...
+        duration: ... for this long [s]: something that rocks stands still twice a period.
+        poll: interval at which poses are looked at [s].
+    """
+
+    speed: float = 0.005
+    turning: float = 0.02
+    duration: float = 0.12
+    poll: float = 0.04
+
+
+@dataclass(frozen=True)
+class BodySpeed:
+    """How fast a body moves.
+
+    Attributes:
+        speed: of its centre of mass [m/s].
+        turning: of its rotation [rad/s].
+    """
+
+    speed: float
+    turning: float
+
+
+@dataclass(frozen=True)
+class Settled:
+    """How settling ended.
+
+    Attributes:
+        duration: simulated time that it took [s].
+        moving: bodies that still move at the end; none if all came to rest.
+    """
+
+    duration: float
+    moving: dict[BodyIndex, BodySpeed] = field(default_factory=dict)
+
+    @property
+    def at_rest(self) -> bool:
+        """Everything came to rest within the time allowed."""
+        return not self.moving
+
+
+def settle(
+    simulator: Simulator,
+    plant: MultibodyPlant,
+    bodies: Iterable[BodyIndex],
+    time_limit: float,
+    criterion: RestCriterion = RestCriterion(),
+) -> Settled:
+    """Advances a simulator until bodies are at rest, or time is up.
+
+    Args:
+        simulator: of a diagram with `plant` in it; its context is advanced.
+        plant: a finalized plant.
+        bodies: to be at rest, all of them.
+        time_limit: simulated time allowed [s].
+        criterion: what counts as rest.
+
+    Raises:
+        RuntimeError, SystemExit: from Drake.
+    """
+    context = plant.GetMyContextFromRoot(simulator.get_context())
+    watched = [plant.get_body(index) for index in bodies]
+    start = simulator.get_context().get_time()
+    steps = max(1, round(time_limit / criterion.poll))
+    needed = max(1, round(criterion.duration / criterion.poll))
+    still = 0
+    moving: dict[BodyIndex, BodySpeed] = {}
+    before = [_pose(body, context) for body in watched]
+    for step in range(1, steps + 1):
+        simulator.AdvanceTo(start + step * criterion.poll)
+        after = [_pose(body, context) for body in watched]
+        moving = {}
+        for body, old, new in zip(watched, before, after, strict=True):
+            speed = _speed(old, new, criterion.poll)
+            # not the other way round: a comparison with NaN is false
+            if not (speed.speed < criterion.speed and speed.turning < criterion.turning):
+                moving[body.index()] = speed
+        before = after
+        still = 0 if moving else still + 1
+        if still >= needed:
+            break
+    return Settled(simulator.get_context().get_time() - start, moving)
+
+
+def _pose(body: RigidBody, context: Context) -> tuple[Array, Array]:
+    """Rotation (3, 3) and centre of mass (3,) in the world."""
+    X_WO = body.EvalPoseInWorld(context)
+    p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
+    return X_WO.rotation().matrix(), p_WOcm
+
+
+def _speed(before: tuple[Array, Array], after: tuple[Array, Array], interval: float) -> BodySpeed:
+    turn = before[0].T @ after[0]
+    # chordal distance; exact for small turns, where the cosine is not
+    angle = 2.0 * np.arcsin(min(1.0, np.linalg.norm(turn - np.eye(3)) / np.sqrt(8.0)))
+    travel = np.linalg.norm(after[1] - before[1])
+    return BodySpeed(float(travel / interval), float(angle / interval))

@@ -1,0 +1,68 @@
+"""The choice of the contact geometry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from burg_drake.core.errors import MeshError
+from burg_drake.objects.contact import CONTACT_FILE, MESH_FACES, contact_geometry
+from burg_drake.objects.entry import ContactGeometry
+from burg_drake.objects.library import load_library
+
+
+def cylinder() -> trimesh.Trimesh:
+    return trimesh.creation.cylinder(0.03, 0.1, sections=64)
+
+
+def torus() -> trimesh.Trimesh:
+    return trimesh.creation.torus(0.05, 0.01, major_sections=96, minor_sections=48)
+
+
+def test_by_itself_it_is_a_primitive_where_one_fits(tmp_path: Path) -> None:
+    contact, written = contact_geometry(None, cylinder(), True, [cylinder()], tmp_path)
+    assert contact.kind == "primitive" and written == ()
+    assert contact.primitive is not None and contact.primitive.shape == "cylinder"
+    assert contact.fit is not None and contact.fit.hausdorff < 1e-4
+    assert contact_geometry(None, torus(), True, [torus()], tmp_path)[0] == ContactGeometry()
+
+
+def test_the_volume_of_an_open_surface_is_that_of_its_pieces(tmp_path: Path) -> None:
+    lidless = trimesh.Trimesh(cylinder().vertices, cylinder().faces[3:], process=False)
+    contact, _ = contact_geometry(None, lidless, False, [cylinder()], tmp_path)
+    assert contact.kind == "primitive"
+
+
+@pytest.mark.parametrize("kind", ["pieces", "compliant_pieces"])
+def test_pieces_are_taken_as_they_are(tmp_path: Path, kind: str) -> None:
+    contact, written = contact_geometry(kind, cylinder(), True, [], tmp_path)  # type: ignore[arg-type]
+    assert contact == ContactGeometry(kind=kind)  # type: ignore[arg-type]
+    assert written == ()
+
+
+def test_a_mesh_is_written_with_few_faces(tmp_path: Path) -> None:
+    fine = torus()
+    assert len(fine.faces) > 4 * MESH_FACES
+    contact, written = contact_geometry("mesh", fine, True, [], tmp_path)
+    assert written == (contact.mesh,) == (CONTACT_FILE,)
+    mesh = trimesh.load_mesh(tmp_path / CONTACT_FILE)
+    assert mesh.is_watertight and mesh.euler_number == 0  # it still has its hole
+    assert len(mesh.faces) < len(fine.faces) / 2
+    assert contact.fit is not None and contact.fit.hausdorff < 5e-4
+    assert contact.fit.volume_ratio == pytest.approx(mesh.volume / fine.volume, rel=1e-6)
+
+
+def test_what_cannot_be_is_said(tmp_path: Path) -> None:
+    holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
+    with pytest.raises(MeshError, match=r"^contact 'mesh' needs a closed surface; repair"):
+        contact_geometry("mesh", holey, False, [torus()], tmp_path)
+    with pytest.raises(MeshError, match=r"no box, cylinder or sphere has about this volume"):
+        contact_geometry("primitive", torus(), True, [], tmp_path)
+    bottle = load_library("household").surface("bottle")
+    with pytest.raises(MeshError, match=r"^contact 'primitive': .*; choose 'pieces'"):
+        contact_geometry("primitive", bottle, True, [], tmp_path)
+    egg = trimesh.creation.icosphere(subdivisions=4, radius=0.05).apply_scale((1, 1, 0.95))
+    with pytest.raises(MeshError, match=r"the nearest, a sphere, is 2\.[56] mm off"):
+        contact_geometry("primitive", egg, True, [], tmp_path)

@@ -1,0 +1,127 @@
+"""What a check finds: each thing that can go wrong with a library is made to go wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from burg_drake.core.schema import save_document
+from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.check import check_library
+from burg_drake.pipeline.source import ObjectSource
+
+Fault = Callable[[ObjectLibrary], None]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library of a box and a bottle-like thing without any fault, and its meshes."""
+    folder = tmp_path_factory.mktemp("sound")
+    trimesh.creation.box((0.05, 0.06, 0.07)).export(folder / "box.stl")
+    sources = [ObjectSource.from_file(folder / "box.stl", mass=0.1, contact="pieces")]
+    assert build_library(sources, folder / "lib").built == ("box",)
+    return folder
+
+
+@pytest.fixture
+def library(sound: Path, tmp_path: Path) -> ObjectLibrary:
+    shutil.copytree(sound, tmp_path / "copy")
+    return load_library(tmp_path / "copy" / "lib")
+
+
+def test_a_sound_library(library: ObjectLibrary) -> None:
+    assert check_library(library) == ()
+
+
+def test_a_library_without_its_sources_is_sound(library: ObjectLibrary) -> None:
+    (library.root.parent / "box.stl").unlink()
+    assert check_library(library) == ()
+
+
+def test_the_built_in_library_is_sound() -> None:
+    assert [i.message for i in check_library(load_library("household")) if i.is_error] == []
+
+
+def lose_a_piece(library: ObjectLibrary) -> None:
+    library.path("box/pieces/000.obj").unlink()
+
+
+def edit_a_piece(library: ObjectLibrary) -> None:
+    piece = library.path("box/pieces/000.obj")
+    piece.write_text(piece.read_text() + "# by hand\n")
+
+
+def change_the_source(library: ObjectLibrary) -> None:
+    trimesh.creation.box((0.05, 0.06, 0.08)).export(library.root.parent / "box.stl")
+
+
+def forget_the_record(library: ObjectLibrary) -> None:
+    library.path("box/build.json").unlink()
+
+
+def age_the_record(library: ObjectLibrary) -> None:
+    record = library.path("box/build.json")
+    record.write_text(json.dumps({**json.loads(record.read_text()), "version": 1}))
+
+
+def edit_the_document(library: ObjectLibrary) -> None:
+    entry = library.entry("box")
+    heavier = replace(entry, mass_properties=replace(entry.mass_properties, mass=0.2))
+    document = replace(library.document, objects={"box": heavier})
+    save_document(document, library.root / "library.yaml")
+
+
+def forget_the_object(library: ObjectLibrary) -> None:
+    save_document(replace(library.document, objects={}), library.root / "library.yaml")
+
+
+def break_the_model(library: ObjectLibrary) -> None:
+    sdf = library.path("box/box.sdf")
+    sdf.write_text(sdf.read_text().replace("<mass>0.1", "<mass>-0.1"))
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "message"),
+    [
+        (lose_a_piece, "missing", "box/pieces/000.obj is missing; build it again"),
+        (edit_a_piece, "changed", "box/pieces/000.obj was changed after it was built; build"),
+        (change_the_source, "stale", "box.stl has changed since; build it again"),
+        (forget_the_record, "stale", "box was built by another release; build it again"),
+        (age_the_record, "stale", "box was built by another release; build it again"),
+        (edit_the_document, "changed", "library.yaml says other than box/box.sdf; change values"),
+        (forget_the_object, "missing", "box is an object that library.yaml does not list; add"),
+        (break_the_model, "broken", "box.sdf: "),
+    ],
+)
+def test_faults(library: ObjectLibrary, fault: Fault, kind: str, message: str) -> None:
+    fault(library)
+    issues = [i for i in check_library(load_library(library.root)) if i.is_error]
+    assert kind in [issue.kind for issue in issues]
+    assert message in next(issue.message for issue in issues if issue.kind == kind)
+
+
+def test_implausible_values(tmp_path: Path) -> None:
+    box = trimesh.creation.box((0.05, 0.06, 0.07))
+    bowl = trimesh.creation.annulus(r_min=0.03, r_max=0.032, height=0.05)
+    sources = [
+        ObjectSource(name="leaden", mesh=box, mass=90.0, friction=4.0),
+        ObjectSource(name="ring", mesh=bowl, density=1000.0, pieces=(box,)),
+    ]
+    report = build_library(sources, tmp_path / "lib", confirm=False)
+    issues = check_library(report.library)
+    assert not [issue for issue in issues if issue.is_error]
+    found = {(issue.object, issue.kind): issue.message for issue in issues}
+    kinds = [(issue.object, issue.kind) for issue in issues]
+    assert ("leaden", "implausible") in kinds and ("ring", "implausible") in kinds
+    messages = "\n".join(issue.message for issue in issues)
+    assert "friction 4 is not that of household materials (0.05 to 1.5)" in messages
+    assert "the convex pieces are coarse: " in messages
+    assert "mass 0.0194 kg was not given; it follows from 1000 kg/m^3" in messages
+    assert found["leaden", "unsure"] == "its stable poses were not confirmed in simulation"
