@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from burg_drake.objects.meshes import unit_scale
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 
@@ -17,7 +18,7 @@ with tempfile.TemporaryDirectory() as folder:
     trimesh.creation.annulus(r_min=20, r_max=25, height=80).export(mesh_file)
 
     report = build_library(
-        [ObjectSource.from_file(mesh_file, scale=0.001, mass=0.12, friction=0.4)],
+        [ObjectSource.from_file(mesh_file, scale=unit_scale("mm"), mass=0.12, friction=0.4)],
         Path(folder) / "my_library",
     )
     for name, message in report.failed.items():
@@ -29,6 +30,8 @@ with tempfile.TemporaryDirectory() as folder:
     moments = ", ".join(f"{1e6 * i:.1f}" for i in tube.mass_properties.inertia[:3])
     print(f"moments of inertia about the centre of mass: {moments} kg mm^2")
     print(f"{len(tube.pieces)} convex pieces, Drake model {tube.sdf}")
+    print(f"the pieces are up to {1e3 * tube.fit.hausdorff:.1f} mm off the surface")
     for pose in tube.stable_poses:
         axis = np.round(pose.X_SO.matrix()[:3, 2], 2) + 0.0
-        print(f"rests with probability {pose.probability:.2f}, its axis along {axis}")
+        rolls = ", and rolls" if pose.rolls else ""
+        print(f"rests with probability {pose.probability:.2f}, its axis along {axis}{rolls}")

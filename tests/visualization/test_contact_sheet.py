@@ -75,7 +75,7 @@ def test_a_card_an_object_with_its_pictures(tmp_path: Path) -> None:
         head, data = source.split(",", 1)
         assert head == "data:image/png;base64"
         assert Image.open(io.BytesIO(base64.b64decode(data))).width in (320, 160)
-    for text in ("<heavy> for a mug", "25 pieces", "118 × 81 × 81", "118 g", "not measured"):
+    for text in ("<heavy> for a mug", "25 pieces", "118 × 81 × 81", "118 g", "1.9 mm"):
         assert text in page.text, text
 
 
