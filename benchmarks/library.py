@@ -5,13 +5,15 @@
 Builds the surfaces of the built-in library, cut by CoACD as a user's meshes are, and the meshes
 given. Prints a row an object with the time of each stage, then medians beside the peer's figures,
 the time of a rebuild of 50 unchanged objects, and how much faster two workers are than one (wall
-time: leave the machine alone meanwhile). BURG-Toolkit takes 24 to 65 s to decompose an object with
-concavities, and 0.04 to 1.75 s for the stable poses of an object.
+time: leave the machine alone meanwhile; CoACD's own threads are off, so that a worker is a core).
+BURG-Toolkit takes 24 to 65 s to decompose an object with concavities, and 0.04 to 1.75 s for the
+stable poses of an object.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 import time
 from pathlib import Path
@@ -20,6 +22,7 @@ import numpy as np
 import trimesh
 
 import burg_drake as burg
+from burg_drake.core.processes import ONE_THREAD
 from burg_drake.pipeline.build import BuildReport
 from burg_drake.pipeline.source import ObjectSource
 
@@ -35,6 +38,7 @@ def main() -> None:
     parser.add_argument("meshes", nargs="*", help="mesh files in metres")
     parser.add_argument("--no-parallel", action="store_true", help="leave out the two workers")
     arguments = parser.parse_args()
+    os.environ.update(ONE_THREAD)
     household = burg.load_library("household")
     sources = [ObjectSource(name=n, mesh=household.surface(n)) for n in household.objects]
     sources += [ObjectSource.from_file(mesh) for mesh in arguments.meshes]
