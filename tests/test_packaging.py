@@ -33,7 +33,12 @@ HEAVY = {
     "trimesh",
 }
 # Distributions whose import name is another one.
-IMPORT_NAMES = {"drake": "pydrake", "opencv-python-headless": "cv2", "pyyaml": "yaml"}
+IMPORT_NAMES = {
+    "pillow": "PIL",
+    "drake": "pydrake",
+    "opencv-python-headless": "cv2",
+    "pyyaml": "yaml",
+}
 
 try:
     importlib.metadata.distribution("burg-drake")

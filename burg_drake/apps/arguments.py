@@ -167,7 +167,12 @@ def named_positive(text: str) -> tuple[str, float]:
 def friction(text: str) -> tuple[str, float]:
     """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
     name, _, value = text.rpartition("=")
-    mu = number(value)
+    return name, coefficient(value)
+
+
+def coefficient(text: str) -> float:
+    """A friction coefficient from 0."""
+    mu = number(text)
     if mu < 0.0:
-        raise argparse.ArgumentTypeError(f"{value} is not a friction coefficient from 0")
-    return name, mu
+        raise argparse.ArgumentTypeError(f"{text} is not a friction coefficient from 0")
+    return mu

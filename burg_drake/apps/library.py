@@ -9,6 +9,7 @@ from burg_drake.apps.arguments import (
     add_group,
     add_verb,
     add_view,
+    coefficient,
     friction,
     named_positive,
     positive,
@@ -72,7 +73,7 @@ def _add_add(group: Any) -> None:
         group,
         "add",
         run_add,
-        "add one object to a library, or change one",
+        "add one object to a library, or build it anew (what is not given gets its default)",
         "burg-drake library add my_library mug.obj --mass 0.118 --friction 0.4",
         "burg-drake library add my_library scan_7.ply --name towel --mass 0.2"
         " --wall-thickness 0.005",
@@ -81,7 +82,7 @@ def _add_add(group: Any) -> None:
     add.add_argument("mesh", metavar="MESH", help="mesh file")
     add.add_argument("--name", help="the object's name (default: that of the mesh file)")
     add.add_argument("--mass", metavar="KG", type=positive, help="mass")
-    add.add_argument("--friction", metavar="MU", type=friction, help="coefficient (default: 0.24)")
+    add.add_argument("--friction", metavar="MU", type=coefficient, help="default: 0.24")
     add.add_argument("--description", metavar="TEXT", help="for people")
     _add_common_values(add)
 

@@ -43,7 +43,7 @@ def run_add(arguments: argparse.Namespace) -> int:
         arguments.mesh,
         mass=arguments.mass,
         density=arguments.density,
-        friction=arguments.friction[1] if arguments.friction else None,
+        friction=arguments.friction,
         description=arguments.description or "",
     )
     if arguments.name:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,9 +32,23 @@ def sources_of(arguments: argparse.Namespace) -> tuple[list[ObjectSource], str |
             sources += recipe.sources()
         else:
             sources += [ObjectSource.from_file(mesh) for mesh in _mesh_files([argument])]
+    sources = _with_own_names(sources)
     values = named_values(arguments, {source.name for source in sources})
     changed = with_common_values(sources, arguments)
     return [_with_values(source, values, arguments.density) for source in changed], name
+
+
+def _with_own_names(sources: Sequence[ObjectSource]) -> list[ObjectSource]:
+    """Sources of which those that share a name also go by their file's suffix."""
+    from burg_drake.pipeline.source import object_name
+
+    shared = {name for name, count in Counter(s.name for s in sources).items() if count > 1}
+    return [
+        replace(s, name=object_name(f"{s.name}_{Path(str(s.mesh)).suffix}"))
+        if s.name in shared
+        else s
+        for s in sources
+    ]
 
 
 def with_common_values(

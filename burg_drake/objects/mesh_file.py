@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import trimesh
@@ -24,7 +25,7 @@ REFERRING = (".obj", ".gltf")
 STL_HEADER, STL_TRIANGLE = 84, 50
 """Bytes of a binary STL file's header with the number of triangles, and of a triangle."""
 
-REFERRED = (".mtl", ".png", ".jpg", ".jpeg", ".bin")
+REFERRED = (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".webp", ".bin")
 """What they refer to."""
 
 
@@ -78,15 +79,18 @@ def source_rgba(mesh: trimesh.Trimesh) -> tuple[float, float, float, float] | No
 
 
 def _companions(path: Path) -> list[Path]:
-    """Files in the mesh's folder that its text names, and that those name in turn."""
+    """Files in the mesh's folder, or in a folder in it, that its text names, and that those name in
+    turn."""
     if path.suffix.lower() not in REFERRING:
         return []
-    beside = {p.name: p for p in path.parent.iterdir() if p.suffix.lower() in REFERRED}
+    folder = path.parent
+    files = (*folder.glob("*"), *folder.glob("*/*"))
+    beside = sorted(p for p in files if p.suffix.lower() in REFERRED and p.is_file())
     found: list[Path] = []
     queue = [path]
     while queue:
         text = queue.pop().read_bytes()
-        named = [p for name, p in sorted(beside.items()) if name.encode() in text and p != path]
+        named = [p for p in beside if p.name.encode() in text or quote(p.name).encode() in text]
         fresh = [p for p in named if p not in found]
         found += fresh
         queue += [p for p in fresh if p.suffix.lower() == ".mtl"]
@@ -94,10 +98,10 @@ def _companions(path: Path) -> list[Path]:
 
 
 def _check_file(path: Path) -> None:
-    if path.suffix.lower() not in FORMATS:
-        raise MeshError(f"{path}: {path.suffix or 'no suffix'} is not one of {', '.join(FORMATS)}")
     if not path.is_file():
         raise MeshError(f"{path}: the mesh file does not exist")
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(f"{path}: {path.suffix or 'no suffix'} is not one of {', '.join(FORMATS)}")
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the mesh file is empty")
 

@@ -103,7 +103,7 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
             tally.fail(source.name, error)
             continue
         entry = tally.entries.get(source.name)
-        if entry is not None and is_current(entry, keys, source, root):
+        if entry is not None and is_current(entry, keys, source, root, confirm):
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
@@ -162,9 +162,15 @@ class _Tally:
         """Moves an object's folder into place and writes the library with it."""
         if built.folder is not None:
             home = self.library.root / source.name
+            before = scratch / f"{source.name}.before"
             if home.exists():
-                home.rename(scratch / f"{source.name}.before")
-            built.folder.rename(home)
+                home.rename(before)
+            try:
+                built.folder.rename(home)
+            except BaseException:
+                if before.exists() and not home.exists():
+                    before.rename(home)
+                raise
         self.entries[source.name] = built.entry
         if time.monotonic() > self.saved + SAVING_INTERVAL:
             self.save()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,8 +13,14 @@ import numpy as np
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.objects.mass import implausible
-from burg_drake.objects.sdf import model_sdf
-from burg_drake.pipeline.record import Record, file_hashes, is_object_folder, read_record
+from burg_drake.objects.meshes import mesh_hash
+from burg_drake.pipeline.record import (
+    Record,
+    entry_hash,
+    file_hashes,
+    is_object_folder,
+    read_record,
+)
 
 IssueKind = Literal["missing", "changed", "stale", "broken", "implausible", "unsure"]
 
@@ -83,11 +88,11 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
         text = f"{home} was built by another release; build it again"
         yield _issue(name, "stale", text)
     else:
-        yield from _record_issues(library, name, entry, record, home)
-    if (library.root / entry.source.path).is_file() and entry.source.path:
-        source = library.root / entry.source.path
-        if hashlib.sha256(source.read_bytes()).hexdigest() != entry.source.sha256:
-            yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
+        yield from _record_issues(name, entry, record, home)
+    source = library.root / entry.source.path
+    traced = bool(entry.source.path) and source.is_file()
+    if traced and record is not None and mesh_hash(source) != record.keys.mesh:
+        yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
     if not missing:
         complaint = drake_complaint(library.root / entry.sdf)
         if complaint:
@@ -95,9 +100,13 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
 
 
 def _record_issues(
-    library: ObjectLibrary, name: str, entry: ObjectEntry, record: Record, home: Path
+    name: str, entry: ObjectEntry, record: Record, home: Path
 ) -> Iterator[LibraryIssue]:
     found = file_hashes(home)
+    listed = {Path(p).relative_to(home.name).as_posix() for p in entry.files}
+    lost = sorted(set(record.files) - set(found) - listed)
+    if lost:
+        yield _issue(name, "missing", f"{home / lost[0]} is missing; build it again")
     changed = sorted(f for f, sha in record.files.items() if found.get(f, sha) != sha)
     if changed:
         more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
@@ -106,18 +115,8 @@ def _record_issues(
     if record.keys.build != entry.build:
         text = f"{home} and library.yaml are of different builds; build it again"
         yield _issue(name, "stale", text)
-        return
-    base = home.relative_to(library.root).as_posix()
-    sdf = model_sdf(
-        name,
-        entry.mass_properties,
-        entry.friction,
-        entry.mesh.removeprefix(f"{base}/"),
-        [piece.removeprefix(f"{base}/") for piece in entry.pieces],
-        record.geometry.contact,
-    )
-    if record.files.get(Path(entry.sdf).name) != hashlib.sha256(sdf.encode()).hexdigest():
-        text = f"library.yaml says other than {entry.sdf}; change values by building it again"
+    elif record.entry != entry_hash(entry):
+        text = "library.yaml says other than what was built; change values by building it again"
         yield _issue(name, "changed", text)
 
 

@@ -17,7 +17,13 @@ from burg_drake.core.frames import Array
 from burg_drake.core.schema import Vector3
 from burg_drake.objects.contact import contact_geometry
 from burg_drake.objects.decompose import convex_pieces, given_pieces
-from burg_drake.objects.entry import ContactGeometry, ObjectEntry, Source, StablePose
+from burg_drake.objects.entry import (
+    DEFAULT_FRICTION,
+    ContactGeometry,
+    ObjectEntry,
+    Source,
+    StablePose,
+)
 from burg_drake.objects.fit import measure_fit
 from burg_drake.objects.library import LibraryDocument, ObjectLibrary
 from burg_drake.objects.mass import Solid, mass_properties, solid_of_pieces, solid_of_surface
@@ -28,7 +34,7 @@ from burg_drake.objects.sdf import model_sdf
 from burg_drake.objects.shell import solid_of_shell
 from burg_drake.objects.stable_poses import stable_poses
 from burg_drake.pipeline.keys import StageKeys
-from burg_drake.pipeline.record import Geometry, read_record
+from burg_drake.pipeline.record import Geometry, intact, read_record
 from burg_drake.pipeline.source import ObjectSource
 
 MESH_FILE = "mesh.obj"
@@ -36,13 +42,6 @@ SURFACE_FILE = "surface.obj"
 PIECES_FOLDER = "pieces"
 PIECE_DECIMALS = 7
 """Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
-
-RESTING_DENSITY = 300.0
-"""Density of the objects whose resting is simulated [kg/m^3]: whether a pose is stable does not
-depend on it, and a new mass shall not need a new simulation."""
-
-RESTING_FRICTION = 0.5
-"""Friction of the same; it does not decide which pose is stable on a horizontal plane either."""
 
 Pieces = tuple[trimesh.Trimesh, ...]
 
@@ -122,7 +121,7 @@ def _pieces(
     before = read_record(home)
     if before is not None and before.keys.pieces == keys.pieces:
         files = [home / name for name in before.geometry.pieces]
-        if all(file.exists() for file in files):
+        if intact(home, before, before.geometry.pieces):
             return tuple(trimesh.load_mesh(file, process=False) for file in files), 0.0
     if source.pieces is not None:
         pieces = given_pieces(source.pieces)
@@ -157,15 +156,16 @@ def _support(contact: ContactGeometry, pieces: Pieces) -> Array:
 def _confirmed(
     source: ObjectSource, geometry: Geometry, folder: Path
 ) -> tuple[tuple[StablePose, ...], tuple[str, ...]]:
-    """The poses that stand the test of simulation, and remarks on the others."""
+    """The poses that stand the test of simulation, and remarks on the others.
+
+    The object's own mass and friction do not enter: the test sets its own.
+    """
     from burg_drake.simulation.resting import confirm_poses  # imports Drake
 
-    properties = mass_properties(
-        geometry.solid, density=RESTING_DENSITY, center_of_mass=source.center_of_mass
-    )
+    properties = mass_properties(geometry.solid, center_of_mass=source.center_of_mass)
     name = source.name
     sdf = model_sdf(
-        name, properties, RESTING_FRICTION, MESH_FILE, geometry.pieces, geometry.contact
+        name, properties, DEFAULT_FRICTION, MESH_FILE, geometry.pieces, geometry.contact
     )
     atomic_write(folder / f"{name}.sdf", sdf)
     entry = ObjectEntry(
@@ -173,7 +173,6 @@ def _confirmed(
         sdf=f"{name}/{name}.sdf",
         pieces=tuple(f"{name}/{piece}" for piece in geometry.pieces),
         contact=geometry.contact,
-        friction=RESTING_FRICTION,
         lower=geometry.lower,
         upper=geometry.upper,
         mass_properties=properties,

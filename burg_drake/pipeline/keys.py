@@ -26,6 +26,7 @@ class StageKeys:
 
     Attributes:
         file: SHA-256 of the mesh file's bytes; of the arrays for a mesh in memory.
+        mesh: hash of the mesh with all that its file refers to.
         visual: the visual mesh.
         pieces: the surface, its convex pieces, and how well they fit.
         rest: what touches, the volume, the centre of mass, and the stable poses.
@@ -33,6 +34,7 @@ class StageKeys:
     """
 
     file: str
+    mesh: str
     visual: str
     pieces: str
     rest: str
@@ -56,12 +58,19 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     if source.pieces is not None:
         given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in source.pieces]
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
-    surface = (mesh, float(source.scale), thickness, source.openings)
-    visual = content_hash(VERSION, "visual", *surface, source.rgba)
-    maker = [_coacd_version()] if given is None else []
+    makers = (_release("trimesh"), _release("manifold3d"))
+    surface = (mesh, float(source.scale), thickness, source.openings, *makers)
+    visual = content_hash(VERSION, "visual", *surface, _floats(source.rgba))
+    maker = [_release("coacd")] if given is None else []
     pieces = content_hash(VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker)
     rest = content_hash(
-        VERSION, "rest", pieces, _floats(source.center_of_mass), source.contact, confirm
+        VERSION,
+        "rest",
+        pieces,
+        _floats(source.center_of_mass),
+        source.contact,
+        asdict(DEFAULT_CONTACT),
+        [_release("drake")] if confirm else None,
     )
     numbers = (source.mass, source.density, source.coefficient)
     build = content_hash(
@@ -76,7 +85,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     )
     in_memory = isinstance(source.mesh, trimesh.Trimesh)
     file = mesh if in_memory else hashlib.sha256(Path(source.mesh).read_bytes()).hexdigest()
-    return StageKeys(file, visual, pieces, rest, build)
+    return StageKeys(file, mesh, visual, pieces, rest, build)
 
 
 def _floats(numbers: tuple[float | None, ...] | None) -> list[float | None] | None:
@@ -84,9 +93,9 @@ def _floats(numbers: tuple[float | None, ...] | None) -> list[float | None] | No
     return None if numbers is None else [None if n is None else float(n) for n in numbers]
 
 
-def _coacd_version() -> str:
-    """Other versions of CoACD may cut the same mesh otherwise."""
+def _release(package: str) -> str:
+    """Its version: another one may make something else of the same mesh."""
     try:
-        return metadata.version("coacd")
+        return metadata.version(package)
     except metadata.PackageNotFoundError:
         return ""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import subprocess
 import threading
 from collections.abc import Iterator, Sequence
@@ -79,13 +80,13 @@ def build_all(work: Sequence[Work], workers: int) -> Iterator[tuple[Work, Outcom
         finally:
             threads.shutdown(wait=False, cancel_futures=True)
             for worker in crew:
-                worker.end()
+                worker.kill()
 
 
 def attempt(item: Work) -> Outcome:
     """Builds one object; one broken mesh is one failure, whatever it broke."""
-    item.folder.mkdir()
     try:
+        item.folder.mkdir()
         return build_object(item.source, item.keys, item.root, item.folder, item.confirm)
     except Exception as error:
         return error
@@ -109,8 +110,12 @@ class _Worker:
             outcome: Outcome = connection.recv()
             return outcome
         except (EOFError, OSError):
-            self._process = self._connection = None
+            with self._lock:
+                self._process = self._connection = None
+            connection.close()
             return SimulationError(cause_of_death(process))
+        except Exception as error:  # such as a mesh that cannot be pickled
+            return error
 
     def _started(self) -> tuple[subprocess.Popen[bytes], Connection]:
         with self._lock:
@@ -120,13 +125,13 @@ class _Worker:
                 self._process, self._connection = start_worker(__name__)
             return self._process, self._connection
 
-    def end(self) -> None:
+    def kill(self) -> None:
+        """Ends the process and what it started; the thread that waits for it cleans up."""
         with self._lock:
             self._ended = True
-            if self._process is not None and self._connection is not None:
-                self._process.kill()
-                self._process.wait()
-                self._connection.close()
+            if self._process is not None:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self._process.pid, signal.SIGKILL)
 
 
 def main(handle: int) -> None:
@@ -137,6 +142,7 @@ def main(handle: int) -> None:
     """
     # A filter, because importing pydrake sets the logger's level back.
     logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
+    os.setpgid(0, 0)  # a group of its own, so that CoACD ends with it
     connection = Connection(handle)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while True:

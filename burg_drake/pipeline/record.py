@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 from burg_drake.core.errors import DocumentError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.schema import Vector3, parse_document, plain_data
-from burg_drake.objects.entry import ContactGeometry, Fit, StablePose
+from burg_drake.objects.entry import ContactGeometry, Fit, ObjectEntry, StablePose
 from burg_drake.objects.mass import Solid
 from burg_drake.pipeline.keys import VERSION, StageKeys
 
@@ -71,12 +72,14 @@ class Record:
         keys: of the last build.
         geometry: what it found out.
         files: SHA-256 of each file in the object's folder, by name.
+        entry: hash of the entry in `library.yaml`, see `entry_hash`.
     """
 
     version: int = VERSION
     keys: StageKeys
     geometry: Geometry
     files: dict[str, str]
+    entry: str
 
 
 def write_record(home: Path, record: Record) -> None:
@@ -93,15 +96,27 @@ def read_record(home: Path) -> Record | None:
         return None
 
 
-def read_keys(home: Path) -> StageKeys | None:
-    """The keys in an object's folder, as `read_record`, but fast."""
+def is_as_built(home: Path, keys: StageKeys, entry: ObjectEntry) -> bool:
+    """Whether a folder is what a build with these keys left, and the entry what it listed."""
     data = _read_json(home)
     if data is None or data.get("version") != VERSION:
-        return None
-    try:
-        return StageKeys(**data["keys"])
-    except (TypeError, KeyError):
-        return None
+        return False
+    return (
+        data.get("keys") == asdict(keys)
+        and data.get("entry") == entry_hash(entry)
+        and data.get("files") == file_hashes(home)
+    )
+
+
+def intact(home: Path, record: Record, names: Iterable[str]) -> bool:
+    """Whether files of an object's folder are those that were built."""
+    found = file_hashes(home)
+    return all(name in found and found[name] == record.files.get(name) for name in names)
+
+
+def entry_hash(entry: ObjectEntry) -> str:
+    """SHA-256 of an entry; the same before and after it was written to a document."""
+    return hashlib.sha256(json.dumps(plain_data(entry)).encode()).hexdigest()
 
 
 def is_object_folder(home: Path) -> bool:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import trimesh
 
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.schema import Vector3
 from burg_drake.objects.entry import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
@@ -61,13 +62,19 @@ class ObjectSource:
 
     @classmethod
     def from_file(cls, mesh: str | Path, **fields: Any) -> ObjectSource:
-        """A mesh file under the name of its stem, such as `003_cracker_box.obj`.
+        """A mesh file under the name of its stem, such as `003_cracker_box.obj`; where that has no
+        letters a-z or digits, under a name made from its hash.
 
         Args:
             mesh: the file.
             fields: any other attribute.
         """
-        return cls(name=object_name(Path(mesh).stem), mesh=Path(mesh), **fields)
+        stem = Path(mesh).stem
+        try:
+            name = object_name(stem)
+        except InvalidInputError:
+            name = f"mesh_{content_hash(stem)[:6]}"
+        return cls(name=name, mesh=Path(mesh), **fields)
 
     @property
     def coefficient(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.files import atomic_write
-from burg_drake.objects.entry import MassProperties, ObjectEntry, Source
+from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
 from burg_drake.objects.mass import DEFAULT_DENSITY, implausible, mass_properties
 from burg_drake.objects.sdf import model_sdf
 from burg_drake.pipeline.geometry import MESH_FILE, build_geometry
@@ -19,8 +20,10 @@ from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import (
     Geometry,
     Record,
+    entry_hash,
     file_hashes,
-    read_keys,
+    intact,
+    is_as_built,
     read_record,
     write_record,
 )
@@ -44,15 +47,22 @@ class Built:
     seconds: dict[str, float] = field(default_factory=dict)
 
 
-def is_current(entry: ObjectEntry, keys: StageKeys, source: ObjectSource, root: Path) -> bool:
+def is_current(
+    entry: ObjectEntry, keys: StageKeys, source: ObjectSource, root: Path, confirm: bool
+) -> bool:
     """Whether the library holds just what these keys and the source ask for."""
     return (
-        read_keys(root / source.name) == keys
-        and entry.build == keys.build
+        entry.build == keys.build
         and entry.description == source.description
         and (entry.source.file, entry.source.path) == _origin(source, root)
-        and all((root / p).exists() for p in entry.files)
+        and not (confirm and _unconfirmed(entry.stable_poses))
+        and is_as_built(root / source.name, keys, entry)
     )
+
+
+def _unconfirmed(poses: Sequence[StablePose]) -> bool:
+    """Whether the simulation of poses failed, so that it is worth another try."""
+    return any(pose.residual is None for pose in poses)
 
 
 def build_object(
@@ -77,7 +87,8 @@ def build_object(
     if (
         before is not None
         and (before.keys.visual, before.keys.rest) == (keys.visual, keys.rest)
-        and all((home / name).exists() for name in before.files)
+        and not (confirm and _unconfirmed(before.geometry.stable_poses))
+        and intact(home, before, (name for name in before.files if not name.endswith(".sdf")))
     ):
         geometry = before.geometry
     else:
@@ -95,18 +106,15 @@ def build_object(
     sdf = model_sdf(
         source.name, properties, source.coefficient, MESH_FILE, geometry.pieces, geometry.contact
     )
-    _write(source.name, keys, geometry, sdf, home if folder is None else folder)
     entry = _entry(source, keys, geometry, properties, root)
+    target = home if folder is None else folder
+    files = file_hashes(target) | {f"{source.name}.sdf": hashlib.sha256(sdf.encode()).hexdigest()}
+    record = Record(keys=keys, geometry=geometry, files=files, entry=entry_hash(entry))
+    # The record goes first: after a kill in between, it matches no SDF, and the object is built
+    # again.
+    write_record(target, record)
+    atomic_write(target / f"{source.name}.sdf", sdf)
     return Built(folder, entry, tuple(_notes(source, geometry, properties)), seconds)
-
-
-def _write(name: str, keys: StageKeys, geometry: Geometry, sdf: str, folder: Path) -> None:
-    """Writes the record and the SDF. The record goes first: after a kill in between, it matches no
-    entry, and the object is built again."""
-    files = file_hashes(folder)
-    files[f"{name}.sdf"] = hashlib.sha256(sdf.encode()).hexdigest()
-    write_record(folder, Record(keys=keys, geometry=geometry, files=files))
-    atomic_write(folder / f"{name}.sdf", sdf)
 
 
 def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties) -> list[str]:

@@ -291,7 +291,10 @@ def test_another_coacd_version_cuts_again_what_it_cut(
     given = ObjectSource(name="given", mesh=_box(), pieces=(_box(),), mass=0.1)
     sources = [*_sources(meshes), given]
     build(sources, tmp_path / "lib")
-    monkeypatch.setattr(keys.metadata, "version", lambda name: f"another {name}")
+    true = keys.metadata.version
+    monkeypatch.setattr(
+        keys.metadata, "version", lambda name: "another" if name == "coacd" else true(name)
+    )
     report = build(sources, tmp_path / "lib")
     assert (report.built, report.cached) == (("box", "can"), ("given",))
 
@@ -349,3 +352,25 @@ def test_a_library_is_a_package(meshes: Path, tmp_path: Path) -> None:
     parser.package_map().AddPackageXml(str(moved / "package.xml"))
     (model,) = parser.AddModelsFromUrl("package://my_things/can/can.sdf")
     assert plant.HasBodyNamed("body", model)
+
+
+@pytest.mark.parametrize("mass", [0.2, 0.4])
+def test_files_that_were_changed_are_built_again(meshes: Path, tmp_path: Path, mass: float) -> None:
+    build(_sources(meshes), tmp_path / "lib")
+    piece = tmp_path / "lib/box/pieces/000.obj"
+    before = piece.read_bytes()
+    piece.write_bytes(before.replace(b"0.05", b"0.09"))
+    (tmp_path / "lib/box/mesh.mtl").unlink()
+    report = build(_sources(meshes, mass=mass), tmp_path / "lib")
+    assert (report.built, report.cached) == (("box",), ("can",))
+    assert piece.read_bytes() == before
+    assert (tmp_path / "lib/box/mesh.mtl").is_file()
+
+
+def test_a_document_that_was_edited_is_written_again(meshes: Path, tmp_path: Path) -> None:
+    build(_sources(meshes), tmp_path / "lib")
+    document = tmp_path / "lib/library.yaml"
+    before = document.read_text()
+    document.write_text(before.replace("mass: 0.2", "mass: 7.5"))
+    assert build(_sources(meshes), tmp_path / "lib").built == ("box",)
+    assert document.read_text() == before

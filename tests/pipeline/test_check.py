@@ -95,7 +95,11 @@ def break_the_model(library: ObjectLibrary) -> None:
         (change_the_source, "stale", "box.stl has changed since; build it again"),
         (forget_the_record, "stale", "box was built by another release; build it again"),
         (age_the_record, "stale", "box was built by another release; build it again"),
-        (edit_the_document, "changed", "library.yaml says other than box/box.sdf; change values"),
+        (
+            edit_the_document,
+            "changed",
+            "library.yaml says other than what was built",
+        ),
         (forget_the_object, "missing", "box is an object that library.yaml does not list; add"),
         (break_the_model, "broken", "box.sdf: "),
     ],
