@@ -42,9 +42,16 @@ class Outcome(StrEnum):
     DROPPED = "dropped"
     """The target was lifted and lost while being held."""
     LIFTED = "lifted"
-    """Both fingers still hold the target at the end."""
+    """Both fingers still hold the target at the end, and nothing else was disturbed."""
+    LIFTED_DISTURBED = "lifted_disturbed"
+    """Both fingers still hold the target at the end, but another object was moved on the way."""
     SIMULATION_FAILED = "simulation_failed"
     """Drake could not step the trial; the reason is stored with the result."""
+
+    @property
+    def held(self) -> bool:
+        """The target was lifted and is held, whatever happened to the others."""
+        return self in (Outcome.LIFTED, Outcome.LIFTED_DISTURBED)
 
     @property
     def stage(self) -> Stage:

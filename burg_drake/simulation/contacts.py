@@ -1,7 +1,8 @@
-"""Reads Drake's contact results: which bodies touch, and how hard the fingers press."""
+"""Reads Drake's contact results: which bodies touch, how hard the fingers press, on what area."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +20,13 @@ class Contact:
     Attributes:
         body_A, body_B: the bodies.
         f_B_W: (3,) force on body B in the world [N].
+        area: of the contact patch [m^2]; 0 for contact at a point.
     """
 
     body_A: BodyIndex
     body_B: BodyIndex
     f_B_W: Array
+    area: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,12 @@ class FingerContact:
     Attributes:
         touching: whether each finger touches the target.
         force: (2, 3) force of each finger on the target in the world [N].
+        area: (2,) area of the patches of each finger [m^2].
     """
 
     touching: tuple[bool, bool]
     force: Array
+    area: Array
 
     @property
     def both(self) -> bool:
@@ -47,6 +52,10 @@ class FingerContact:
     def any(self) -> bool:
         """A finger touches the target."""
         return any(self.touching)
+
+
+NO_CONTACT = FingerContact((False, False), np.zeros((2, 3)), np.zeros(2))
+"""Neither finger touches anything."""
 
 
 class ContactReader:
@@ -71,7 +80,8 @@ class ContactReader:
             info = results.hydroelastic_contact_info(i)
             surface = info.contact_surface()
             body_M, body_N = self._body_of[surface.id_M()], self._body_of[surface.id_N()]
-            contacts.append(Contact(body_N, body_M, info.F_Ac_W().translational()))
+            f_M_W = info.F_Ac_W().translational()
+            contacts.append(Contact(body_N, body_M, f_M_W, surface.total_area()))
         for i in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(i)
             contacts.append(Contact(pair.bodyA_index(), pair.bodyB_index(), pair.contact_force()))
@@ -82,29 +92,39 @@ def finger_contact(
     contacts: list[Contact], fingers: tuple[BodyIndex, BodyIndex], target: BodyIndex
 ) -> FingerContact:
     """Sums the contacts of each finger with the target."""
-    force = np.zeros((2, 3))
+    force, area = np.zeros((2, 3)), np.zeros(2)
     touching = [False, False]
     for i, finger in enumerate(fingers):
         for contact in contacts:
             if (contact.body_A, contact.body_B) == (finger, target):
                 force[i] += contact.f_B_W
-                touching[i] = True
             elif (contact.body_A, contact.body_B) == (target, finger):
                 force[i] -= contact.f_B_W
-                touching[i] = True
-    return FingerContact((touching[0], touching[1]), force)
+            else:
+                continue
+            area[i] += contact.area
+            touching[i] = True
+    return FingerContact((touching[0], touching[1]), force, area)
 
 
 def reached(
-    contacts: list[Contact], moving: set[BodyIndex], still: set[BodyIndex]
+    contacts: list[Contact], moving: Collection[BodyIndex], still: Collection[BodyIndex]
 ) -> set[BodyIndex]:
     """Those of the bodies in `still` that a body in `moving` touches."""
-    found = set()
-    for contact in contacts:
-        for one, other in (
-            (contact.body_A, contact.body_B),
-            (contact.body_B, contact.body_A),
-        ):
-            if one in moving and other in still:
-                found.add(other)
-    return found
+    return {other for contact in contacts for one, other in _ways(contact) if one in moving} & set(
+        still
+    )
+
+
+def touched_from_outside(contacts: list[Contact], bodies: Collection[BodyIndex]) -> bool:
+    """Whether one of the bodies touches a body that is not one of them."""
+    return any(
+        one in bodies and other not in bodies
+        for contact in contacts
+        for one, other in _ways(contact)
+    )
+
+
+def _ways(contact: Contact) -> Iterator[tuple[BodyIndex, BodyIndex]]:
+    yield contact.body_A, contact.body_B
+    yield contact.body_B, contact.body_A

@@ -10,7 +10,13 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 
 from burg_drake.core.frames import Array, inverse, rotation_angle
 from burg_drake.core.outcome import Outcome
-from burg_drake.simulation.contacts import FingerContact, finger_contact, reached
+from burg_drake.simulation.contacts import (
+    NO_CONTACT,
+    Contact,
+    finger_contact,
+    reached,
+    touched_from_outside,
+)
 from burg_drake.simulation.result import Margins, TrialResult
 
 if TYPE_CHECKING:
@@ -18,31 +24,23 @@ if TYPE_CHECKING:
 
 MINIMUM_LIFT = 0.5
 """Share of the lift height that the target must rise by to count as lifted."""
-
-
 LEVER = 0.05
 """Turning counts as the motion of a point at this distance from the grasp [m]."""
-
-
-class BystanderReached(Exception):
-    """A moving body touched objects that are locked.
-
-    Attributes:
-        bodies: the objects.
-    """
-
-    def __init__(self, bodies: set[BodyIndex]) -> None:
-        super().__init__(bodies)
-        self.bodies = bodies
 
 
 class Execution:
     """Runs a trial from a Context that has been brought to its start.
 
+    Objects that are locked are released when something moving touches them: the trial goes back to
+    the look before, where they were still apart, and goes on from there.
+
     Args:
         trial: the trial.
         target: the grasped body.
         moving: the free objects that are not locked, the target among them.
+
+    Attributes:
+        contact: of the fingers with the target at the last look.
     """
 
     def __init__(self, trial: HandTrial, target: BodyIndex, moving: set[BodyIndex]) -> None:
@@ -54,133 +52,200 @@ class Execution:
         self._plant_context = self._plant.GetMyContextFromRoot(self._context)
         self._results_port = self._plant.get_contact_results_output_port()
         self._target = self._plant.get_body(target)
-        self._others = [self._plant.get_body(index) for index in sorted(moving - {target})]
+        self._names = {index: name for name, index in diagram.free.items() if index != target}
         self._still = set(diagram.free.values()) - moving
-        self._moving = moving | set(diagram.robot_bodies)
-        self._start = [self._position(body) for body in self._others]
-        self._height_start = self._height()
-        self._others_moved = 0.0
-        self._contact = FingerContact((False, False), np.zeros((2, 3)))
+        self._hand = set(diagram.robot_bodies)
+        self._height_start = self._center(self._target)[2]
+        self._others = {i: self._center(self._plant.get_body(i)) for i in self._names}
+        self._others_last = dict(self._others)
+        self._displacements = dict.fromkeys(self._names, 0.0)
+        self.contact = NO_CONTACT
+        self._X_GO_last = self.X_GO()
         self._X_GO_grip: Array | None = None
+        self._touched = False
+        self._at_rest = 0.0
+        self._in_free_air = 0.0
+        self._way_blocked = False
+        self._left_to_rise = 0.0
 
     def run(self) -> TrialResult:
         """Runs all phases.
 
         Raises:
-            BystanderReached: a locked object was touched; the trial must start again.
             RuntimeError: the simulation failed.
         """
-        touched = self._close()
-        if not self._contact.both:
-            if self._contact.any:
-                return self._end(Outcome.ONE_FINGER)
-            return self._end(Outcome.CLOSED_EMPTY if touched else Outcome.NO_CONTACT)
-        self._X_GO_grip = self._X_GO()
-        if not self._lift():
-            return self._end(Outcome.SLIPPED)
-        if not self._hold():
-            return self._end(Outcome.DROPPED)
-        return self._end(Outcome.LIFTED)
+        for phase in (self.close, self.lift, self.hold):
+            outcome = phase()
+            if outcome is not None:
+                return self.result(outcome)
+        return self.result(self.held())
 
-    def _close(self) -> bool:
-        """Closes until the fingers rest; returns whether a finger touched the target."""
+    def close(self) -> Outcome | None:
+        """Closes until the fingers rest; None if both hold the target then."""
         settings = self._settings
-        touched, slow_since = False, math.inf
+        slow_since = math.inf
         while self._context.get_time() < settings.close_timeout:
-            now = self._advance()
-            touched = touched or self._contact.any
+            now = self.advance()
             if self._trial.hand.finger_speed(self._plant_context) > settings.settled_speed:
                 slow_since = math.inf
             else:
                 slow_since = min(slow_since, now)
                 if now - slow_since >= settings.settled_time - 1e-9:
                     break
-        return touched
+        if self.contact.both:
+            self._X_GO_grip = self.X_GO()
+            return None
+        if self.contact.any:
+            return Outcome.ONE_FINGER
+        return Outcome.CLOSED_EMPTY if self._touched else Outcome.NO_CONTACT
 
-    def _lift(self) -> bool:
-        """Raises the hand; returns whether the target is held at the end."""
+    def lift(self) -> Outcome | None:
+        """Raises the hand; None if the target is held at the top and has to prove itself there."""
         settings = self._settings
         steps = 2 * max(1, round(settings.lift_time / settings.poll / 2))
         top_speed = 2 * settings.lift_height / (steps * settings.poll)
         for i in range(steps):
             speed = top_speed * (1 - abs(2 * i + 1 - steps) / steps)  # of the interval's middle
             self._trial.command("lift", np.array([0.0, speed]))
-            self._advance()
-            if not self._contact.any:
-                return False
+            self.advance()
+            if not self.contact.any:
+                return Outcome.SLIPPED
+            if self._is_decided():
+                return self.held()
         self._trial.command("lift", np.zeros(2))
-        return self._contact.both and self._risen() >= MINIMUM_LIFT * settings.lift_height
+        if self.contact.both and self.risen() >= MINIMUM_LIFT * settings.lift_height:
+            return None
+        return Outcome.SLIPPED
 
-    def _hold(self) -> bool:
-        """Waits; returns whether the target is held at the end.
+    def hold(self) -> Outcome | None:
+        """Waits; None if the target is held at the end.
 
-        The end is early when the target has come to rest in the hand: at the speeds of
-        `TrialSettings` it would move by less than a millimetre in what is left.
+        Unless the whole trial is asked for, the end is early when the target has come to rest in
+        the hand: at the speeds of `TrialSettings` it would move by less than a millimetre in what
+        is left.
         """
         settings = self._settings
-        X_GO, resting = self._X_GO(), 0.0
+        self._at_rest = 0.0
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
-            self._advance()
-            if not self._contact.any:
-                return False
-            X_GO_before, X_GO = X_GO, self._X_GO()
-            distance, angle = _motion(X_GO_before, X_GO)
-            slow = max(distance, angle * LEVER) <= settings.settled_speed * settings.poll
-            resting = resting + settings.poll if slow else 0.0
-            if resting >= settings.resting_time - 1e-9:
+            self.advance()
+            if not self.contact.any:
+                return Outcome.DROPPED
+            at_rest = self._at_rest >= settings.resting_time - 1e-9
+            if at_rest and not self._trial.diagram.engine.whole_trial:
                 break
-        return self._contact.both
+        return None if self.contact.both else Outcome.DROPPED
 
-    def _advance(self) -> float:
-        """Steps to the next look at the contacts; returns the time [s]."""
-        time = self._context.get_time() + self._settings.poll
-        self._trial.simulator.AdvanceTo(time)
-        if not math.isfinite(self._height()):
-            raise RuntimeError(f"the state is not finite at {time:.3f} s")
-        contacts = self._trial.contacts.read(self._results_port.Eval(self._plant_context))
-        bystanders = reached(contacts, self._moving, self._still)
-        if bystanders:
-            raise BystanderReached(bystanders)
-        self._contact = finger_contact(contacts, self._trial.hand.fingers, self._target.index())
-        for body, start in zip(self._others, self._start, strict=True):
-            distance = float(np.linalg.norm(self._position(body) - start))
-            self._others_moved = max(self._others_moved, distance)
+    def held(self) -> Outcome:
+        """The outcome of a target that is held to the end."""
+        moved = max(self._displacements.values(), default=0.0)
+        disturbed = moved > self._settings.disturbance
+        return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
+
+    def _is_decided(self) -> bool:
+        """Whether the target will be held to the end, as nothing is left that could change it.
+
+        On its way up the hand accelerates first, which is when the load on the grip is largest.
+        Friction that does not hold it then lets the target go ever faster; so what keeps still, in
+        free air and with all others at rest, is held at the top as well.
+        """
+        if self._trial.diagram.engine.whole_trial or self._way_blocked:
+            return False
+        if not self.contact.both:
+            return False
+        if min(self._at_rest, self._in_free_air) < self._settings.resting_time - 1e-9:
+            return False
+        way = self._settings.lift_height - self._trial.hand.risen(self._plant_context)
+        positions = self._plant.GetPositions(self._plant_context)
+        rise = self._trial.rise(self._target.index())
+        self._way_blocked = not rise.is_free(self._trial.X_WG_start, positions, way)
+        if not self._way_blocked:
+            self._left_to_rise = way
+        return not self._way_blocked
+
+    def advance(self) -> float:
+        """Steps to the next look at the contacts; returns the time [s].
+
+        Raises:
+            RuntimeError: the simulation failed.
+        """
+        before = self._context.get_time()
+        time = before + self._settings.poll
+        while True:
+            state = self._context.get_discrete_state().Clone() if self._still else None
+            self._trial.simulator.AdvanceTo(time)
+            if not math.isfinite(self._center(self._target)[2]):
+                raise RuntimeError(f"the state is not finite at {time:.3f} s")
+            contacts = self._trial.contacts.read(self._results_port.Eval(self._plant_context))
+            moving = self._hand | (set(self._trial.diagram.free.values()) - self._still)
+            found = reached(contacts, moving, self._still)
+            if not found:
+                break
+            self._context.SetTime(before)
+            self._context.SetDiscreteState(state)
+            self._still -= found
+            self._trial.release(found, self._still)
+        self._look(contacts)
         return time
 
-    def _position(self, body: RigidBody) -> Array:
-        return self._plant.EvalBodyPoseInWorld(self._plant_context, body).translation()
+    def _look(self, contacts: list[Contact]) -> None:
+        """Takes down what the contacts and poses say."""
+        settings, target = self._settings, self._target.index()
+        self.contact = finger_contact(contacts, self._trial.hand.fingers, target)
+        self._touched = self._touched or self.contact.any
+        X_GO = self.X_GO()
+        distance, angle = _motion(self._X_GO_last, X_GO)
+        moved = max(distance, angle * LEVER, self._watch_others())
+        self._X_GO_last = X_GO
+        at_rest = moved <= settings.settled_speed * settings.poll
+        self._at_rest = self._at_rest + settings.poll if at_rest else 0.0
+        free = not touched_from_outside(contacts, self._hand | {target})
+        self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
-    def _height(self) -> float:
-        """Height of the target's centre of mass [m]."""
+    def _watch_others(self) -> float:
+        """Measures how far others are displaced; returns the largest motion since the last look."""
+        largest = 0.0
+        for index in self._names.keys() - self._still:
+            center = self._center(self._plant.get_body(index))
+            displacement = float(np.linalg.norm(center - self._others[index]))
+            self._displacements[index] = max(self._displacements[index], displacement)
+            largest = max(largest, float(np.linalg.norm(center - self._others_last[index])))
+            self._others_last[index] = center
+        return largest
+
+    def risen(self) -> float:
+        """How far the target's centre of mass has risen [m]."""
+        return float(self._center(self._target)[2] - self._height_start)
+
+    def X_GO(self) -> Array:
+        """(4, 4) target in the grasp frame."""
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        return float(X_WO.multiply(self._target.default_com())[2])
+        return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
 
-    def _risen(self) -> float:
-        return self._height() - self._height_start
+    def _center(self, body: RigidBody) -> Array:
+        """Centre of mass (3,) in the world [m]."""
+        X_WB = self._plant.EvalBodyPoseInWorld(self._plant_context, body)
+        return X_WB.multiply(body.default_com())
 
-    def _X_GO(self) -> Array:
-        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        return inverse(self._X_WG()) @ X_WO.GetAsMatrix4()
-
-    def _X_WG(self) -> Array:
-        return self._trial.hand.X_WG(self._plant_context)
-
-    def _end(self, outcome: Outcome) -> TrialResult:
-        slip = tilt = force = math.nan
+    def result(self, outcome: Outcome) -> TrialResult:
+        """The outcome with the margins at this moment."""
+        slip = tilt = force = area = math.nan
         if self._X_GO_grip is not None:
-            slip, tilt = _motion(self._X_GO_grip, self._X_GO())
-            closing = self._X_WG()[:3, 0]
-            force = float(np.abs(self._contact.force @ closing).min())
+            slip, tilt = _motion(self._X_GO_grip, self.X_GO())
+            closing = self._trial.hand.X_WG(self._plant_context)[:3, 0]
+            force = float(np.abs(self.contact.force @ closing).min())
+            area = float(self.contact.area.min())
         margins = Margins(
             overlap=0.0,
             slip=slip,
             tilt=tilt,
             pad_force=force,
-            lift=self._risen(),
-            others_moved=self._others_moved,
+            patch_area=area,
+            lift=self.risen() + self._left_to_rise,
+            others_moved=max(self._displacements.values(), default=0.0),
             end_time=self._context.get_time(),
         )
-        return TrialResult(outcome=outcome, margins=margins)
+        displacements = {name: self._displacements[i] for i, name in self._names.items()}
+        return TrialResult(outcome=outcome, margins=margins, displacements=displacements)
 
 
 def _motion(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from burg_drake.core.outcome import Outcome
 
@@ -17,8 +18,10 @@ class Margins:
         slip: how far the target moved in the hand since the grip, at the grasp point [m].
         tilt: how far the target turned in the hand since the grip [rad].
         pad_force: normal force of the weaker pad [N], along the closing direction.
-        lift: how far the target's centre of mass rose [m].
-        others_moved: largest displacement of any other object [m].
+        patch_area: area on which the pad with the smaller contact patch touches the target [m^2].
+        lift: how far the target's centre of mass rose [m]; of a trial that was decided on the way
+            up, with the way that the hand had left.
+        others_moved: largest displacement of the centre of mass of any other object [m].
         end_time: simulated time at which the outcome was decided [s].
     """
 
@@ -26,6 +29,7 @@ class Margins:
     slip: float = math.nan
     tilt: float = math.nan
     pad_force: float = math.nan
+    patch_area: float = math.nan
     lift: float = math.nan
     others_moved: float = math.nan
     end_time: float = math.nan
@@ -40,9 +44,12 @@ class TrialResult:
         margins: continuous slack.
         blocker: what the hand collided with at the start, if anything.
         reason: the simulator's message if it failed.
+        displacements: how far the centre of mass of every other free object was moved at most
+            [m], by instance; 0 where nothing touched it. Empty if the trial did not start.
     """
 
     outcome: Outcome
     margins: Margins
     blocker: str = ""
     reason: str = ""
+    displacements: Mapping[str, float] = field(default_factory=dict)

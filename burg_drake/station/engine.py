@@ -21,6 +21,9 @@ class Engine:
             1 ms and 8 % at 2 ms, and braked too much at 5 ms.
         contact_model: hydroelastic where geometry allows it, else point contact.
         contact_surface: polygons are faster than triangles and as accurate here.
+        whole_trial: simulate every trial to its end. Otherwise it ends as soon as its outcome is
+            decided: the target is held without moving, touched by nothing but the hand, and there
+            is nothing in the hand's way up.
     """
 
     name: str
@@ -28,6 +31,7 @@ class Engine:
     contact_approximation: Literal["lagged", "similar", "sap"] = "lagged"
     contact_model: Literal["hydroelastic_with_fallback", "point"] = "hydroelastic_with_fallback"
     contact_surface: Literal["polygon", "triangle"] = "polygon"
+    whole_trial: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.time_step <= 0.02:
@@ -39,7 +43,7 @@ class Engine:
 ENGINES = {
     engine.name: engine
     for engine in (
-        Engine(name="reference", time_step=0.001),
+        Engine(name="reference", time_step=0.001, whole_trial=True),
         Engine(name="standard", time_step=0.002),
         Engine(name="screening", time_step=0.005),
     )

@@ -68,6 +68,10 @@ class FloatingHand:
         """Speed of the faster finger [m/s]."""
         return max(abs(joint.get_translation_rate(plant_context)) for joint in self.joints)
 
+    def risen(self, plant_context: Context) -> float:
+        """How far the hand has risen since it was placed [m]."""
+        return float(self.lift.get_translation(plant_context))
+
     def X_WG(self, plant_context: Context) -> Array:
         """(4, 4) current grasp frame."""
         X_WH = self._plant.EvalBodyPoseInWorld(plant_context, self.body).GetAsMatrix4()

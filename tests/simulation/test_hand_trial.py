@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument, load_s
 from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
 from burg_drake.simulation.result import TrialResult
+from burg_drake.station.engine import ENGINES
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Obstacle, Station, StationDocument, Table
 
@@ -28,6 +29,8 @@ BOX = (0.06, 0.09, 0.08)
 BOX_MASS = 0.3
 GRAVITY = 9.81
 FORCE = 40.0
+PAD = (0.0175, 0.0185)
+"""Size of a pad [m]."""
 
 
 def box_mesh(size: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -118,7 +121,17 @@ def test_centred_grasp_holds_with_the_commanded_force(box_trial: HandTrial) -> N
     assert result.margins.lift == pytest.approx(0.30, abs=0.001)
     assert result.margins.slip < 0.0005
     assert result.margins.tilt < np.deg2rad(0.1)
-    assert result.margins.end_time > 1.35  # the rise and a little more
+    assert result.margins.patch_area == pytest.approx(PAD[0] * PAD[1], rel=0.01)
+    assert result.margins.end_time < 0.5  # decided soon after it left the table
+
+
+def test_the_whole_trial_confirms_what_was_decided_on_the_way(make_scene, box_trial) -> None:
+    engine = replace(ENGINES["standard"], whole_trial=True)
+    whole = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=engine)
+    for X_OG in GRASPS:
+        early, full = (t.run("box", X_OG) for t in (box_trial, whole))
+        assert early.margins.end_time < 0.6 < 1.75 < full.margins.end_time
+        assert_same(early, full)
 
 
 @pytest.mark.parametrize(("share", "outcome"), [(0.97, Outcome.SLIPPED), (1.03, Outcome.LIFTED)])
@@ -140,17 +153,18 @@ def test_tilt_of_an_eccentric_grasp_falls_with_friction(box_trial: HandTrial) ->
 
 def test_dropped_while_holding(make_scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """The pads lose most of their friction once the box is up."""
-    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
-    lift = Execution._lift
+    engine = replace(ENGINES["standard"], whole_trial=True)
+    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=engine)
+    lift = Execution.lift
     greased = []
 
-    def lift_and_grease(execution: Execution) -> bool:
-        held = lift(execution)
+    def lift_and_grease(execution: Execution) -> Outcome | None:
+        outcome = lift(execution)
         trial.set_friction("box", 0.01)
         greased.append(trial.context.get_time())
-        return held
+        return outcome
 
-    monkeypatch.setattr(Execution, "_lift", lift_and_grease)
+    monkeypatch.setattr(Execution, "lift", lift_and_grease)
     result = trial.run("box", CENTRE)
     assert result.outcome is Outcome.DROPPED
     # sixty millimetres from the box's top to the pads' lower edge fall free in a tenth of a second
@@ -272,21 +286,13 @@ def test_bystanders_do_not_change_a_trial_and_are_not_moved(make_scene, box_tria
     np.testing.assert_allclose(margins(watched)[:5], margins(alone)[:5], atol=1e-4)
 
 
-def with_all_free(trial: HandTrial, instance: str, X_OG: np.ndarray) -> TrialResult:
-    """The trial with no object locked at any time."""
-    X_WG = trial.diagram.X_WO(instance) @ X_OG
-    everything = set(trial.diagram.free.values())
-    trial._reset(X_WG, trial.clearance.free_travel(X_WG), everything)
-    trial.set_friction(instance, None)
-    return Execution(trial, trial.diagram.free[instance], everything).run()
-
-
 def test_neighbour_on_top_goes_up_with_the_target(make_scene) -> None:
     block = Instance(object="block", X_SO=Pose((0.3, 0.235, BOX[2])))
     trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0), block), make_station())
     result = trial.run("box", from_above(0.05, y=-0.03), friction=0.8)
-    assert result.outcome is Outcome.LIFTED
-    assert result.margins.others_moved > 0.2
+    assert result.outcome is Outcome.LIFTED_DISTURBED
+    assert result.displacements == {"block": result.margins.others_moved}
+    assert result.margins.others_moved == pytest.approx(0.30, abs=0.02)
 
 
 def test_neighbours_in_the_way_of_a_finger_are_pushed_as_if_never_locked(make_scene) -> None:
@@ -297,9 +303,9 @@ def test_neighbours_in_the_way_of_a_finger_are_pushed_as_if_never_locked(make_sc
         Instance(name="behind", object="block", X_SO=Pose((0.409, 0.215, 0.0))),
         Instance(name="far", object="block", X_SO=Pose((0.1, 0.35, 0.0))),
     )
-    trial = HandTrial(scene, make_station())
     X_OG = from_above(0.065, x=0.006)
-    lazy, full = trial.run("box", X_OG), with_all_free(trial, "box", X_OG)
+    lazy = HandTrial(scene, make_station()).run("box", X_OG)
+    full = HandTrial(scene, make_station(), lock=False).run("box", X_OG)
     assert lazy.outcome is full.outcome is Outcome.LIFTED
     assert lazy.margins.others_moved > 0.002
     np.testing.assert_allclose(margins(lazy)[:6], margins(full)[:6], rtol=0.05, atol=1e-3)
