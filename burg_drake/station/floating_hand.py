@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.station.diagram import StationDiagram
+from burg_drake.station.hand_model import find_hand
 
 
 class FloatingHand:
@@ -16,6 +17,12 @@ class FloatingHand:
 
     Args:
         station_diagram: the diagram.
+
+    Attributes:
+        document: the hand's document.
+        body: the hand's body H.
+        fingers, joints, pads: bodies, joints and pads of the two fingers, in the document's order.
+        lift: the joint that carries the hand.
 
     Raises:
         InvalidInputError: the diagram has no floating hand.
@@ -30,9 +37,12 @@ class FloatingHand:
         self.document = hand
         self._plant = plant
         model = plant.GetModelInstanceByName("hand")
-        self.body = plant.GetBodyByName(hand.body, model)
-        self.joints = tuple(plant.GetJointByName(f.joint, model) for f in hand.fingers)
-        self.fingers = tuple(plant.GetBodyByName(f.body, model).index() for f in hand.fingers)
+        inspector = station_diagram.scene_graph.model_inspector()
+        found = find_hand(plant, inspector, hand, model)
+        self.body, self.joints, self.pads = found.body, found.joints, found.pads
+        self.fingers = (found.fingers[0].index(), found.fingers[1].index())
+        driven = [plant.get_joint_actuator(i).joint() for i in plant.GetJointActuatorIndices(model)]
+        self._order = [found.joints.index(joint) for joint in driven]
         self.lift = plant.GetJointByName("lift")
         self._base = plant.GetFrameByName("lift_base")
         self._mount = plant.GetFrameByName("lift_mount")
@@ -59,10 +69,12 @@ class FloatingHand:
             joint.set_translation_rate(plant_context, 0.0)
 
     def closing_command(self) -> Array:
-        """(4,) desired state that closes the hand: positions, velocities of the two fingers."""
+        """(4,) desired state that closes the hand: positions of the two fingers and velocities, in
+        the order of the model's actuators."""
+        fingers = [self.document.fingers[i] for i in self._order]
         speed = self.document.closing_speed
-        direction = [np.sign(f.closed - f.open) for f in self.document.fingers]
-        return np.array([f.closed for f in self.document.fingers] + [speed * d for d in direction])
+        direction = [np.sign(f.closed - f.open) for f in fingers]
+        return np.array([f.closed for f in fingers] + [speed * d for d in direction])
 
     def finger_speed(self, plant_context: Context) -> float:
         """Speed of the faster finger [m/s]."""

@@ -1,4 +1,7 @@
-"""The gripper document: a parallel hand as data."""
+"""The gripper document: a parallel hand as data.
+
+Whether it fits its model is the matter of `station.hand_check`.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +21,9 @@ class Finger:
     Attributes:
         body: link of the finger in the hand's model.
         joint: prismatic joint that moves it.
-        pad: name of the collision geometry that touches the object.
-        closed: joint position with the pads together [m].
-        open: joint position with the hand open [m].
+        pad: name of the collision geometry that touches the object; compliant, as objects are not.
+        closed: joint position with the pads at the smallest distance [m].
+        open: joint position with the pads at the largest distance [m].
     """
 
     body: str
@@ -44,6 +47,8 @@ class Hand:
         opening: smallest and largest distance between the pads [m].
         force: force of each finger on the object while gripping [N].
         closing_speed: speed of each finger while closing [m/s].
+        coupled: one drive moves both fingers, each in proportion to its way from open to closed;
+            where the model does not say so by itself (`mimic`), it is made so.
         fingers: the two fingers; the first one is on the side of +x of G.
     """
 
@@ -57,6 +62,7 @@ class Hand:
     opening: tuple[float, float]
     force: float
     closing_speed: float
+    coupled: bool = True
     fingers: tuple[Finger, Finger]
 
     def __post_init__(self) -> None:
@@ -65,6 +71,13 @@ class Hand:
             raise InvalidInputError(f"opening {list(self.opening)} must rise from 0 or above [m]")
         if self.force <= 0.0 or self.closing_speed <= 0.0:
             raise InvalidInputError("force and closing_speed must be above 0")
+        for finger in self.fingers:
+            if finger.closed == finger.open:
+                raise InvalidInputError(
+                    f"finger {finger.body!r}: closed and open are both {finger.open:g} m"
+                )
+        if self.fingers[0].joint == self.fingers[1].joint:
+            raise InvalidInputError(f"both fingers name the joint {self.fingers[0].joint!r}")
 
     def X_AH(self, X_AG: Array) -> Array:
         """Hand body poses (..., 4, 4) that bring the grasp frame to `X_AG` (..., 4, 4)."""
@@ -79,3 +92,15 @@ def load_hand(reference: str, base: Path | None = None) -> Hand:
         DocumentError: the file does not fit the schema.
     """
     return load_document(resolve(reference, "models/hands", base), Hand)
+
+
+def locate_hand(reference: str, base: Path | None = None) -> tuple[Hand, Path]:
+    """Loads a hand document and finds the model file that it names.
+
+    Raises:
+        UnknownNameError: no such hand or model.
+        DocumentError: the file does not fit the schema.
+    """
+    path = resolve(reference, "models/hands", base)
+    hand = load_document(path, Hand)
+    return hand, resolve(hand.model, base=path.parent)

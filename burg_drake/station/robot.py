@@ -19,15 +19,14 @@ from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
+from burg_drake.station.hand_check import check_hand
+from burg_drake.station.hand_model import add_hand
 from burg_drake.station.station import Station
 
 Robot = Literal["arm", "hand", "none"]
 
 ROBOT_MODELS = ("hand", "arm", "lift")
 """Names of the robot's model instances in every plant."""
-FINGER_DAMPING = 1000.0
-"""Velocity gain of a finger [N s/m]. Without position gain and with the effort limited, this is a
-servo that moves at the commanded speed and presses with the limit."""
 LIFT_DAMPING = 1e6
 """Velocity gain of the floating hand's lift joint [N s/m]; holds a speed to 1e-5 m/s."""
 ARM_STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 1000.0])
@@ -47,23 +46,20 @@ def add_robot(
         Model instances by role: `hand`, and `arm` or `lift`.
 
     Raises:
-        InvalidInputError: the station has no arm, or its home posture is not one of this arm.
+        InvalidInputError: the hand's document does not fit its model, the station has no arm, or
+            its home posture is not one of this arm.
     """
     if robot == "none":
         return {}
-    plant, parser = builder.plant(), builder.parser()
-    (hand,) = parser.AddModels(str(station.hand_model))
-    body = plant.GetBodyByName(station.hand.body, hand)
-    for finger in station.hand.fingers:
-        actuator = plant.GetJointActuatorByName(finger.joint, hand)
-        actuator.set_controller_gains(PdControllerGains(p=0.0, d=FINGER_DAMPING))
-        actuator.set_effort_limit(station.hand.force)
-    plant.RenameModelInstance(hand, "hand")
-    models = {"hand": hand}
+    check_hand(station.hand, station.hand_model)
+    plant = builder.plant()
+    added = add_hand(builder, station.hand, station.hand_model)
+    plant.RenameModelInstance(added.instance, "hand")
+    models = {"hand": added.instance}
     if robot == "hand":
-        models["lift"] = _add_lift(plant, body, _hover(station))
+        models["lift"] = _add_lift(plant, added.body, _hover(station))
     else:
-        models["arm"] = _add_arm(builder, station, body)
+        models["arm"] = _add_arm(builder, station, added.body)
     for model in models.values():
         plant.set_gravity_enabled(model, False)
     return models

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document
-from burg_drake.station.hand import Hand
+from burg_drake.station.hand import Hand, locate_hand
+
+FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']""")
+"""A mesh in SDF, or in URDF."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,12 +166,24 @@ class Station:
 
     @property
     def content(self) -> str:
-        """Hash of the station, its hand document and the robot's model files; names and file
-        locations do not count."""
+        """Hash of the station, its hand document and the robot's model files with their meshes;
+        names and file locations do not count."""
         arm = self.document.arm and replace(self.document.arm, model="")
         placed = replace(self.document, name="", description="", hand="", arm=arm)
         models = [self.hand_model, *([self.arm_model] if self.arm_model else [])]
-        return content_hash(dump_document(placed), dump_document(self.hand), models)
+        files = [file for model in models for file in (model, *_named_files(model))]
+        return content_hash(dump_document(placed), dump_document(self.hand), files)
+
+
+def _named_files(model: Path) -> list[Path]:
+    """The files that an SDF or URDF file names, as far as they are beside it or installed."""
+    text = model.read_text(encoding="utf-8", errors="replace")
+    named = dict.fromkeys(uri or name for uri, name in FILE_REFERENCE.findall(text))
+    files = []
+    for reference in named:
+        with contextlib.suppress(UnknownNameError):
+            files.append(resolve(reference, base=model.parent))
+    return [file for file in files if file.is_file()]
 
 
 def load_station(reference: str | Path) -> Station:
@@ -181,9 +198,7 @@ def load_station(reference: str | Path) -> Station:
     """
     path = resolve(reference, "stations")
     document = load_document(path, StationDocument)
-    hand_path = resolve(document.hand, "models/hands", path.parent)
-    hand = load_document(hand_path, Hand)
-    hand_model = resolve(hand.model, base=hand_path.parent)
+    hand, hand_model = locate_hand(document.hand, path.parent)
     arm_model = None
     if document.arm is not None:
         arm_model = resolve(document.arm.model, base=path.parent)

@@ -15,8 +15,8 @@ from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.resources import resolve
 from tools.panda_model.hand_document import hand_yaml
-from tools.panda_model.obj import mtl_text
 from tools.panda_model.sdf import arm_sdf, hand_sdf
+from tools.robot_model.obj import mtl_text
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html.
 DH = [

@@ -7,11 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.planning import RobotDiagramBuilder
+from pydrake.systems.analysis import Simulator
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.resources import resolve
-from burg_drake.station.hand import Hand, load_hand
+from burg_drake.core.resources import builtin_names, resolve
+from burg_drake.core.schema import Pose
+from burg_drake.station.hand import Finger, Hand, load_hand
+from burg_drake.station.hand_check import check_hand
+from burg_drake.station.hand_model import add_hand
+
+STUCK = Finger(body="a", joint="j", pad="pad", closed=0.02, open=0.02)
+MOVING = replace(STUCK, open=0.03)
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +53,8 @@ def test_hand_poses_bring_the_grasp_frame_to_the_goal(panda: Hand) -> None:
         ({"opening": (-0.01, 0.08)}, r"opening \[-0.01, 0.08\] must rise from 0"),
         ({"force": 0.0}, "force and closing_speed must be above 0"),
         ({"closing_speed": -0.05}, "force and closing_speed must be above 0"),
+        ({"fingers": (STUCK, STUCK)}, "finger 'a': closed and open are both 0.02 m"),
+        ({"fingers": (MOVING, MOVING)}, "both fingers name the joint 'j'"),
     ],
 )
 def test_bad_figures(panda: Hand, wrong: dict[str, object], message: str) -> None:
@@ -62,3 +72,159 @@ def test_unknown_key_and_name(tmp_path: Path) -> None:
         load_hand(str(file))
     with pytest.raises(UnknownNameError, match=r"pandahand .*did you mean 'panda_hand'"):
         load_hand("pandahand")
+
+
+@pytest.mark.parametrize("name", builtin_names("models/hands"))
+def test_built_in_hands_fit_their_models(name: str) -> None:
+    hand = load_hand(name)
+    assert hand.name == name
+    assert check_hand(hand, resolve(hand.model)).opening == pytest.approx(hand.opening, abs=1e-9)
+
+
+def one_finger(hand: Hand, index: int = 1, **changed: object) -> Hand:
+    """The hand with one finger's entries changed."""
+    fingers = list(hand.fingers)
+    fingers[index] = replace(fingers[index], **changed)  # type: ignore[arg-type]
+    return replace(hand, fingers=(fingers[0], fingers[1]))
+
+
+WRONG_DOCUMENTS = {
+    "body": (
+        lambda h: replace(h, body="panda_hnd"),
+        "body 'panda_hnd' is not in its model package://burg_drake/models/panda/panda_hand.sdf; did"
+        " you mean 'panda_hand'? Known: panda_hand, panda_leftfinger, panda_rightfinger",
+    ),
+    "finger": (
+        lambda h: one_finger(h, body="finger"),
+        "fingers[1].body 'finger' is not in its model",
+    ),
+    "joint": (
+        lambda h: one_finger(h, joint="panda_finger_joint3"),
+        "fingers[1].joint 'panda_finger_joint3' is not in its model"
+        " package://burg_drake/models/panda/panda_hand.sdf; did you mean 'panda_finger_joint2'?"
+        " Known: panda_finger_joint1, panda_finger_joint2",
+    ),
+    "pad": (
+        lambda h: one_finger(h, index=0, pad="pda"),
+        "fingers[0].pad 'pda' is not in its model package://burg_drake/models/panda/panda_hand.sdf;"
+        " did you mean 'pad'? Known: diagonal, pad, screw_mount, sledge",
+    ),
+    "limits": (
+        lambda h: one_finger(h, open=0.05),
+        "fingers[1].open is 0.05 m; joint 'panda_finger_joint2' goes from 0 to 0.04 m",
+    ),
+    "opening": (
+        lambda h: replace(h, opening=(0.0, 0.1)),
+        "with both fingers open the pads are 80.0 mm apart along x of G; opening says 100.0 mm",
+    ),
+    "closed": (
+        lambda h: one_finger(h, closed=0.002),
+        "with both fingers closed the pads are 2.0 mm apart along x of G; opening says 0.0 mm",
+    ),
+    "swapped": (
+        lambda h: replace(h, fingers=h.fingers[::-1]),
+        "the first finger is on the side of -x of G; exchange the fingers, or turn X_HG by 180 deg",
+    ),
+    "turned": (
+        lambda h: replace(h, X_HG=Pose((0.0, 0.0, 0.1034))),
+        "with both fingers open the pads are -17.5 mm apart along x of G; opening says 80.0 mm",
+    ),
+    "aside": (
+        lambda h: replace(h, X_HG=Pose((0.0, 0.003, 0.1034), rpy_deg=(0.0, 0.0, 90.0))),
+        "with both fingers open the middle between the pads is at x = -3.0 mm of G",
+    ),
+    "short": (
+        lambda h: replace(h, X_HG=Pose((0.0, 0.0, 0.09), rpy_deg=(0.0, 0.0, 90.0))),
+        "G is not between the pads: with both fingers open the pad of fingers[0] reaches from"
+        " 4.4 mm to 22.9 mm along z of G",
+    ),
+    "upside down": (
+        lambda h: replace(h, X_HG=Pose((0.0, 0.0, 0.1034), rpy_deg=(180.0, 0.0, 90.0))),
+        "+z of G, the approach direction, points towards 'panda_hand'; turn X_HG",
+    ),
+    "force": (
+        lambda h: replace(h, force=80.0),
+        "force 80 N is more than the 70 N that joint 'panda_finger_joint1' has in",
+    ),
+    "speed": (
+        lambda h: replace(h, closing_speed=0.1),
+        "closing_speed 0.1 m/s is more than the 0.05 m/s that joint 'panda_finger_joint1' has in",
+    ),
+    "uncoupled": (
+        lambda h: replace(h, coupled=False),
+        "coupled is false, but in the model one finger follows the other",
+    ),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_DOCUMENTS)
+def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
+    change, message = WRONG_DOCUMENTS[wrong]
+    with pytest.raises(InvalidInputError) as error:
+        check_hand(change(panda), resolve(panda.model))
+    assert str(error.value).startswith("hand 'panda_hand': " + message)
+
+
+MIMIC = '<drake:mimic joint="panda_finger_joint1" multiplier="1" offset="0"/>'
+COMPLIANT = "<drake:compliant_hydroelastic/>"
+LOOSE_LINK = """
+    <link name="camera"/><joint name="tilt" type="revolute"><parent>panda_hand</parent>
+    <child>camera</child><axis><xyz>0 0 1</xyz></axis></joint>
+    <drake:collision_filter_group"""
+
+
+def changed_model(folder: Path, old: str, new: str) -> Path:
+    """The Panda hand's model with other text in it."""
+    path = resolve("package://burg_drake/models/panda/panda_hand.sdf")
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    text = text.replace("meshes/", f"{path.parent}/meshes/").replace(old, new)
+    (folder / "hand.sdf").write_text(text, encoding="utf-8")
+    return folder / "hand.sdf"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (MIMIC, MIMIC.replace('"1"', '"0.5"'), "the model couples the fingers .mimic. in another"),
+        (MIMIC, MIMIC.replace('"1"', '"-1"'), "the model couples the fingers .mimic. in another"),
+        (COMPLIANT, "", r"fingers\[0\].pad 'pad' is not compliant; give it drake:compliant_hydroe"),
+        (COMPLIANT, "<drake:rigid_hydroelastic/>", r"fingers\[0\].pad 'pad' is not compliant"),
+        ('name="pad"', 'name="tip"', r"fingers\[0\].pad 'pad' is not in its model"),
+        (
+            "    <drake:collision_filter_group",
+            LOOSE_LINK,
+            "actuators for panda_finger_joint1, ",
+        ),
+        ("<sdf ", "<sfd ", "cannot be loaded as one model"),
+    ],
+)
+def test_model_that_does_not_fit(
+    panda: Hand, tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        check_hand(panda, changed_model(tmp_path, old, new))
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+def test_the_document_couples_what_the_model_leaves_free(
+    panda: Hand, tmp_path: Path, coupled: bool
+) -> None:
+    """Two fingers of one mass share the momentum that one of them is given; or it keeps it."""
+    hand = replace(panda, coupled=coupled)
+    path = changed_model(tmp_path, MIMIC, "")
+    check_hand(hand, path)
+    builder = RobotDiagramBuilder(time_step=0.001)
+    plant = builder.plant()
+    found = add_hand(builder, hand, path)
+    plant.WeldFrames(plant.world_frame(), found.body.body_frame())
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+    plant.Finalize()
+    simulator = Simulator(builder.Build())
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    for joint, rate in zip(found.joints, (0.02, 0.0), strict=True):
+        joint.set_translation(context, 0.01)
+        joint.set_translation_rate(context, rate)
+    simulator.AdvanceTo(0.1)
+    moved = [joint.get_translation(context) - 0.01 for joint in found.joints]
+    assert moved == pytest.approx([0.001, 0.001] if coupled else [0.002, 0.0], abs=5e-5)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from manifold3d import Manifold
 
-from tools.panda_model.fields import cylinder, half_space, join, meet, prism
 from tools.panda_model.limb_look import CELL, SEAM
-from tools.panda_model.obj import Part
-from tools.panda_model.solids import plate, rod
-from tools.panda_model.surface import Piece, part, pieces
+from tools.robot_model.fields import cylinder, half_space, join, meet, prism
+from tools.robot_model.obj import Part
+from tools.robot_model.solids import plate, rod
+from tools.robot_model.surface import Piece, part, pieces
 
 TOP = 0.140
 """Joint 1 begins here [m]."""

@@ -7,43 +7,9 @@ of the link B.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 
-import numpy as np
-
-
-@dataclass(frozen=True)
-class Box:
-    """Box of `size` [m], centred at `p_BG`, turned by `rpy` [rad] in the link frame B."""
-
-    name: str
-    size: tuple[float, float, float]
-    p_BG: tuple[float, float, float]
-    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Capsule:
-    """All points within `radius` [m] of the segment from `p_BStart` to `p_BEnd`."""
-
-    name: str
-    radius: float
-    p_BStart: tuple[float, float, float]
-    p_BEnd: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Cylinder:
-    """Cylinder of `radius` [m] from the centre of one end to that of the other."""
-
-    name: str
-    radius: float
-    p_BStart: tuple[float, float, float]
-    p_BEnd: tuple[float, float, float]
-
-
-Shape = Box | Capsule | Cylinder
+from tools.robot_model.shapes import PAD, Box, Capsule, Cylinder, Shape
 
 
 def _turned(shapes: tuple[Capsule, ...], sign: float, shift: float) -> tuple[Capsule, ...]:
@@ -115,9 +81,6 @@ HAND_SHAPES: tuple[Shape, ...] = (
 )
 """Collision shapes of the hand without fingers; its cable is left out."""
 
-PAD = "pad"
-"""Collision geometry of each finger that touches the object."""
-
 LEFT_FINGER_SHAPES: tuple[Box, ...] = (
     # 7.58 mm in franka_ros, which lets the closed pads overlap by 0.04 mm.
     Box(PAD, (0.0175, 0.0152, 0.0185), (0.0, 0.0076, 0.04525)),
@@ -126,22 +89,3 @@ LEFT_FINGER_SHAPES: tuple[Box, ...] = (
     Box("sledge", (0.022, 0.0088, 0.0038), (0.0, 0.0068, 0.0022)),
 )
 """Collision shapes of the left finger (franka_ros, franka_hand.xacro)."""
-
-
-def mirrored_finger(boxes: tuple[Box, ...]) -> tuple[Box, ...]:
-    """The same boxes turned by 180 deg about z: the right finger from the left one."""
-    return tuple(
-        Box(b.name, b.size, (-b.p_BG[0], -b.p_BG[1], b.p_BG[2]), (-b.rpy[0], 0.0, 0.0))
-        for b in boxes
-    )
-
-
-def axis_pose(shape: Capsule | Cylinder) -> tuple[np.ndarray, np.ndarray, float]:
-    """Centre (3,) [m], roll-pitch-yaw (3,) [rad] and length [m] of a shape whose axis is z."""
-    start, end = np.asarray(shape.p_BStart), np.asarray(shape.p_BEnd)
-    axis = end - start
-    length = float(np.linalg.norm(axis))
-    x, y, z = axis / length
-    # R = Rz(yaw) Ry(pitch) takes z to the axis.
-    rpy = np.array([0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)])
-    return (start + end) / 2, rpy, length

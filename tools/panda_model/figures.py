@@ -22,6 +22,8 @@ from math import pi
 
 import numpy as np
 
+from tools.robot_model.inertia import Inertia
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -63,23 +65,6 @@ FLANGE_OFFSET = 0.107
 
 HOME = (0.0, -pi / 4, 0.0, -3 * pi / 4, 0.0, pi / 2, pi / 4)
 """Usual ready posture of the arm [rad]."""
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Mass properties of a link B.
-
-    Attributes:
-        mass: [kg].
-        p_BBcm: centre of mass in the link frame [m].
-        moments: Ixx, Iyy, Izz about the centre of mass, axes of the link frame [kg m^2].
-        products: Ixy, Ixz, Iyz, likewise (entries of the tensor).
-    """
-
-    mass: float
-    p_BBcm: tuple[float, float, float]
-    moments: tuple[float, float, float]
-    products: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 LINK_INERTIAS: tuple[Inertia, ...] = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tools.panda_model.collision import PAD
 from tools.panda_model.figures import (
     FINGER_EFFORT,
     FINGER_SPEED,
@@ -10,6 +9,7 @@ from tools.panda_model.figures import (
     GRASP_FORCE,
     TCP_HEIGHT,
 )
+from tools.robot_model.shapes import PAD
 
 
 def hand_yaml() -> str:
@@ -33,6 +33,7 @@ X_HG: {{translation: [0.0, 0.0, {TCP_HEIGHT}], rpy_deg: [0.0, 0.0, 90.0]}}
 opening: [0.0, {2 * FINGER_TRAVEL}]  # distance between the pads [m]
 force: {GRASP_FORCE}  # of each finger while gripping [N]
 closing_speed: {FINGER_SPEED}  # of each finger [m/s]
+coupled: true  # one drive moves both fingers
 # The first finger is on the side of +x of G. `pad`: collision geometry that touches the object.
 fingers:
 {fingers}"""

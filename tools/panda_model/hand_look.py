@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from manifold3d import Manifold
 
-from tools.panda_model.obj import Part
-from tools.panda_model.solids import plate, rod, rounded_hull
-from tools.panda_model.surface import part
+from tools.robot_model.obj import Part
+from tools.robot_model.solids import plate, rod, rounded_hull
+from tools.robot_model.surface import part
 
 FRONT = (
     (0.0935, -0.0085),

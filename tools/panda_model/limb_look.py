@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tools.panda_model.fields import (
+from tools.robot_model.fields import (
     Field,
     Vector,
     capsule,
@@ -14,9 +14,9 @@ from tools.panda_model.fields import (
     join,
     meet,
 )
-from tools.panda_model.obj import Part
-from tools.panda_model.solids import rod
-from tools.panda_model.surface import Piece, part, pieces, turned
+from tools.robot_model.obj import Part
+from tools.robot_model.solids import rod
+from tools.robot_model.surface import Piece, part, pieces, turned
 
 RADIUS = 0.055
 """Of the tubes and drums of the arm [m]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from tools.panda_model.base_look import base_parts
 from tools.panda_model.hand_look import finger_parts, hand_parts
 from tools.panda_model.limb_look import elbow_parts, shoulder_parts
-from tools.panda_model.obj import Part
 from tools.panda_model.wrist_look import flange_parts, forearm_parts, wrist_parts
+from tools.robot_model.obj import Part
 
 
 def link_parts() -> dict[str, list[Part]]:

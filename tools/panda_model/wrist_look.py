@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tools.panda_model.fields import (
+from tools.panda_model.limb_look import CELL, RADIUS, SEAM
+from tools.robot_model.fields import (
     box,
     cylinder,
     domed,
@@ -14,10 +15,9 @@ from tools.panda_model.fields import (
     prism,
     sphere,
 )
-from tools.panda_model.limb_look import CELL, RADIUS, SEAM
-from tools.panda_model.obj import Part
-from tools.panda_model.solids import plate, rod
-from tools.panda_model.surface import Piece, part, pieces, turned
+from tools.robot_model.obj import Part
+from tools.robot_model.solids import plate, rod
+from tools.robot_model.surface import Piece, part, pieces, turned
 
 WRIST = 0.088
 """Offset of joint 7 from joint 6 [m]."""

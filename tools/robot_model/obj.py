@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MATERIAL_FILE = "panda.mtl"
-
 
 @dataclass(frozen=True)
 class Part:
@@ -46,9 +44,9 @@ MATERIALS: dict[str, Material] = {
 """Colours of the parts."""
 
 
-def obj_text(parts: Iterable[Part]) -> str:
+def obj_text(parts: Iterable[Part], material_file: str) -> str:
     """OBJ text of the parts; positions to 0.01 mm, normals to 0.001."""
-    lines = [f"mtllib {MATERIAL_FILE}"]
+    lines = [f"mtllib {material_file}"]
     offset = 1
     for part in parts:
         lines.append(f"usemtl {part.material}")

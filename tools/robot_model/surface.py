@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from manifold3d import Manifold, Mesh64
 
-from tools.panda_model.fields import Field, Vector, gradient, inset
-from tools.panda_model.obj import Part
-from tools.panda_model.surface_nets import surface_net
+from tools.robot_model.fields import Field, Vector, gradient, inset
+from tools.robot_model.obj import Part
+from tools.robot_model.surface_nets import surface_net
 
 CREASE = np.cos(np.deg2rad(35.0))
 """Faces that differ more than this from the smooth normal keep an edge."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tools.panda_model.fields import Field, gradient
+from tools.robot_model.fields import Field, gradient
 
 NEWTON_STEPS = 4
 

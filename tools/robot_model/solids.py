@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from manifold3d import CrossSection, FillRule, JoinType, Manifold
 
-from tools.panda_model.fields import Vector
+from tools.robot_model.fields import Vector
 
 SEGMENTS = 64
 """Segments of a full circle."""

@@ -3,7 +3,7 @@
 The tetrahedra that Drake makes of a box are too few for the torsional friction of a patch and too
 many for what they yield. Here a star of tetrahedra joins the centre, where the pressure is highest,
 with the surface, whose front and back are divided into 2 x 2 squares. The mesh is its own image
-when turned by 180 degrees about z, as the right finger is of the left one.
+when turned by 180 degrees about z, as the one finger is of the other one.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import numpy as np
 PAD_FILE = "pad.vtk"
 
 
-def pad_vtk(size: Sequence[float]) -> str:
+def pad_vtk(size: Sequence[float], thickness: int = 1) -> str:
     """Text of a VTK file.
 
     Args:
-        size: extents of the pad [m]; y is the thickness, front and back are the faces along y.
+        size: extents of the pad [m].
+        thickness: the axis across front and back: 0 for x, 1 for y.
     """
     half = np.array(size) / 2
     points: list[tuple[int, int, int]] = [(0, 0, 0)]
@@ -30,7 +31,10 @@ def pad_vtk(size: Sequence[float]) -> str:
             if corner not in points:
                 points.append(corner)
         cells.append([0, *(points.index(corner) for corner in triangle)])
-    p = np.array(points) * half
+    corners = np.array(points)
+    if thickness == 0:
+        corners = corners[:, (1, 0, 2)]
+    p = corners * half
     lines = ["# vtk DataFile Version 3.0", "Finger pad", "ASCII", "DATASET UNSTRUCTURED_GRID"]
     lines.append(f"POINTS {len(p)} double")
     lines.extend(" ".join(f"{v:.9g}" for v in point + 0.0) for point in p)

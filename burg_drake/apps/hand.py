@@ -1,0 +1,57 @@
+"""`burg-drake hand`: list the hands that there are, check one of your own."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from burg_drake.apps.arguments import add_group, add_verb
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verbs."""
+    group = add_group(verbs, "hand", "list the built-in hands, check a hand document")
+    add_verb(group, "list", run_list, "list the built-in hands", "burg-drake hand list")
+    check = add_verb(
+        group,
+        "check",
+        run_check,
+        "hold a hand document against its model (exit code 2 if they do not fit)",
+        "burg-drake hand check wsg_50",
+        "burg-drake hand check my_hand.yaml",
+    )
+    check.add_argument(
+        "hand", metavar="HAND", help="hand document, or name of a built-in one: wsg_50"
+    )
+
+
+def run_list(arguments: argparse.Namespace) -> int:
+    """Prints name and description of each built-in hand."""
+    from burg_drake.core.resources import builtin_names
+    from burg_drake.station.hand import load_hand
+
+    hands = [load_hand(name) for name in builtin_names("models/hands")]
+    width = max(len(hand.name) for hand in hands)
+    for hand in hands:
+        print(f"{hand.name:{width}}  {hand.description}")
+    return 0
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Prints what a hand does and measures; what does not fit is an error."""
+    from burg_drake.station.hand import locate_hand
+    from burg_drake.station.hand_check import check_hand
+
+    hand, model = locate_hand(arguments.hand)
+    figures = check_hand(hand, model)
+    low, high = (round(1e3 * width, 1) + 0.0 for width in figures.opening)
+    thickness, *face = (1e3 * extent for extent in figures.pad_size)
+    x, y, z = hand.X_HG.translation
+    print(f"{hand.name}: the document fits {model}")
+    print(f"  opening        {low:.1f} to {high:.1f} mm, measured between the pads")
+    print(f"  pads           {face[0]:.1f} x {face[1]:.1f} mm, {thickness:.1f} mm thick")
+    print(f"  grasp frame    at ({1e3 * x:g}, {1e3 * y:g}, {1e3 * z:g}) mm of {hand.body}")
+    print(f"  force          {hand.force:g} N a finger")
+    print(f"  closing speed  {1e3 * hand.closing_speed:g} mm/s a finger")
+    print(f"  fingers        {'coupled' if hand.coupled else 'independent'}")
+    return 0
