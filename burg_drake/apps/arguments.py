@@ -134,6 +134,14 @@ def positive(text: str) -> float:
     return value
 
 
+def not_negative(text: str) -> float:
+    """A finite number from 0."""
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is below 0")
+    return value
+
+
 def approach_angle(text: str) -> float:
     """An angle from straight down in degrees, above 0 to 180."""
     value = number(text)

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from burg_drake import __version__
-from burg_drake.apps import evaluate, grasps, library, replay, report, scene
+from burg_drake.apps import evaluate, grasps, hand, library, replay, report, robustness, scene
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError
 
@@ -20,7 +20,7 @@ INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
 
-VERBS = (library, scene, evaluate, replay, grasps, report)
+VERBS = (library, scene, evaluate, robustness, replay, grasps, report, hand)
 
 
 def build_parser() -> Parser:

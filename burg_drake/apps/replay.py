@@ -1,17 +1,32 @@
-"""`burg-drake replay`: the recording of one trial of a run."""
+"""`burg-drake replay`: one trial again, from a run or from its row alone, compared and recorded."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_verb, add_view
+from burg_drake.apps.arguments import add_verb, add_view, positive_int
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.inputs import Inputs
     from burg_drake.evaluation.judge import Verdict
-    from burg_drake.evaluation.run_store import Run
+    from burg_drake.evaluation.origin import Origin
+    from burg_drake.evaluation.table import Columns
+    from burg_drake.evaluation.trial import Trial
+    from burg_drake.simulation.result import TrialResult
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is to be replayed."""
+
+    trial: Trial
+    origin: Origin
+    inputs: Inputs
 
 
 def add_to(verbs: Any) -> None:
@@ -20,74 +35,152 @@ def add_to(verbs: Any) -> None:
         verbs,
         "replay",
         run_replay,
-        "show the trial of one grasp of a run in Meshcat",
+        "execute one recorded trial again, compare it with the record, and show it in Meshcat",
         "burg-drake replay runs/first --best",
-        "burg-drake replay runs/first --grasp mug-0123456789",
-        "burg-drake replay runs/first --best --html replay.html",
+        "burg-drake replay runs/first --grasp mug-0123456789 --html replay.html",
+        "burg-drake replay results.csv --row 17",
+        "burg-drake replay one_row.csv --scene runs/first/scene.yaml",
+        "",
+        "A row and its header are enough, wherever they were copied to.",
     )
-    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
-    which = parser.add_mutually_exclusive_group(required=True)
+    parser.add_argument(
+        "results",
+        metavar="RESULTS",
+        help="folder of a run, or a table of results (.csv, .parquet), or a few rows of one",
+    )
+    which = parser.add_mutually_exclusive_group()
     which.add_argument("--grasp", metavar="ID", help="id of a grasp, from the table of results")
     which.add_argument(
+        "--row", metavar="N", type=positive_int, help="row of the table, the first one is 1"
+    )
+    which.add_argument(
         "--best", action="store_true", help="the lifted grasp that slipped and disturbed least"
+    )
+    parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
+    parser.add_argument("--station", metavar="FILE", help="where its station is now")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="replay even if the scene or station is not the one of the trial",
     )
     add_view(parser)
 
 
 def run_replay(arguments: argparse.Namespace) -> int:
-    """Executes a grasp once more, recorded."""
+    """Executes a trial once more, recorded; 1 if it ends unlike the record."""
     from burg_drake.apps.live import open_view, present
-    from burg_drake.evaluation.run_store import load_run
-    from burg_drake.simulation.hand_trial import TrialSettings
-    from burg_drake.visualization.replay import describe, record_trial
+    from burg_drake.evaluation.rerun import as_result, comparison, differences
+    from burg_drake.visualization.replay import describe
 
-    run = load_run(arguments.run_folder)
-    id = _best(run) if arguments.best else arguments.grasp
-    candidate = run.candidate(id)
-    scene, station = run.scene(), run.station()
+    path = Path(arguments.results)
+    is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
+    source = _from_table(path, arguments) if is_table else _from_run(path, arguments)
+    for note in source.inputs.notes:
+        print(f"burg-drake: {note}", file=sys.stderr)
     meshcat = open_view(arguments)
-    result = record_trial(
-        scene,
-        station,
-        candidate.instance,
-        candidate.X_OG,
-        meshcat,
-        engine=run.document.engine,
-        settings=TrialSettings(**run.document.trial),
-    )
-    lines = describe(result)
-    verdict = run.verdicts.get(id)
-    if verdict is not None and verdict.outcome is not result.outcome:
-        lines.insert(0, _other_verdict(run, verdict))
+    verdict, shown = _execute(source, meshcat)
+    lines = describe(as_result(verdict))
+    recorded = source.trial.verdict
+    found = [] if recorded is None else differences(recorded, verdict)
+    lines += [] if recorded is None else comparison(found, source.origin)
+    if shown.outcome is not verdict.outcome:
+        lines += ["shown is the hand alone, to the end:", *describe(shown)]
     for line in lines:
         print(line)
-    if arguments.html is None and result.margins.end_time == 0.0:
+    if arguments.html is None and shown.margins.end_time == 0.0:
         print("nothing moves: the trial ended at its start", file=sys.stderr)
-    present(meshcat, arguments, title=f"{scene.name}: {id}", caption=lines)
-    return 0
+    title = f"{source.inputs.scene.name}: {source.trial.id}"
+    present(meshcat, arguments, title=title, caption=lines)
+    return 0 if all(difference.rounding for difference in found) else 1
 
 
-def _other_verdict(run: Run, verdict: Verdict) -> str:
-    """Introduces a trial that ends unlike the run's, with what may be the cause."""
+def _execute(source: Source, meshcat: Any) -> tuple[Verdict, TrialResult]:
+    """The verdict as the row's engine gives it, and the whole trial as shown.
+
+    An engine that ends trials early is run twice: as recorded, and to the end for the picture.
+    """
     from burg_drake.core.outcome import Stage
-    from burg_drake.evaluation.run_document import software_versions
+    from burg_drake.evaluation.judge import trial_verdict
+    from burg_drake.evaluation.rerun import rerun
+    from burg_drake.visualization.replay import record_trial
 
-    there, here = run.document.versions, software_versions()
-    changed = [
-        f"{name} {there[name]}, now {here[name]}"
-        for name in there
-        if name in here and there[name] != here[name]
-    ]
-    versions = f" (with {'; '.join(changed)})" if changed else ""
-    trial = "the hand alone" if verdict.stage is Stage.REACHABLE else "this time"
-    return f"the run's verdict: {verdict.outcome}{versions}; {trial}:"
+    trial, origin = source.trial, source.origin
+    scene, station = source.inputs.scene, source.inputs.station
+    shown = record_trial(
+        scene,
+        station,
+        trial.instance,
+        trial.X_OG,
+        meshcat,
+        engine=origin.engine,
+        settings=origin.settings(),
+        friction=trial.friction,
+        mass=trial.mass,
+    )
+    decided = None if trial.verdict is None else trial.verdict.stage
+    if origin.engine.whole_trial and decided is not Stage.REACHABLE:
+        return trial_verdict(shown), shown
+    return rerun(scene, station, trial, origin), shown
 
 
-def _best(run: Run) -> str:
-    best = run.best()
-    if not best:
-        raise InvalidInputError(
-            f"{run.path}: no grasp was lifted; choose one with --grasp ID"
-            f" (ids are in {run.table_path.name})"
-        )
-    return best[0]
+def _from_run(path: Path, arguments: argparse.Namespace) -> Source:
+    from burg_drake.evaluation.inputs import Inputs, find_inputs
+    from burg_drake.evaluation.run_document import origin_of
+    from burg_drake.evaluation.run_store import load_run
+
+    run = load_run(path)
+    if arguments.grasp is not None:
+        id = arguments.grasp
+    else:
+        id = str(run.results["id"][_choose(run.results, path, arguments)])
+    trial, origin = run.trial(id), origin_of(run.document)
+    if arguments.scene is None and arguments.station is None and not arguments.force:
+        return Source(trial, origin, Inputs(run.scene(), run.station()))
+    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return Source(trial, origin, find_inputs(origin, f"{path}, {id},", path, **options))
+
+
+def _from_table(path: Path, arguments: argparse.Namespace) -> Source:
+    from burg_drake.evaluation.inputs import find_inputs
+    from burg_drake.evaluation.origin import read_origin
+    from burg_drake.evaluation.table import table_row
+    from burg_drake.evaluation.table_file import read_table
+    from burg_drake.evaluation.trial import read_trial
+
+    columns = read_table(path)
+    if "id" not in columns:
+        raise InvalidInputError(f"{path} is not a results table (it has no column id)")
+    index = _choose(columns, path, arguments)
+    where, row = f"{path}, row {index + 1}", table_row(columns, index)
+    trial, origin = read_trial(row, where), read_origin(row, where)
+    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return Source(trial, origin, find_inputs(origin, where, path.parent, **options))
+
+
+def _choose(columns: Columns, path: Path, arguments: argparse.Namespace) -> int:
+    """Index of the row that is asked for."""
+    from burg_drake.evaluation.rows import best_rows, rows_of
+
+    ids = columns["id"].tolist()
+    if arguments.row is not None:
+        if arguments.row > len(ids):
+            raise InvalidInputError(f"{path} has no row {arguments.row}; it has {len(ids)}")
+        return int(arguments.row) - 1
+    if arguments.grasp is not None:
+        rows = rows_of(columns, arguments.grasp, str(path))
+        if len(rows) > 1:
+            raise InvalidInputError(
+                f"{path} has {len(rows)} rows of {arguments.grasp}, the first is row"
+                f" {rows[0] + 1}; choose one with --row"
+            )
+        return rows[0]
+    if arguments.best:
+        best = best_rows(columns)
+        if not best:
+            raise InvalidInputError(
+                f"{path}: no grasp was lifted; choose one with --grasp ID or --row N"
+            )
+        return best[0]
+    if len(ids) != 1:
+        raise InvalidInputError(f"{path} has {len(ids)} rows; give --grasp ID, --row N or --best")
+    return 0

@@ -1,17 +1,33 @@
-"""`burg-drake scene`: show and validate scenes."""
+"""`burg-drake scene`: show, validate and settle scenes."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_group, add_scene, add_station, add_verb, add_view
+from burg_drake.apps.arguments import (
+    DEFAULT_ENGINE,
+    ENGINE_NAMES,
+    add_group,
+    add_scene,
+    add_station,
+    add_verb,
+    add_view,
+    positive,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.settle_scene import SettledScene
+
+DEFAULT_TIME_LIMIT = 10.0
+"""In step with simulation.settle_scene, which imports too much for a help text."""
 
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "scene", "show and validate scenes")
+    group = add_group(verbs, "scene", "show, validate and settle scenes")
     show = add_verb(
         group,
         "show",
@@ -34,6 +50,43 @@ def add_to(verbs: Any) -> None:
     )
     add_scene(validate)
     add_station(validate)
+    _add_settle(group)
+
+
+def _add_settle(group: Any) -> None:
+    settle = add_verb(
+        group,
+        "settle",
+        run_settle,
+        "let the objects of a scene fall and come to rest, and write the scene that this gives",
+        "burg-drake scene settle heap.yaml -o settled.yaml",
+        "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
+        "",
+        "Exit code 1, and no file without --keep, if something still moves or fell off the table.",
+    )
+    add_scene(settle)
+    add_station(settle)
+    settle.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
+    )
+    settle.add_argument(
+        "--time-limit",
+        metavar="S",
+        type=positive,
+        default=DEFAULT_TIME_LIMIT,
+        help="simulated time allowed (default: %(default)g)",
+    )
+    settle.add_argument(
+        "--keep",
+        action="store_true",
+        help="write the scene even if something still moves, and without what fell off the table",
+    )
+    settle.add_argument(
+        "--engine",
+        choices=ENGINE_NAMES,
+        default=DEFAULT_ENGINE,
+        help="how time is stepped (default: %(default)s)",
+    )
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -76,3 +129,70 @@ def run_validate(arguments: argparse.Namespace) -> int:
             f" on station {station.name}"
         )
     return 1 if any(issue.is_error for issue in issues) else 0
+
+
+def run_settle(arguments: argparse.Namespace) -> int:
+    """Settles a scene; 1 if an object still moves or is gone."""
+    from burg_drake.scene.scene import load_scene
+    from burg_drake.simulation.settle_scene import settle_scene
+    from burg_drake.station.engine import engine_preset
+    from burg_drake.station.station import load_station
+
+    scene = load_scene(arguments.scene)
+    station = load_station(arguments.station)
+    settled = settle_scene(
+        scene,
+        station,
+        engine=engine_preset(arguments.engine),
+        time_limit=arguments.time_limit,
+    )
+    if settled.at_rest or arguments.keep:
+        _write_settled(settled, arguments.output)
+    _print_displacements(settled)
+    if settled.at_rest:
+        print(f"at rest after {settled.duration:.2f} s")
+    if settled.at_rest or arguments.keep:
+        print(f"wrote {arguments.output}")
+    for line in _faults(settled):
+        print(f"burg-drake: {scene.path}: {line}", file=sys.stderr)
+    return 0 if settled.at_rest else 1
+
+
+def _write_settled(settled: SettledScene, output: str) -> None:
+    """Writes a scene so that its library is found from there, too."""
+    import dataclasses
+    from pathlib import Path
+
+    from burg_drake.core.resources import builtin_names
+    from burg_drake.evaluation.run_document import portable_reference
+    from burg_drake.scene.scene import save_scene
+
+    path, document = Path(output), settled.scene.document
+    if document.library not in builtin_names("models"):
+        library = portable_reference(settled.scene.library.root, path.parent)
+        document = dataclasses.replace(document, library=library)
+    save_scene(document, path)
+
+
+def _print_displacements(settled: SettledScene) -> None:
+    wide = max((len(name) for name in settled.displacements), default=0)
+    for name, moved in settled.displacements.items():
+        angle = math.degrees(moved.angle)
+        print(f"{name:<{wide}}  moved {moved.distance * 1e3:7.1f} mm, turned {angle:5.1f} deg")
+
+
+def _faults(settled: SettledScene) -> list[str]:
+    """What keeps a scene from being settled, a line each."""
+    lines = []
+    if settled.moving:
+        moving = ", ".join(
+            f"{name!r} at {v.speed * 1e3:.1f} mm/s and {math.degrees(v.turning):.1f} deg/s"
+            for name, v in settled.moving.items()
+        )
+        lines.append(
+            f"after {settled.duration:g} s something still moves: {moving};"
+            " give a longer --time-limit, or --keep"
+        )
+    if settled.fallen:
+        lines.append(f"fell off the table: {', '.join(settled.fallen)}")
+    return lines

@@ -85,8 +85,15 @@ def quaternion_from_rotation(R_AB: ArrayLike) -> Array:
 
 
 def rotation_angle(R_AB: ArrayLike) -> Array:
-    """(..., 3, 3) -> (...,) angle of the rotation [rad], in [0, pi]."""
-    return _batch_matrix(R_AB, lambda R: R.magnitude()[:, None], 1)[..., 0]
+    """(..., 3, 3) -> (...,) angle of the rotation [rad], in [0, pi].
+
+    From sine and cosine both (trace and skew part), which is exact for small angles, too.
+    """
+    R = np.asarray(R_AB, dtype=float)
+    skew = R - np.swapaxes(R, -1, -2)
+    x, y, z = skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]
+    trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
+    return np.arctan2(np.sqrt(x * x + y * y + z * z), trace - 1.0)
 
 
 def rot_z(angle: float) -> Array:

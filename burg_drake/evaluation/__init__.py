@@ -7,12 +7,13 @@ from burg_drake.core.lazy import attach
 __all__, __getattr__, __dir__ = attach(
     __name__,
     {
+        "burg_drake.core.statistics": ["wilson_interval"],
         "burg_drake.evaluation.cascade": ["evaluate"],
         "burg_drake.evaluation.judge": ["Decision", "Judge", "StationJudge", "Verdict"],
         "burg_drake.evaluation.progress": ["Progress"],
         "burg_drake.evaluation.report": ["write_report"],
         "burg_drake.evaluation.run_store": ["Run", "load_run"],
-        "burg_drake.evaluation.summary": ["summarize", "summary_view", "wilson_interval"],
-        "burg_drake.evaluation.table": ["read_table"],
+        "burg_drake.evaluation.summary": ["summarize", "summary_view"],
+        "burg_drake.evaluation.table_file": ["read_table"],
     },
 )

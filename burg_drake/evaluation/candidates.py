@@ -38,11 +38,15 @@ class Candidate:
         id: `INSTANCE-GRASP`, unique in a run.
         instance: name of the placed object.
         X_OG: (4, 4) grasp in the object frame.
+        friction: the target's coefficient, in place of the library's.
+        mass: of the target, in place of the library's [kg].
     """
 
     id: str
     instance: str
     X_OG: Array
+    friction: float | None = None
+    mass: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,7 @@ from burg_drake.evaluation.run_document import (
     Library,
     RunDocument,
     Stretch,
+    TableFormat,
     input_reference,
     numbers,
     portable_reference,
@@ -55,7 +56,7 @@ from burg_drake.evaluation.run_store import (
     save_run,
     write_copies,
 )
-from burg_drake.evaluation.table import TableFormat, require_writer, write_table
+from burg_drake.evaluation.table_file import require_writer, write_table
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.engine import ENGINES, Engine, engine_preset
 from burg_drake.station.station import Station, load_station

@@ -3,6 +3,10 @@
 A grasp that ends its worker (a crash inside Drake) is tried once more, alone, in a fresh process;
 when that dies too, the grasp's outcome is `simulation_failed` and the others go on. So do they when
 a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended.
+
+The first stage is asked about many grasps at once, which costs a fraction of asking about each, and
+only what it passes on is handed out grasp by grasp. When a worker ends while it does so, its grasps
+go through all stages one by one, so that the one to blame is found.
 """
 
 from __future__ import annotations
@@ -14,18 +18,34 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
+from typing import TypeVar
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.processes import cause_of_death, default_workers, start_worker
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Judge, Verdict
-from burg_drake.evaluation.worker import Begins, Dying, Judged, Message, Ready, Task, Unable
+from burg_drake.evaluation.judge import Judge, Screened, Verdict
+from burg_drake.evaluation.worker import (
+    Begins,
+    Dying,
+    Judged,
+    Message,
+    Ready,
+    Screening,
+    Screens,
+    Task,
+    Unable,
+)
 
-TASK_SIZE = 8
+Item = TypeVar("Item")
+
+TASK_SIZE = 4
 """Grasps handed out at a time: few enough that workers finish together."""
+SCREENING_SIZE = 512
+"""Grasps screened at a time: enough that more would hardly be cheaper each."""
 GRASP_TIME_LIMIT = 300.0
-"""Wall time for one grasp [s]; a trial takes about a second, and the slowest ones some tens."""
+"""Wall time for one grasp, or one screening [s]; a trial takes about a second, the slowest ones
+some tens."""
 HOPELESS = 50
 """So many grasps in a row that end their workers, with none judged in between, end the run."""
 FALSE_STARTS = 2
@@ -59,7 +79,7 @@ def judge_all(
         raise InvalidInputError(f"workers is {count}; give 1 or more")
     pool = _Pool(make_judge, candidates)
     try:
-        yield from pool.run(min(count, len(pool.todo)))
+        yield from pool.run(min(count, -(-len(candidates) // TASK_SIZE)))
     except BaseException:
         pool.kill()
         raise
@@ -74,11 +94,13 @@ class _Worker:
         process, connection: the process and our end of the pipe.
         first: task that is kept for it until it is ready, if any.
         ready: whether its judge is built.
+        screening: grasps that it screens.
         task: grasps that it was given and has not judged yet.
         last_try: whether its task is a grasp that has ended another worker before.
         stage: the last one that it announced.
-        since: when it began with the first grasp of `task`, by `time.monotonic` [s].
-        overdue: whether it was ended because that grasp took too long.
+        since: when it began with the first grasp of `task`, or the screening, by
+            `time.monotonic` [s].
+        overdue: whether it was ended because that took too long.
         last_words: why it is about to end.
     """
 
@@ -86,7 +108,8 @@ class _Worker:
     connection: Connection
     first: Task | None = None
     ready: bool = False
-    task: deque[Candidate] = field(default_factory=deque)
+    screening: tuple[Candidate, ...] = ()
+    task: deque[tuple[Candidate, Screened | None]] = field(default_factory=deque)
     last_try: bool = False
     stage: Stage = Stage.CLEAR
     since: float = 0.0
@@ -94,19 +117,27 @@ class _Worker:
     last_words: str = ""
 
     @property
-    def idle(self) -> bool:
-        return self.ready and not self.task
+    def busy(self) -> bool:
+        return bool(self.task or self.screening)
 
-    def give(self, task: Task) -> None:
-        self.task = deque(task.candidates)
-        self.last_try = task.last_try
+    def give(self, work: Task | Screening) -> None:
+        if isinstance(work, Screening):
+            self.screening = work.candidates
+        else:
+            self.task = deque(work.grasps)
+            self.last_try = work.last_try
         self.since = time.monotonic()
-        self.send(task)
+        self.send(work)
 
     def judged(self) -> Candidate:
         """Takes the grasp off the task that a verdict has come for."""
         self.since, self.overdue = time.monotonic(), False
-        return self.task.popleft()
+        return self.task.popleft()[0]
+
+    def screened(self) -> tuple[Candidate, ...]:
+        """Takes the grasps off that are screened."""
+        candidates, self.screening, self.overdue = self.screening, (), False
+        return candidates
 
     def end_if_overdue(self) -> None:
         if time.monotonic() > self.since + GRASP_TIME_LIMIT and not self.connection.poll():
@@ -123,13 +154,18 @@ class _Worker:
 
 
 class _Pool:
-    """Open tasks and living workers."""
+    """Open work and living workers.
+
+    Attributes:
+        unscreened: grasps that nothing was asked about yet.
+        open: grasps to be judged, with the answer of the first stage if that is known.
+        workers: by their connection.
+    """
 
     def __init__(self, make_judge: Callable[[], Judge], candidates: Sequence[Candidate]) -> None:
         self.make_judge = make_judge
-        self.todo: deque[Task] = deque(
-            Task(tuple(candidates[i : i + TASK_SIZE])) for i in range(0, len(candidates), TASK_SIZE)
-        )
+        self.unscreened = deque(candidates)
+        self.open: deque[tuple[Candidate, Screened | None]] = deque()
         self.workers: dict[object, _Worker] = {}
         self.false_starts = 0
         self.crashes_in_a_row = 0
@@ -137,7 +173,7 @@ class _Pool:
     def run(self, count: int) -> Iterator[tuple[Candidate, Verdict]]:
         for _ in range(count):
             self.hire()
-        while self.todo or any(w.task or w.first for w in self.workers.values()):
+        while self.has_work or any(w.busy or w.first for w in self.workers.values()):
             for connection in wait([w.connection for w in self.workers.values()], self.patience):
                 worker = self.workers[connection]
                 try:
@@ -147,15 +183,26 @@ class _Pool:
                 else:
                     yield from self.hear(worker, message)
             for worker in self.workers.values():
-                if worker.idle and self.todo:
-                    worker.give(self.todo.popleft())
-                elif worker.task:
+                if worker.busy:
                     worker.end_if_overdue()
+                elif worker.ready and self.has_work:
+                    worker.give(self.next_work())
+
+    @property
+    def has_work(self) -> bool:
+        return bool(self.unscreened or self.open)
+
+    def next_work(self) -> Task | Screening:
+        """Grasps to judge; when there are few of them left, grasps to screen. So the two take
+        turns, and the pace of judging tells how long the rest takes."""
+        if self.unscreened and len(self.open) < TASK_SIZE:
+            return Screening(_take(self.unscreened, SCREENING_SIZE))
+        return Task(_take(self.open, TASK_SIZE))
 
     @property
     def patience(self) -> float | None:
         """Time until the next grasp takes too long [s]."""
-        since = [w.since for w in self.workers.values() if w.task and not w.overdue]
+        since = [w.since for w in self.workers.values() if w.busy and not w.overdue]
         return max(0.0, min(since) + GRASP_TIME_LIMIT - time.monotonic()) if since else None
 
     def hire(self, first: Task | None = None) -> None:
@@ -164,7 +211,7 @@ class _Pool:
 
     def replace(self) -> None:
         """Starts a worker in the place of a dead one, if there is work for it."""
-        if self.todo:
+        if self.has_work:
             self.hire()
 
     def hear(self, worker: _Worker, message: Message) -> Iterator[tuple[Candidate, Verdict]]:
@@ -181,6 +228,12 @@ class _Pool:
                 if worker.first is not None:
                     worker.give(worker.first)
                     worker.first = None
+            case Screens(screened):
+                for candidate, answer in zip(worker.screened(), screened, strict=True):
+                    if answer.decision.outcome is None:
+                        self.open.append((candidate, answer))
+                    else:
+                        yield candidate, answer.verdict()
             case Judged(verdict):
                 self.crashes_in_a_row = 0
                 yield worker.judged(), verdict
@@ -196,16 +249,16 @@ class _Pool:
                 raise SimulationError(f"cannot build the simulation: {reason}")
             self.hire(worker.first)
             return
+        self.open.extend((candidate, None) for candidate in worker.screening)
         if not worker.task:
             self.replace()
             return
         suspect = worker.task.popleft()
-        if worker.task:
-            self.todo.appendleft(Task(tuple(worker.task)))
+        self.open.extendleft(reversed(worker.task))
         if not (worker.last_try or worker.overdue):
             self.hire(Task((suspect,), last_try=True))
             return
-        yield suspect, Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
+        yield suspect[0], Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
         self.crashes_in_a_row += 1
         if self.crashes_in_a_row >= HOPELESS:
             raise SimulationError(
@@ -233,6 +286,11 @@ class _Pool:
             worker.process.wait()
             worker.connection.close()
         self.workers.clear()
+
+
+def _take(queue: deque[Item], n: int) -> tuple[Item, ...]:
+    """Takes the first n items off, or as many as there are."""
+    return tuple(queue.popleft() for _ in range(min(n, len(queue))))
 
 
 def _start(make_judge: Callable[[], Judge], first: Task | None) -> _Worker:

@@ -101,6 +101,7 @@ def encode(id: str, verdict: Verdict) -> bytes:
         "blocker": verdict.blocker,
         "reason": verdict.reason,
         "margins": {k: _finite(v) for k, v in verdict.margins.items()},
+        "displacements": {k: _finite(v) for k, v in verdict.displacements.items()},
         "q_grasp": list(verdict.q_grasp),
         "q_pregrasp": list(verdict.q_pregrasp),
         "cpu": {stage.value: round(seconds, 6) for stage, seconds in verdict.cpu.items()},
@@ -120,11 +121,16 @@ def decode(line: bytes) -> tuple[str, Verdict]:
         stage=Stage(record["stage"]),
         blocker=record["blocker"],
         reason=record["reason"],
-        margins={k: math.nan if v is None else v for k, v in record["margins"].items()},
+        margins=_numbers(record["margins"]),
+        displacements=_numbers(record.get("displacements", {})),  # older journals have none
         q_grasp=tuple(record["q_grasp"]),
         q_pregrasp=tuple(record["q_pregrasp"]),
         cpu={Stage(stage): seconds for stage, seconds in record["cpu"].items()},
     )
+
+
+def _numbers(values: dict[str, float | None]) -> dict[str, float]:
+    return {name: math.nan if value is None else value for name, value in values.items()}
 
 
 def _finite(value: float) -> float | None:

@@ -13,8 +13,10 @@ from burg_drake import __version__
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import PACKAGE_URI, data_root
-from burg_drake.evaluation.table import TableFormat
+from burg_drake.evaluation.origin import Origin, engine_label
 from burg_drake.station.engine import Engine
+
+TableFormat = Literal["csv", "parquet"]
 
 HASH_DIGITS = 12
 """Digits of a hash that people get to see."""
@@ -150,7 +152,7 @@ def identity(document: RunDocument) -> dict[str, str]:
     return {
         "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
-        "engine": engine.name,
+        "engine": engine_label(engine),
         "settings of engine, trial and arm": settings,
         "reach": "on" if document.reach else "off",
         "grasps": (
@@ -168,6 +170,21 @@ def identity(document: RunDocument) -> dict[str, str]:
 def run_hash(document: RunDocument) -> str:
     """Short hash of what decides about a run's results: `identity` and the candidates."""
     return content_hash(identity(document), document.grasps.content)[:HASH_DIGITS]
+
+
+def origin_of(document: RunDocument) -> Origin:
+    """What every row of the run's table tells of it."""
+    return Origin(
+        scene=document.scene.path,
+        scene_content=document.scene.content[:HASH_DIGITS],
+        station=document.station.path,
+        station_content=document.station.content[:HASH_DIGITS],
+        engine=document.engine,
+        trial=document.trial,
+        versions=document.versions,
+        seed=document.seed,
+        run=document.hash,
+    )
 
 
 def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -28,8 +27,10 @@ from burg_drake.core.schema import load_document, save_document
 from burg_drake.evaluation.candidates import Candidate, Candidates
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.run_document import RunDocument, portable_reference
-from burg_drake.evaluation.table import Columns, make_columns
+from burg_drake.evaluation.rows import best_rows, unknown_grasp
+from burg_drake.evaluation.run_document import RunDocument, origin_of, portable_reference
+from burg_drake.evaluation.table import Columns, make_columns, table_row
+from burg_drake.evaluation.trial import Trial
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.scene import Scene, SceneDocument, save_scene
 from burg_drake.station.station import Station, StationDocument, load_station
@@ -41,11 +42,6 @@ GRASPS_FILE = "grasps.npz"
 JOURNAL_FILE = "journal.jsonl"
 REPORT_FILE = "report.html"
 RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
-
-SLIP_SCALE = 0.005
-TILT_SCALE = 0.1
-PUSH_SCALE = 0.01
-"""A slip of 5 mm, a tilt of 0.1 rad and a push of 10 mm weigh the same in `Run.best`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +87,9 @@ class Run:
         return make_columns(
             self.candidates,
             self.verdicts,
+            origin_of(self.document),
+            instances=self._instances,
             joints=self._joints,
-            seed=self.document.seed,
-            engine=self.document.engine.name,
-            run=self.document.hash,
         )
 
     @property
@@ -111,7 +106,7 @@ class Run:
         (found,) = np.nonzero(self.results["id"] == id)
         if not len(found):
             raise self._unknown(id)
-        return {name: values[found[0]].item() for name, values in self.results.items()}
+        return table_row(self.results, found[0])
 
     def candidate(self, id: str) -> Candidate:
         """One grasp, judged or not, with its pose as it was judged, bit for bit.
@@ -124,20 +119,19 @@ class Run:
             raise self._unknown(id)
         return found
 
-    def best(self, count: int = 1) -> list[str]:
-        """Ids of the lifted grasps that disturbed least, best first; fewer if fewer were lifted.
+    def trial(self, id: str) -> Trial:
+        """One grasp, judged or not, with its verdict.
 
-        Ranked by slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm; equal ones by id.
+        Raises:
+            UnknownNameError: the run has no such grasp; the message names the nearest.
         """
-        columns = self.results
-        penalty = (
-            columns["slip"] / SLIP_SCALE
-            + columns["tilt"] / TILT_SCALE
-            + columns["others_moved"] / PUSH_SCALE
-        )
-        lifted = columns["outcome"] == Outcome.LIFTED
-        ranked = sorted(zip(np.nan_to_num(penalty[lifted]), columns["id"][lifted], strict=True))
-        return [str(id) for _, id in ranked[:count]]
+        candidate = self.candidate(id)
+        verdict = self.verdicts.get(id)
+        return Trial(id=id, instance=candidate.instance, X_OG=candidate.X_OG, verdict=verdict)
+
+    def best(self, count: int = 1) -> list[str]:
+        """Ids of the lifted grasps that disturbed least, best first; see `best_rows`."""
+        return [str(self.results["id"][row]) for row in best_rows(self.results, count)]
 
     def scene(self) -> Scene:
         """The scene as it was judged.
@@ -172,6 +166,12 @@ class Run:
         return station
 
     @property
+    def _instances(self) -> list[str]:
+        """Names of the free objects of the scene that was judged."""
+        document = load_document(self.path / SCENE_FILE, SceneDocument)
+        return [instance.name or instance.object for instance in document.instances]
+
+    @property
     def _joints(self) -> int:
         """Number of the arm's joints, if it was asked."""
         arm = load_document(self.path / STATION_FILE, StationDocument).arm
@@ -189,11 +189,8 @@ class Run:
         )
 
     def _unknown(self, id: str) -> UnknownNameError:
-        close = difflib.get_close_matches(id, self.candidates.id, n=3, cutoff=0.3)
-        hint = f"did you mean {' or '.join(close)}? " if close else ""
-        return UnknownNameError(
-            f"{self.path} has no judged grasp {id!r}; {hint}All ids are in {self.table_path.name}"
-        )
+        hint = f"All ids are in {self.table_path.name}"
+        return unknown_grasp(id, self.candidates.id, str(self.path), hint)
 
 
 def load_run(path: str | Path) -> Run:

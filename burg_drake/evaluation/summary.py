@@ -11,15 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.table import Table
-
-Z_95 = 1.959963984540054
-"""Quantile of the normal distribution that leaves 2.5 % on either side."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +54,13 @@ class Group:
         return self.reachable - self.failed[Stage.EXECUTED]
 
     @property
+    def held(self) -> int:
+        """Those whose target was held to the end."""
+        return sum(count for outcome, count in self.outcomes.items() if outcome.held)
+
+    @property
     def lifted(self) -> int:
-        """Those that succeeded."""
+        """Those that succeeded: held, and nothing else was disturbed."""
         return self.outcomes[Outcome.LIFTED]
 
     @property
@@ -68,6 +71,7 @@ class Group:
             "clear": self.clear,
             "reachable": self.reachable,
             "executed": self.executed,
+            "held": self.held,
             "lifted": self.lifted,
         }
 
@@ -114,28 +118,6 @@ class Summary:
     total: Group
     costs: tuple[StageCost, ...]
     reach: bool
-
-
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
-    """Wilson's score interval for a proportion (E. B. Wilson, JASA 22, 1927).
-
-    Args:
-        successes, trials: counts.
-        z: quantile of the normal distribution; 95 % by default.
-
-    Returns:
-        Lower and upper bound in [0, 1]; all of it if there were no trials.
-    """
-    if trials == 0:
-        return 0.0, 1.0
-    share = successes / trials
-    scale = 1.0 + z * z / trials
-    center = (share + z * z / (2 * trials)) / scale
-    half = z / scale * math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
-    # the bounds meet 0 and 1 exactly in theory, but not in floating point
-    lower = 0.0 if successes == 0 else max(0.0, center - half)
-    upper = 1.0 if successes == trials else min(1.0, center + half)
-    return lower, upper
 
 
 def summarize(run: Run) -> Summary:
@@ -243,7 +225,10 @@ def _stage_table(summary: Summary) -> Table:
             interval = f"{100 * low:.0f}-{100 * high:.0f} %"
         counts = [str(group.funnel[name]) for name in names]
         table.add_row(group.name, *counts, share, interval)
-    table.caption = "success: lifted of executed; CI: Wilson's interval"
+    table.caption = (
+        "held: to the end; lifted: held, and no other object disturbed\n"
+        "success: lifted of executed; CI: Wilson's interval"
+    )
     table.caption_justify = "left"
     return table
 

@@ -11,19 +11,38 @@ from multiprocessing.connection import Connection
 from burg_drake.core.errors import BurgError, SimulationError
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Judge, Verdict, judge_grasp, one_line
+from burg_drake.evaluation.judge import (
+    Judge,
+    Screened,
+    Verdict,
+    judge_grasp,
+    one_line,
+    screen_grasps,
+)
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Work for a worker: the first stage of many grasps.
+
+    Attributes:
+        candidates: the grasps.
+    """
+
+    candidates: tuple[Candidate, ...]
 
 
 @dataclass(frozen=True)
 class Task:
-    """Work for a worker.
+    """Work for a worker: all stages of a few grasps, or those after the first.
 
     Attributes:
-        candidates: to be judged in this order.
+        grasps: to be judged in this order; each with the answer of the first stage, or None where
+            that has not been asked.
         last_try: of a single grasp that has ended another worker before.
     """
 
-    candidates: tuple[Candidate, ...]
+    grasps: tuple[tuple[Candidate, Screened | None], ...]
     last_try: bool = False
 
 
@@ -37,6 +56,17 @@ class Unable:
     """The judge cannot be built; no other worker could."""
 
     error: BurgError
+
+
+@dataclass(frozen=True)
+class Screens:
+    """A screening is done.
+
+    Attributes:
+        screened: the answers, in the order of the grasps.
+    """
+
+    screened: tuple[Screened, ...]
 
 
 @dataclass(frozen=True)
@@ -60,7 +90,7 @@ class Dying:
     reason: str
 
 
-Message = Ready | Unable | Begins | Judged | Dying
+Message = Ready | Unable | Screens | Begins | Judged | Dying
 
 
 def main(handle: int) -> None:
@@ -93,7 +123,10 @@ def _serve(connection: Connection) -> None:
         connection.send(Unable(SimulationError(f"cannot build the simulation: {one_line(error)}")))
         return
     connection.send(Ready())
-    while (task := connection.recv()) is not None:
-        for candidate in task.candidates:
-            verdict = judge_grasp(judge, candidate, lambda s: connection.send(Begins(s)))
+    while (work := connection.recv()) is not None:
+        if isinstance(work, Screening):
+            connection.send(Screens(tuple(screen_grasps(judge, work.candidates))))
+            continue
+        for candidate, screened in work.grasps:
+            verdict = judge_grasp(judge, candidate, lambda s: connection.send(Begins(s)), screened)
             connection.send(Judged(verdict))

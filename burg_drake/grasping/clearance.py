@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.geometry import (
     Box,
     CollisionFilterDeclaration,
@@ -16,16 +17,18 @@ from pydrake.geometry import (
     GeometryId,
     GeometrySet,
     Mesh,
-    PenetrationAsPointPair,
     QueryObject,
+    SceneGraphInspector,
     Sphere,
 )
 from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
-from burg_drake.core.frames import Array
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, check_pose
 from burg_drake.core.outcome import Outcome
-from burg_drake.grasping.penetration import Polytope, penetration_depth
+from burg_drake.grasping.screen import Body, HandScreen
+from burg_drake.grasping.shape import Shape
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.hollow import mesh_by_pieces
@@ -60,6 +63,9 @@ class HandClearance:
 
     Args:
         station_diagram: a diagram built with `robot="hand"`.
+
+    Raises:
+        InvalidInputError: a collision geometry is of a shape that the screen does not know.
     """
 
     def __init__(self, station_diagram: StationDiagram) -> None:
@@ -71,27 +77,44 @@ class HandClearance:
         self._bodies = _filter_scene(station_diagram, self._context)
         self._graph_context = station_diagram.scene_graph.GetMyContextFromRoot(self._context)
         self._station_diagram = station_diagram
-        self._polytopes: dict[GeometryId, Polytope | None] = {}
+        self._screen = self._build_screen()
 
     def check(self, instance: str, X_WG: Array) -> Clearance:
-        """Screens one grasp.
+        """Screens one grasp: the same to the last bit as in a batch.
 
         Args:
             instance: the target's name in the scene.
             X_WG: (4, 4) grasp in the world.
+        """
+        return self.check_all(instance, X_WG[None])[0]
+
+    def check_all(self, instance: str, X_WG: Array) -> list[Clearance]:
+        """Screens grasps.
+
+        Args:
+            instance: the target's name in the scene.
+            X_WG: (N, 4, 4) grasps in the world.
 
         Returns:
-            The verdict. Where several bodies are overlapped, the one decides that would be in the
+            N verdicts. Where several bodies are overlapped, the one decides that would be in the
             way in an emptier scene, too: the target, then the table, then background, then
-            clutter.
+            clutter. What is no deeper than `screen.TOUCHING` is no overlap.
+
+        Raises:
+            InvalidInputError: `X_WG` are not poses.
         """
-        pairs = self._overlapping(X_WG)
-        if not pairs:
-            return Clearance(None)
-        outcomes = {name: self._outcome(instance, name) for name, _ in pairs}
-        blocker = min(outcomes, key=lambda name: (PRIORITY.index(outcomes[name]), name))
-        overlap = max(self._depth(pair) for name, pair in pairs if name == blocker)
-        return Clearance(outcomes[blocker], blocker, overlap)
+        outcomes = self.outcomes(instance)
+        blockers, depths = self._screen.deepest(check_pose(X_WG, "X_WG"), list(outcomes))
+        return [
+            Clearance(outcomes[name], name, depth) if name else Clearance(None)
+            for name, depth in zip(blockers.tolist(), depths.tolist(), strict=True)
+        ]
+
+    def outcomes(self, instance: str) -> dict[str, Outcome]:
+        """What an overlap with each body means to grasps of `instance`, the deciding ones first."""
+        outcomes = {name: self._outcome(instance, name) for name in self._screen.bodies}
+        order = sorted(outcomes, key=lambda name: (PRIORITY.index(outcomes[name]), name))
+        return {name: outcomes[name] for name in order}
 
     def free_travel(self, X_WG: Array) -> float:
         """How far the fingers can close before anything is touched.
@@ -105,40 +128,54 @@ class HandClearance:
         """
         closed = 0.0
         for step in TRAVEL_STEPS:
-            while closed + step <= 1.0 and not self._overlapping(X_WG, closed + step):
+            while closed + step <= 1.0 and not self.touched(X_WG, closed + step):
                 closed += step
         return closed
 
-    def _overlapping(
-        self, X_WG: Array, closed: float = 0.0
-    ) -> list[tuple[str, PenetrationAsPointPair]]:
-        """What the hand overlaps: name, and pair of geometries."""
+    def touched(self, X_WG: Array, closed: float = 0.0) -> dict[str, float]:
+        """What the hand overlaps by Drake's own query, which takes one grasp at a time.
+
+        Args:
+            X_WG: (4, 4) grasp in the world.
+            closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
+
+        Returns:
+            Names and depths [m]; a depth is along some separating direction, and may be larger
+            than that along the nearest one.
+        """
         self._hand.place(self._plant_context, X_WG, closed)
-        pairs = self._query().ComputePointPairPenetration()
         names, bodies = self._names, self._bodies
-        return [(names.get(bodies[p.id_A]) or names[bodies[p.id_B]], p) for p in pairs]
+        found: dict[str, float] = {}
+        for p in self._query().ComputePointPairPenetration():
+            name = names.get(bodies[p.id_A]) or names[bodies[p.id_B]]
+            found[name] = max(found.get(name, 0.0), p.depth)
+        return found
 
     def _query(self) -> QueryObject:
         return self._query_port.Eval(self._graph_context)
 
-    def _depth(self, pair: PenetrationAsPointPair) -> float:
-        """Penetration depth of two geometries of the hand's present place [m]."""
+    def _build_screen(self) -> HandScreen:
+        """Reads the collision geometry of hand and scene."""
+        self._hand.place(self._plant_context, np.eye(4))
         query = self._query()
-        shapes = [self._polytope(query, geometry) for geometry in (pair.id_A, pair.id_B)]
-        if shapes[0] is None or shapes[1] is None:
-            return pair.depth
-        X_WA, X_WB = query.GetPoseInWorld(pair.id_A), query.GetPoseInWorld(pair.id_B)
-        return penetration_depth(shapes[0], shapes[1], X_WA.InvertAndCompose(X_WB).GetAsMatrix4())
-
-    def _polytope(self, query: QueryObject, geometry: GeometryId) -> Polytope | None:
-        """The polytope or ball of a geometry; None if it is of another shape."""
-        if geometry not in self._polytopes:
-            inspector = query.inspector()
-            known = isinstance(inspector.GetShape(geometry), (Box, Convex, Cylinder, Mesh, Sphere))
-            self._polytopes[geometry] = (
-                Polytope.from_geometry(inspector, geometry) if known else None
-            )
-        return self._polytopes[geometry]
+        robot = set(self._station_diagram.robot_bodies)
+        hand: list[Shape] = []
+        pieces: dict[BodyIndex, list[Shape]] = {}
+        for geometry, body in self._bodies.items():
+            if query.inspector().GetProximityProperties(geometry) is None:
+                continue
+            if body in robot:  # with X_WG = 1 the world is the grasp frame
+                X_GP = query.GetPoseInWorld(geometry).GetAsMatrix4()
+                hand.append(_shape(query.inspector(), geometry, X_GP))
+            else:
+                X_BP = query.inspector().GetPoseInFrame(geometry).GetAsMatrix4()
+                pieces.setdefault(body, []).append(_shape(query.inspector(), geometry, X_BP))
+        plant = self._station_diagram.plant
+        bodies = {}
+        for body, shapes in pieces.items():
+            X_WB = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
+            bodies[self._names[body]] = Body(X_WB.GetAsMatrix4(), shapes)
+        return HandScreen(hand, bodies)
 
     def _outcome(self, instance: str, blocker: str) -> Outcome:
         if blocker == instance:
@@ -154,6 +191,26 @@ def _names(station_diagram: StationDiagram) -> dict[BodyIndex, str]:
     """Names of all bodies that a hand can collide with."""
     bodies = {**station_diagram.free, **station_diagram.fixed, "table": station_diagram.table}
     return {index: name for name, index in bodies.items()}
+
+
+def _shape(inspector: SceneGraphInspector, geometry: GeometryId, X_BP: Array) -> Shape:
+    """A collision geometry at a pose (4, 4)."""
+    shape = inspector.GetShape(geometry)
+    match shape:
+        case Box():
+            return Shape.box(X_BP, np.asarray(shape.size()) / 2)
+        case Sphere():
+            return Shape.ball(X_BP, shape.radius())
+        case Cylinder():
+            return Shape.cylinder(X_BP, shape.radius(), shape.length() / 2)
+        case Convex() | Mesh():
+            hull = inspector.GetConvexHull(geometry)
+            points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+            return Shape.hull(X_BP, points)
+    raise InvalidInputError(
+        f"collision geometry {inspector.GetName(geometry)!r} is a {type(shape).__name__}; the"
+        " hand's screen knows boxes, cylinders, spheres and convex meshes"
+    )
 
 
 def _filter_scene(station_diagram: StationDiagram, context: Context) -> dict[GeometryId, BodyIndex]:

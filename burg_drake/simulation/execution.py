@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 
 MINIMUM_LIFT = 0.5
 """Share of the lift height that the target must rise by to count as lifted."""
-LEVER = 0.05
-"""Turning counts as the motion of a point at this distance from the grasp [m]."""
+LEVER = 0.01
+"""Turning counts as the motion of a point at this distance from the grasp [m], which is at the rim
+of a pad."""
 
 
 class Execution:
@@ -63,7 +64,7 @@ class Execution:
         self._X_GO_last = self.X_GO()
         self._X_GO_grip: Array | None = None
         self._touched = False
-        self._at_rest = 0.0
+        self._creep: list[float] = []
         self._in_free_air = 0.0
         self._way_blocked = False
         self._left_to_rise = 0.0
@@ -110,7 +111,7 @@ class Execution:
             self.advance()
             if not self.contact.any:
                 return Outcome.SLIPPED
-            if self._is_decided():
+            if i < steps // 2 and self._is_decided():
                 return self.held()
         self._trial.command("lift", np.zeros(2))
         if self.contact.both and self.risen() >= MINIMUM_LIFT * settings.lift_height:
@@ -120,18 +121,15 @@ class Execution:
     def hold(self) -> Outcome | None:
         """Waits; None if the target is held at the end.
 
-        Unless the whole trial is asked for, the end is early when the target has come to rest in
-        the hand: at the speeds of `TrialSettings` it would move by less than a millimetre in what
-        is left.
+        Unless the whole trial is asked for, the end is early when the grip is steady.
         """
         settings = self._settings
-        self._at_rest = 0.0
+        self._creep.clear()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
             if not self.contact.any:
                 return Outcome.DROPPED
-            at_rest = self._at_rest >= settings.resting_time - 1e-9
-            if at_rest and not self._trial.diagram.engine.whole_trial:
+            if self._sticks() and not self._trial.diagram.engine.whole_trial:
                 break
         return None if self.contact.both else Outcome.DROPPED
 
@@ -144,15 +142,15 @@ class Execution:
     def _is_decided(self) -> bool:
         """Whether the target will be held to the end, as nothing is left that could change it.
 
-        On its way up the hand accelerates first, which is when the load on the grip is largest.
-        Friction that does not hold it then lets the target go ever faster; so what keeps still, in
-        free air and with all others at rest, is held at the top as well.
+        While the hand accelerates upwards, the load on the grip is largest. Friction that does not
+        carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
+        not get faster, in free air and with all others at rest, is held to the end, too.
         """
         if self._trial.diagram.engine.whole_trial or self._way_blocked:
             return False
-        if not self.contact.both:
+        if not self.contact.both or not (self._sticks() or self._creeps_to_a_halt()):
             return False
-        if min(self._at_rest, self._in_free_air) < self._settings.resting_time - 1e-9:
+        if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
         way = self._settings.lift_height - self._trial.hand.risen(self._plant_context)
         positions = self._plant.GetPositions(self._plant_context)
@@ -161,6 +159,26 @@ class Execution:
         if not self._way_blocked:
             self._left_to_rise = way
         return not self._way_blocked
+
+    def _sticks(self) -> bool:
+        """Whether the grip has been steady for `steady_time`."""
+        settings = self._settings
+        recent = self._creep[-settings.steady_polls :]
+        enough = len(recent) == settings.steady_polls
+        return enough and max(recent) <= settings.creep_speed * settings.poll
+
+    def _creeps_to_a_halt(self) -> bool:
+        """Whether the target moves in the hand no faster than before, and not far any more.
+
+        Drake's friction is slightly viscous: below its limit a load does not slide but creeps, at a
+        constant speed that is the higher, the larger the time step.
+        """
+        settings = self._settings
+        n = settings.steady_polls
+        before, now = sum(self._creep[-2 * n : -n]), sum(self._creep[-n:])
+        ahead = (settings.lift_time + settings.hold_time) / settings.poll
+        enough = len(self._creep) >= 2 * n
+        return enough and now <= before and now / n * ahead <= settings.creep_distance
 
     def advance(self) -> float:
         """Steps to the next look at the contacts; returns the time [s].
@@ -193,11 +211,12 @@ class Execution:
         self.contact = finger_contact(contacts, self._trial.hand.fingers, target)
         self._touched = self._touched or self.contact.any
         X_GO = self.X_GO()
-        distance, angle = _motion(self._X_GO_last, X_GO)
-        moved = max(distance, angle * LEVER, self._watch_others())
+        distance, angle = motion_in_hand(self._X_GO_last, X_GO)
         self._X_GO_last = X_GO
-        at_rest = moved <= settings.settled_speed * settings.poll
-        self._at_rest = self._at_rest + settings.poll if at_rest else 0.0
+        if self._watch_others() <= settings.settled_speed * settings.poll:
+            self._creep.append(max(distance, angle * LEVER))
+        else:
+            self._creep.clear()
         free = not touched_from_outside(contacts, self._hand | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
@@ -230,7 +249,7 @@ class Execution:
         """The outcome with the margins at this moment."""
         slip = tilt = force = area = math.nan
         if self._X_GO_grip is not None:
-            slip, tilt = _motion(self._X_GO_grip, self.X_GO())
+            slip, tilt = motion_in_hand(self._X_GO_grip, self.X_GO())
             closing = self._trial.hand.X_WG(self._plant_context)[:3, 0]
             force = float(np.abs(self.contact.force @ closing).min())
             area = float(self.contact.area.min())
@@ -248,7 +267,7 @@ class Execution:
         return TrialResult(outcome=outcome, margins=margins, displacements=displacements)
 
 
-def _motion(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
+def motion_in_hand(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
     """How a target has moved in the hand: of the point at the grasp [m], and its angle [rad]."""
     X_GG = X_GO_later @ inverse(X_GO)
     return float(np.linalg.norm(X_GG[:3, 3])), float(rotation_angle(X_GG[:3, :3]))

@@ -50,10 +50,12 @@ class TrialSettings:
         lift_time: duration of the rise [s]; half of it accelerates and half of it brakes, both by
             4 height / time^2.
         hold_time: how long the target must be held after the rise [s].
-        resting_time: the target is at rest when it has moved in the hand, and others have moved
-            in the world, slower than `settled_speed` for this long [s]; see `Engine.whole_trial`.
+        creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
+        creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
+            trials early, see `Engine.whole_trial`.
+        steady_time: how long that, and free air, and the rest of all others, must last [s].
         poll: interval at which contacts are looked at [s].
-        settled_speed: the grip has settled when the fingers are slower than this [m/s] ...
+        settled_speed: the fingers have closed when they are slower than this [m/s] ...
         settled_time: ... for this long [s].
         close_timeout: closing ends after this time in any case [s].
         disturbance: others that are moved by more than this count as disturbed [m].
@@ -62,12 +64,19 @@ class TrialSettings:
     lift_height: float = 0.30
     lift_time: float = 1.25
     hold_time: float = 0.5
-    resting_time: float = 0.1
+    creep_speed: float = 0.0003
+    creep_distance: float = 0.002
+    steady_time: float = 0.05
     poll: float = 0.01
     settled_speed: float = 0.002
-    settled_time: float = 0.05
+    settled_time: float = 0.03
     close_timeout: float = 2.0
     disturbance: float = 0.01
+
+    @property
+    def steady_polls(self) -> int:
+        """Looks in `steady_time`."""
+        return max(1, round(self.steady_time / self.poll))
 
 
 class HandTrial:
@@ -230,6 +239,17 @@ class HandTrial:
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
         declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
         self._filter(declaration)
+        self.simulator.Initialize()
+
+    def isolate(self, target: BodyIndex) -> None:
+        """Leaves hand and target alone with each other, in the middle of a trial: all other objects
+        are locked, and neither they nor what is fixed can be touched."""
+        self._prepared = None
+        others = set(self.diagram.free.values()) - {target}
+        self._set_still(others)
+        carried = GeometrySet(self._geometries({target, *self.diagram.robot_bodies}))
+        resting = GeometrySet(self._geometries(self._resting(others)))
+        self._filter(CollisionFilterDeclaration().ExcludeBetween(carried, resting))
         self.simulator.Initialize()
 
     def rise(self, target: BodyIndex) -> Rise:

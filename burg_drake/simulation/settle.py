@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,7 +54,8 @@ class Settled:
 
     Attributes:
         duration: simulated time that it took [s].
-        moving: bodies that still move at the end; none if all came to rest.
+        moving: bodies that still moved shortly before the end, with their last speed; none if all
+            came to rest.
     """
 
     duration: float
@@ -71,6 +73,7 @@ def settle(
     bodies: Iterable[BodyIndex],
     time_limit: float,
     criterion: RestCriterion = RestCriterion(),
+    before_poll: Callable[[], None] | None = None,
 ) -> Settled:
     """Advances a simulator until bodies are at rest, or time is up.
 
@@ -80,6 +83,7 @@ def settle(
         bodies: to be at rest, all of them.
         time_limit: simulated time allowed [s].
         criterion: what counts as rest.
+        before_poll: called at the beginning of each poll interval; may change the state.
 
     Raises:
         RuntimeError, SystemExit: from Drake.
@@ -89,10 +93,11 @@ def settle(
     start = simulator.get_context().get_time()
     steps = max(1, round(time_limit / criterion.poll))
     needed = max(1, round(criterion.duration / criterion.poll))
-    still = 0
-    moving: dict[BodyIndex, BodySpeed] = {}
+    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
     before = [_pose(body, context) for body in watched]
     for step in range(1, steps + 1):
+        if before_poll is not None:
+            before_poll()
         simulator.AdvanceTo(start + step * criterion.poll)
         after = [_pose(body, context) for body in watched]
         moving = {}
@@ -102,10 +107,11 @@ def settle(
             if not (speed.speed < criterion.speed and speed.turning < criterion.turning):
                 moving[body.index()] = speed
         before = after
-        still = 0 if moving else still + 1
-        if still >= needed:
+        recent.append(moving)
+        if len(recent) == needed and not any(recent):
             break
-    return Settled(simulator.get_context().get_time() - start, moving)
+    moved = {index: speed for moving in recent for index, speed in moving.items()}
+    return Settled(simulator.get_context().get_time() - start, moved)
 
 
 def _pose(body: RigidBody, context: Context) -> tuple[Array, Array]:

@@ -3,11 +3,12 @@
 Ports of the diagram (MODEL is `hand`, `arm` or `lift`):
 
     inputs   MODEL.desired_state      positions and velocities for the joint servos
+             applied_forces           list of ExternallyAppliedSpatialForce
     outputs  MODEL.state, state, contact_results, body_poses, geometry_query,
              camera.NAME.color_image, .depth_image, .label_image (with cameras=True)
 
-An input that is not connected leaves its joints without actuation. Gravity does not pull the
-robot: a real one compensates its own weight.
+An input that is not connected leaves its joints without actuation, and bodies without applied
+forces. Gravity does not pull the robot: a real one compensates its own weight.
 """
 
 from __future__ import annotations
@@ -194,6 +195,7 @@ def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
             "sap": DiscreteContactApproximation.kSap,
         }[engine.contact_approximation]
     )
+    plant.set_stiction_tolerance(engine.stiction_tolerance)
     plant.set_contact_surface_representation(
         {
             "polygon": HydroelasticContactRepresentation.kPolygon,
@@ -231,6 +233,7 @@ def _export_ports(builder: RobotDiagramBuilder, models: dict[str, ModelInstanceI
     for role, model in models.items():
         system.ExportInput(plant.get_desired_state_input_port(model), f"{role}.desired_state")
         system.ExportOutput(plant.get_state_output_port(model), f"{role}.state")
+    system.ExportInput(plant.get_applied_spatial_force_input_port(), "applied_forces")
     system.ExportOutput(plant.get_state_output_port(), "state")
     system.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
     system.ExportOutput(plant.get_body_poses_output_port(), "body_poses")

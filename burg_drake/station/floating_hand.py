@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
+from burg_drake.core.frames import Array, inverse
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.hand_model import find_hand
 
@@ -44,6 +44,8 @@ class FloatingHand:
         driven = [plant.get_joint_actuator(i).joint() for i in plant.GetJointActuatorIndices(model)]
         self._order = [found.joints.index(joint) for joint in driven]
         self.lift = plant.GetJointByName("lift")
+        self._X_HG = hand.X_HG.matrix()
+        self._X_GH = inverse(self._X_HG)
         self._base = plant.GetFrameByName("lift_base")
         self._mount = plant.GetFrameByName("lift_mount")
 
@@ -57,7 +59,7 @@ class FloatingHand:
         """
         # The lift joint keeps to world z: its base frame has the world's axes and the hand's
         # position, its mount frame takes up the hand's orientation.
-        X_WH = self.document.X_AH(X_WG)
+        X_WH = X_WG @ self._X_GH
         R_WH = RotationMatrix(X_WH[:3, :3])
         self._base.SetPoseInParentFrame(plant_context, RigidTransform(X_WH[:3, 3]))
         self._mount.SetPoseInParentFrame(plant_context, RigidTransform(R_WH.inverse()))
@@ -87,4 +89,4 @@ class FloatingHand:
     def X_WG(self, plant_context: Context) -> Array:
         """(4, 4) current grasp frame."""
         X_WH = self._plant.EvalBodyPoseInWorld(plant_context, self.body).GetAsMatrix4()
-        return X_WH @ self.document.X_HG.matrix()
+        return X_WH @ self._X_HG

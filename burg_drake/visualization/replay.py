@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatAnimation
@@ -24,6 +25,8 @@ VIEW = (0.73, -0.68)
 """Heading from the grasp to the camera that is preferred, in the world: across from an arm."""
 DISTANCE, CAMERA_HEIGHT = 0.80, 0.42
 """Of the camera from and above its target [m]."""
+SHOWN = 5e-5
+"""Displacements from here on are told [m]."""
 CLEAR_VIEW = 0.10
 """How far other objects should be beside the line of sight [m]."""
 
@@ -38,20 +41,22 @@ def record_trial(
     engine: Engine = ENGINES["standard"],
     settings: TrialSettings = DEFAULT_SETTINGS,
     friction: float | None = None,
+    mass: float | None = None,
 ) -> TrialResult:
     """Executes a grasp once more and leaves the recording in Meshcat, where it plays in a loop.
 
-    A grasp whose open hand collides leaves a still picture of that.
+    The trial is shown to its end, beyond the moment at which its outcome was decided. A grasp whose
+    open hand collides leaves a still picture of that.
 
     Args:
         scene, station: as in the trial to be shown.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         meshcat: where to show it.
-        engine, settings, friction: as in the trial to be shown.
+        engine, settings, friction, mass: as in the trial to be shown.
 
     Returns:
-        What became of the trial; the same as without a picture.
+        What became of the whole trial; the same as without a picture.
 
     Raises:
         InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
@@ -61,6 +66,7 @@ def record_trial(
             f"{instance!r} is not a free object of scene {scene.name!r};"
             f" free are: {', '.join(scene.instances) or '(none)'}"
         )
+    engine = replace(engine, whole_trial=True)
     trial = HandTrial(scene, station, engine=engine, settings=settings, meshcat=meshcat)
     X_WG = trial.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
     _show_start(trial, X_WG)
@@ -68,7 +74,7 @@ def record_trial(
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
     aim_at_grasp(meshcat, X_WG, np.reshape(others, (-1, 3)), settings.lift_height)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
-    result = trial.run(instance, X_OG, friction=friction)
+    result = trial.run(instance, X_OG, friction=friction, mass=mass)
     meshcat.StopRecording()
     if result.margins.end_time > 0.0:
         recording = meshcat.get_mutable_recording()
@@ -123,7 +129,8 @@ def describe(result: TrialResult) -> list[str]:
     margins = result.margins
     lines = [result.outcome.value.replace("_", " ")]
     if result.blocker:
-        lines[0] += f" ({result.blocker}, {margins.overlap * 1e3:.1f} mm deep)"
+        depth = f", {margins.overlap * 1e3:.1f} mm deep" if margins.overlap > 0.0 else ""
+        lines[0] += f" ({result.blocker}{depth})"
     if result.reason:
         lines.append(result.reason)
     figures = [
@@ -133,11 +140,15 @@ def describe(result: TrialResult) -> list[str]:
             ("slip", margins.slip, 1e3, 1, "mm"),
             ("tilt", margins.tilt, 180 / math.pi, 1, "deg"),
             ("pad force", margins.pad_force, 1.0, 1, "N"),
+            ("patch", margins.patch_area, 1e6, 0, "mm²"),
             ("others moved", margins.others_moved, 1e3, 1, "mm"),
         )
         if math.isfinite(value)
     ]
-    return lines + ([", ".join(figures)] if figures else [])
+    moved = sorted(result.displacements.items(), key=lambda item: -item[1])
+    pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]
+    lines += [", ".join(figures)] if figures else []
+    return lines + ([f"moved {', '.join(pushed)}"] if pushed else [])
 
 
 def _show_start(trial: HandTrial, X_WG: Array) -> None:

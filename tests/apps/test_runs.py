@@ -117,6 +117,7 @@ def test_replay_of_the_best(run: Run, tmp_path: Path, capsys: Capture) -> None:
     out = capsys.readouterr().out.splitlines()
     assert out[0] == "lifted"
     assert out[1].startswith("lift 300 mm, slip ")
+    assert out[2] == "as recorded"
     assert out[-1] == f"wrote {page}"
     assert self_contained(page)
     assert f"<title>tabletop_six: {run.best()[0]}</title>" in page.read_text()
@@ -126,38 +127,60 @@ def test_replay_live(run: Run, capsys: Capture) -> None:
     collides = str(run.results["id"][1])
     assert main(["replay", str(run.path), "--grasp", collides, "--no-wait"]) == 0
     captured = capsys.readouterr()
-    assert re.match(r"collision target \(box, \d+\.\d mm deep\)\n", captured.out)
+    assert re.match(r"collision target \(box, \d+\.\d mm deep\)\nas recorded\n", captured.out)
     assert captured.err == "nothing moves: the trial ended at its start\n"
 
 
+def altered(run: Run, folder: Path, verdict: Verdict, **versions: str) -> Path:
+    """A copy of the run with another verdict on its second grasp."""
+    shutil.copytree(run.path, folder)
+    document = run.document
+    document = dataclasses.replace(document, versions={**document.versions, **versions})
+    save_run(Run(folder, document))
+    with Journal(folder / "journal.jsonl") as journal:  # the last line about a grasp counts
+        journal.append(str(run.results["id"][1]), verdict)
+    return folder
+
+
 @pytest.mark.parametrize(
-    ("stage", "versions", "line"),
+    ("verdict", "versions", "line"),
     [
-        ("reachable", {}, "the run's verdict: no_ik; the hand alone:"),
-        ("executed", {}, "the run's verdict: simulation_failed; this time:"),
+        (Verdict(Outcome.NO_IK, Stage.REACHABLE), {}, "not as recorded"),
         (
-            "executed",
+            Verdict(Outcome.SIMULATION_FAILED, Stage.EXECUTED),
             {"drake": "1.2.3"},
-            f"the run's verdict: simulation_failed (with drake 1.2.3, now {version('drake')});"
-            " this time:",
+            f"not as recorded (with drake 1.2.3, now {version('drake')})",
         ),
     ],
 )
 def test_replay_that_ends_unlike_the_run(
-    stage: str, versions: dict[str, str], line: str, run: Run, tmp_path: Path, capsys: Capture
+    verdict: Verdict,
+    versions: dict[str, str],
+    line: str,
+    run: Run,
+    tmp_path: Path,
+    capsys: Capture,
 ) -> None:
-    other = tmp_path / "other"
-    shutil.copytree(run.path, other)
-    document = run.document
-    document = dataclasses.replace(document, versions={**document.versions, **versions})
-    save_run(Run(other, document))
-    outcome = Outcome.NO_IK if stage == "reachable" else Outcome.SIMULATION_FAILED
+    other = altered(run, tmp_path / "other", verdict, **versions)
     id = str(run.results["id"][1])
-    with Journal(other / "journal.jsonl") as journal:  # the last line about a grasp counts
-        journal.append(id, Verdict(outcome, Stage(stage)))
-    assert main(["replay", str(other), "--grasp", id, "--no-wait"]) == 0
-    first, second = capsys.readouterr().out.splitlines()[:2]
-    assert first == line and second.startswith("collision target")
+    assert main(["replay", str(other), "--grasp", id, "--no-wait"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("collision target") and lines[1] == line
+    assert lines[2] == f"outcome: recorded '{verdict.outcome}', now 'collision_target'"
+
+
+def test_replay_compares_with_the_engine_of_the_row(
+    run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    header, row, *_ = run.table_path.read_text().splitlines()
+    assert "whole_trial=False" in row
+    path = tmp_path / "row.csv"
+    path.write_text(f"{header}\n{row}\n".replace("whole_trial=False", "whole_trial=True"))
+    assert main(["replay", str(path), "--no-wait"]) == 1
+    out = capsys.readouterr().out.splitlines()
+    (end,) = (line for line in out if line.startswith("end_time: recorded"))
+    recorded, now = map(float, re.findall(r"[\d.]+", end.removeprefix("end_time")))
+    assert now > recorded + 1.0  # which the row has from a trial that ended once it was decided
 
 
 def test_replay_of_an_unknown_grasp(run: Run, capsys: Capture) -> None:
@@ -167,18 +190,21 @@ def test_replay_of_an_unknown_grasp(run: Run, capsys: Capture) -> None:
 
 
 def test_replay_needs_a_choice(run: Run, capsys: Capture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["replay", str(run.path)])
-    assert ended.value.code == 2
-    assert "one of the arguments --grasp --best is required" in capsys.readouterr().err
+    assert main(["replay", str(run.path)]) == 2
+    assert "has 3 rows; give --grasp ID, --row N or --best" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["replay", str(run.path), "--best", "--row", "1"])
+    assert main(["replay", str(run.path), "--row", "4"]) == 2
+    assert "has no row 4; it has 3" in capsys.readouterr().err
 
 
 def test_replay_of_the_best_where_nothing_was_lifted(
-    run: Run, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+    run: Run, tmp_path: Path, capsys: Capture
 ) -> None:
-    monkeypatch.setattr(Run, "best", lambda self: [])
-    assert main(["replay", str(run.path), "--best"]) == 2
-    assert "no grasp was lifted; choose one with --grasp ID" in capsys.readouterr().err
+    header, _, *rows = run.table_path.read_text().splitlines()
+    (tmp_path / "rest.csv").write_text("\n".join([header, *rows]))
+    assert main(["replay", str(tmp_path / "rest.csv"), "--best"]) == 2
+    assert "rest.csv: no grasp was lifted; choose one with --grasp ID" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("verb", [["replay", "--best"], ["grasps", "show"], ["report"]])

@@ -5,7 +5,7 @@ from burg_drake.core.outcome import Outcome, Stage
 
 def test_stored_values_never_change():
     """Results files hold these texts; append new ones, do not rename."""
-    assert [str(outcome) for outcome in Outcome][:13] == [
+    assert [str(outcome) for outcome in Outcome][:14] == [
         "collision_target",
         "collision_table",
         "collision_clutter",
@@ -18,6 +18,7 @@ def test_stored_values_never_change():
         "slipped",
         "dropped",
         "lifted",
+        "lifted_disturbed",
         "simulation_failed",
     ]
     assert [str(stage) for stage in Stage][:3] == ["clear", "reachable", "executed"]

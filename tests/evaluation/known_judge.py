@@ -32,7 +32,9 @@ def expected(id: str) -> Outcome:
         return Outcome.COLLISION_TABLE
     if n < 45:
         return Outcome.NO_IK
-    return Outcome.SLIPPED if n < 60 else Outcome.LIFTED
+    if n < 60:
+        return Outcome.SLIPPED
+    return Outcome.LIFTED if n < 90 else Outcome.LIFTED_DISTURBED
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,12 @@ class KnownJudge:
     @property
     def stages(self) -> Sequence[tuple[Stage, Callable[[Candidate], Decision]]]:
         return (
-            (Stage.CLEAR, self.clear),
             (Stage.REACHABLE, self.reach),
             (Stage.EXECUTED, self.execute),
         )
+
+    def screen(self, grasps: Sequence[Candidate]) -> list[Decision]:
+        return [self.clear(grasp) for grasp in grasps]
 
     def clear(self, grasp: Candidate) -> Decision:
         time.sleep(self.pause)
@@ -68,8 +72,12 @@ class KnownJudge:
 
     def execute(self, grasp: Candidate) -> Decision:
         n = number(grasp.id)
-        margins = {"slip": n / 7e4, "tilt": n / 900, "pad_force": 40 - n / 30, "others_moved": 0.0}
-        return Decision(expected(grasp.id), margins=margins)
+        outcome = expected(grasp.id)
+        moved = n / 5e3 if outcome is Outcome.LIFTED_DISTURBED else 0.0
+        margins = {"slip": n / 7e4, "tilt": n / 900, "pad_force": 40 - n / 30}
+        margins |= {"patch_area": n / 1e6, "others_moved": moved}
+        others = {"left", "right", "bar"} - {grasp.instance}
+        return Decision(outcome, margins=margins, displacements={min(others): moved})
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,8 @@ class CrashingJudge(KnownJudge):
 
     Attributes:
         how: by grasp id: `segfault`, `exit`, `error`, `hang`, or `once`, which crashes only as long
-            as the file `log` does not exist.
+            as the file `log` does not exist; `screen` and `screen_error` are `segfault` and `error`
+            in the stage `clear`.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -100,6 +109,11 @@ class CrashingJudge(KnownJudge):
 
     def clear(self, grasp: Candidate) -> Decision:
         time.sleep(self.pause)
+        match dict(self.how).get(grasp.id):
+            case "screen":
+                os.kill(os.getpid(), signal.SIGSEGV)
+            case "screen_error":
+                raise RuntimeError("not a pose")
         return Decision()
 
     def reach(self, grasp: Candidate) -> Decision:

@@ -21,7 +21,8 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.progress import Progress
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import read_table
+from burg_drake.evaluation.table import TEXT
+from burg_drake.evaluation.table_file import read_table
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
@@ -31,9 +32,6 @@ def same_results(a: Run, b: Run) -> bool:
     assert list(a.results) == list(b.results)
     names = [name for name in a.results if not name.startswith("cpu_")]
     return all(np.array_equal(a.results[n], b.results[n], equal_nan=n not in TEXT) for n in names)
-
-
-TEXT = {"id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine", "run"}
 
 
 def test_results_do_not_depend_on_workers(

@@ -19,7 +19,7 @@ from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import read_table
+from burg_drake.evaluation.table_file import read_table
 from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram import instance_pose

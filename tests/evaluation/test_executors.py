@@ -50,6 +50,29 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
     assert {v.stage for v in failed.values()} == {Stage.EXECUTED}
 
 
+def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
+    how = {"cube-0003": "screen", "cube-0012": "screen_error"}
+    make = Make(CrashingJudge(how=tuple(how.items())))
+    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
+    failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
+    assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
+        "cube-0003": (Stage.CLEAR, "the worker process was ended by SIGSEGV"),
+        "cube-0012": (Stage.CLEAR, "RuntimeError: not a pose"),
+    }
+    others = {c.id: expected(c.id) for c in grasps(20) if c.id not in how}
+    assert {id: v.outcome for id, v in judged.items() if id not in how} == others
+
+
+def test_grasps_are_screened_together_and_once(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.executors.SCREENING_SIZE", 7)
+    asked = tmp_path / "asked"
+    judged = {c.id: v for c, v in judge_all(grasps(30), Make(KnownJudge(asked)), workers=2)}
+    assert sorted(asked.read_text().split()) == [c.id for c in grasps(30)]
+    assert {id: v.outcome for id, v in judged.items()} == {c.id: expected(c.id) for c in grasps(30)}
+    shares = {v.cpu[Stage.CLEAR] for v in judged.values()}
+    assert len(shares) <= 5  # one for each of the screenings: 7, 7, 7, 7 and 2 grasps
+
+
 def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
     make = Make(CrashingJudge(log=tmp_path / "crashed", how=(("cube-0002", "once"),)))
     judged = {c.id: v.outcome for c, v in judge_all(grasps(10), make, workers=1)}

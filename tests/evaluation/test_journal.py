@@ -16,6 +16,7 @@ LIFTED = Verdict(
     Outcome.LIFTED,
     Stage.EXECUTED,
     margins={"slip": 0.1 + 0.2, "tilt": 1e-300, "pad_force": math.nan},
+    displacements={"mug": 1 / 3, "bowl.2": 0.0},
     q_grasp=(0.1, -2.0 / 3.0),
     q_pregrasp=(1.0, math.pi),
     cpu={Stage.CLEAR: 0.0002, Stage.REACHABLE: 0.01, Stage.EXECUTED: 0.25},
@@ -33,6 +34,16 @@ def test_a_line_gives_back_what_went_in(verdict: Verdict) -> None:
     id, back = decode(line)
     assert id == "mug-1"
     assert repr(back) == repr(verdict)  # equality would fail on NaN
+
+
+def test_a_line_of_an_older_release_is_read() -> None:
+    line = (
+        b'{"id":"mug-1","outcome":"lifted","stage":"executed","blocker":"","reason":"","margins":'
+        b'{"overlap":0.0,"slip":0.002,"tilt":null},"q_grasp":[],"q_pregrasp":[],"cpu":{}}\n'
+    )
+    id, verdict = decode(line)
+    assert (id, verdict.outcome, verdict.margins["slip"]) == ("mug-1", Outcome.LIFTED, 0.002)
+    assert verdict.displacements == {} and "patch_area" not in verdict.margins
 
 
 def test_a_torn_line_is_cut_off_and_the_rest_is_kept(tmp_path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from known_judge import CrashingJudge, Make
 
+from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.report.charts import Series, histogram, nice_step
@@ -99,6 +100,53 @@ def test_failures_are_listed_and_escaped(
     text = " ".join(check(failed.report_path.read_text()).text)
     assert name in text
     assert "RuntimeError: the solver did not converge" in text
+
+
+def table_of(page: str, title: str) -> dict[str, list[str]]:
+    """Cells of the table under a heading by the first one of each row."""
+    part = page[page.index(f"<h2>{title}</h2>") :]
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", part[: part.index("</section>")])
+    cells = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
+    return {first: rest for first, *rest in cells}
+
+
+def test_blockers_are_listed_with_their_depth(run: Run) -> None:
+    found = table_of(report_page(run), "Start collisions")
+    collides = run.results["outcome"] == Outcome.COLLISION_TABLE
+    depth = run.results["overlap"][collides] * 1e3
+    count = str(collides.sum())
+    expected = [count, "·", count, f"{np.median(depth):.1f} mm", f"{depth.max():.1f} mm"]
+    assert found["table"] == expected and list(found) == ["body", "table"]
+
+
+def test_what_was_disturbed_is_told(run: Run) -> None:
+    found = table_of(report_page(run), "What was disturbed")
+    pushed = run.results["outcome"] == Outcome.LIFTED_DISTURBED
+    far = run.results["others_moved"] * 1e3
+    assert "over 10 mm" in found["object"]
+    for name, others in (("bar", ("left", "right")), ("left", ("bar",))):
+        of_others = np.isin(run.results["instance"], others)
+        executed = of_others & np.isfinite(far)
+        count = str((pushed & of_others).sum())
+        by = max(others, key=lambda i: (pushed & (run.results["instance"] == i)).sum())
+        times = (pushed & (run.results["instance"] == by)).sum()
+        assert found[name] == [
+            str(executed.sum()),
+            count,
+            count,
+            f"{np.median(far[pushed & of_others]):.1f} mm",
+            f"{far[pushed & of_others].max():.1f} mm",
+            f"on {by} ({times})",
+        ]
+
+
+def test_a_custom_engine_is_told_apart_from_its_preset(run: Run) -> None:
+    engine = dataclasses.replace(run.document.engine, time_step=0.004)
+    document = dataclasses.replace(run.document, engine=engine)
+    text = " ".join(check(report_page(Run(run.path, document))).text)
+    assert "engine standard (custom)" in text and "The engine is not a preset" in text
+    text = " ".join(check(report_page(run)).text)
+    assert "(custom)" not in text and "not a preset" not in text
 
 
 def test_an_unfinished_run_says_so(run: Run) -> None:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
+import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run_document import RunDocument, portable_reference, run_hash
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import read_table
+from burg_drake.evaluation.table_file import read_table
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station, load_station
 
@@ -137,6 +140,42 @@ def test_a_results_file_on_its_own_leads_to_its_run(run: Run) -> None:
         dataclasses.replace(document, trial={**document.trial, "lift_height": 0.1}),
     ]
     assert len({document.hash, *map(run_hash, others)}) == 6
+
+
+def test_the_engine_is_stored_with_every_setting(run: Run) -> None:
+    """Defaults may change one day; what a run was made with may not."""
+    written = yaml.safe_load((run.path / "run.yaml").read_text())["engine"]
+    assert written == vars(run.document.engine)
+
+
+def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
+    run: Run, scene: Scene, station: Station
+) -> None:
+    engine = dataclasses.replace(run.document.engine, whole_trial=True)
+    assert run_hash(dataclasses.replace(run.document, engine=engine)) != run.document.hash
+    with pytest.raises(InvalidInputError, match=r"engine is standard there, standard \(custom\)"):
+        evaluate(scene, station, run.path, grasps_per_object=10, engine=engine, progress=False)
+
+
+def test_a_run_of_an_older_release_is_read(run: Run) -> None:
+    document = yaml.safe_load((run.path / "run.yaml").read_text())
+    for name in ("whole_trial", "contact_model", "contact_surface", "contact_approximation"):
+        del document["engine"][name]
+    del document["trial"]["disturbance"]
+    (run.path / "run.yaml").write_text(yaml.safe_dump(document))
+    journal = run.path / "journal.jsonl"
+    records = [json.loads(line) for line in journal.read_text().splitlines()]
+    for record in records:
+        del record["displacements"]
+        record["margins"].pop("patch_area", None)
+    journal.write_text("".join(f"{json.dumps(record)}\n" for record in records))
+    old = load_run(run.path)
+    assert old.document.engine == run.document.engine and old.complete
+    assert old.results["outcome"].tolist() == run.results["outcome"].tolist()
+    for name in ("patch_area", "moved_left", "moved_right", "moved_bar"):
+        assert np.isnan(old.results[name]).all()
+    write_report(old)
+    assert "What was disturbed" not in old.report_path.read_text()
 
 
 def test_references_of_copies_hold_everywhere(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import io
-import math
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from known_judge import CrashingJudge, Make, expected
 from rich.console import Console
 
 from burg_drake.core.outcome import Outcome
+from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import (
@@ -20,7 +20,6 @@ from burg_drake.evaluation.summary import (
     rounded,
     summarize,
     summary_view,
-    wilson_interval,
 )
 
 
@@ -29,33 +28,11 @@ def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(scene, station, tmp_path / "run", grasps_per_object=30, progress=False)
 
 
-def test_wilson_interval_has_the_published_values() -> None:
-    # R. G. Newcombe, Statistics in Medicine 17 (1998), Table I, method 3
-    for successes, trials, low, high in (
-        (81, 263, 0.2553, 0.3662),
-        (15, 148, 0.0624, 0.1605),
-        (0, 20, 0.0, 0.1611),
-        (1, 29, 0.0061, 0.1718),
-    ):
-        assert wilson_interval(successes, trials) == pytest.approx((low, high), abs=5e-5)
-
-
-def test_wilson_interval_solves_its_equation() -> None:
-    # the bounds are where the observed share is z standard errors away
-    for successes, trials in ((1, 3), (7, 10), (999, 1000)):
-        for p in wilson_interval(successes, trials):
-            error = math.sqrt(p * (1 - p) / trials)
-            assert abs(successes / trials - p) / error == pytest.approx(1.959964, abs=1e-5)
-    assert wilson_interval(0, 0) == (0.0, 1.0)
-    assert wilson_interval(5, 5)[1] == 1.0
-    low, high = wilson_interval(3, 10)
-    assert wilson_interval(7, 10) == pytest.approx((1 - high, 1 - low))
-
-
 def test_counts_are_those_of_the_known_judge(run: Run) -> None:
     summary = summarize(run)
     assert [g.name for g in summary.objects] == ["cube", "bar"]
     ids = run.candidates.id
+    assert summary.total.outcomes[Outcome.LIFTED_DISTURBED] > 0
     for outcome in Outcome:
         count = sum(expected(id) is outcome for id in ids)
         assert summary.total.outcomes[outcome] == count
@@ -67,6 +44,16 @@ def test_counts_are_those_of_the_known_judge(run: Run) -> None:
         summary.total.clear,
         summary.total.reachable,
     ]
+
+
+def test_held_is_more_than_success(run: Run) -> None:
+    total = summarize(run).total
+    held = sum(expected(id).held for id in run.candidates.id)
+    lifted = sum(expected(id) is Outcome.LIFTED for id in run.candidates.id)
+    assert 0 < lifted < held
+    assert (total.held, total.lifted) == (held, lifted)
+    assert (total.funnel["held"], total.funnel["lifted"]) == (held, lifted)
+    assert total.interval == wilson_interval(lifted, total.executed)
 
 
 def test_counts_never_rise_along_the_stages(run: Run) -> None:
@@ -97,7 +84,7 @@ def test_the_terminal_shows_everything_in_whole_words(run: Run, width: int) -> N
     for word in ("cube", "bar", "all", "lifted", "collision_table", "reachable", "sampling"):
         assert word in text, word
     row = next(line.split() for line in text.splitlines() if line.split()[:1] == ["cube"])
-    assert row[1:6] == [str(n) for n in summarize(run).objects[0].funnel.values()]
+    assert row[1:7] == [str(n) for n in summarize(run).objects[0].funnel.values()]
 
 
 def test_many_objects_become_a_list(run: Run) -> None:

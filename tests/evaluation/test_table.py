@@ -17,13 +17,28 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.table import (
+from burg_drake.evaluation.origin import Origin
+from burg_drake.evaluation.table import Columns, make_columns, table_row, trial_columns
+from burg_drake.evaluation.table_file import (
     METADATA_KEY,
-    Columns,
-    make_columns,
     read_table,
     require_writer,
     write_table,
+)
+from burg_drake.evaluation.trial import Trial, read_trial
+from burg_drake.station.engine import ENGINES
+
+INSTANCES = ("mug_1", "box", "bowl.2")
+ORIGIN = Origin(
+    scene="/some where/scene.yaml",
+    scene_content="0123456789ab",
+    station="panda_tabletop",
+    station_content="ba9876543210",
+    engine=ENGINES["standard"],
+    trial={"lift_height": 0.1 + 0.2},
+    versions={"drake": "1.51.1"},
+    seed=2**40,
+    run="0a1b",
 )
 
 
@@ -44,13 +59,14 @@ def columns() -> Columns:
             Outcome.LIFTED,
             Stage.EXECUTED,
             reason='comma, "quote", Ä',
-            margins={"slip": 2.0 / 3.0, "tilt": math.nan},
+            margins={"slip": 2.0 / 3.0, "tilt": math.nan, "patch_area": 1e-4 / 3},
+            displacements={"box": 1.0 / 7.0, "bowl.2": 0.0},
             q_grasp=(0.1,) * 7,
             q_pregrasp=(math.pi,) * 7,
             cpu={Stage.CLEAR: 1e-4, Stage.EXECUTED: 0.2},
         ),
     }
-    return make_columns(candidates(), verdicts, joints=7, seed=2**40, engine="standard", run="0a1b")
+    return make_columns(candidates(), verdicts, ORIGIN, instances=INSTANCES, joints=7)
 
 
 def test_rows_are_the_judged_grasps_in_the_order_of_the_candidates() -> None:
@@ -68,6 +84,43 @@ def test_position_and_quaternion_are_the_grasp_frame() -> None:
     position = np.stack([table[name] for name in "xyz"], axis=-1)
     X_OG = make_pose(rotation_from_quaternion(wxyz), position)
     np.testing.assert_allclose(X_OG, candidates().grasps.X_OG[[0, 3]], atol=1e-14)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_row_gives_back_its_trial_bit_for_bit(tmp_path: Path, suffix: str) -> None:
+    write_table(tmp_path / f"r.{suffix}", columns())
+    row = table_row(read_table(tmp_path / f"r.{suffix}"), 0)
+    trial = read_trial(row, "here")
+    assert trial.X_OG.tobytes() == candidates().grasps.X_OG[0].tobytes()
+    assert (trial.id, trial.instance) == (candidates().id[0], "mug_1")
+    assert trial.friction is None and trial.mass is None
+    assert trial.verdict is not None
+    assert trial.verdict.margins["patch_area"] == 1e-4 / 3
+    assert trial.verdict.displacements == {"box": 1.0 / 7.0, "bowl.2": 0.0}
+
+
+def test_displacements_are_columns_of_numbers() -> None:
+    table = columns()
+    assert [name for name in table if name.startswith("moved_")] == [
+        "moved_mug_1",
+        "moved_box",
+        "moved_bowl.2",
+    ]
+    assert np.isnan(table["moved_mug_1"]).all()  # the target itself, and a trial that never began
+    np.testing.assert_array_equal(table["moved_box"], [1.0 / 7.0, math.nan])
+
+
+def test_trials_with_another_friction_and_mass_share_the_format() -> None:
+    verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
+    X_OG = candidates().grasps.X_OG[0]
+    trials = [
+        Trial(id="mug_1-a", instance="mug_1", X_OG=X_OG, friction=mu, mass=mass, verdict=verdict)
+        for mu, mass in ((0.1, None), (0.0, 1 / 3))
+    ]
+    table = trial_columns(trials, ORIGIN, instances=INSTANCES)
+    assert list(table) == [name for name in columns() if not name.startswith("q_")]
+    back = [read_trial(table_row(table, k), "here") for k in range(2)]
+    assert [(t.friction, t.mass) for t in back] == [(0.1, None), (0.0, 1 / 3)]
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
@@ -103,7 +156,7 @@ def test_parquet_has_nulls_and_metadata(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_no_rows_are_a_table_too(tmp_path: Path, suffix: str) -> None:
-    table = make_columns(candidates(), {}, joints=0, seed=0, engine="standard", run="")
+    table = make_columns(candidates(), {}, ORIGIN, instances=INSTANCES)
     write_table(tmp_path / f"r.{suffix}", table)
     assert [len(v) for v in read_table(tmp_path / f"r.{suffix}").values()] == [0] * len(table)
 
@@ -113,6 +166,41 @@ def test_without_pyarrow_the_message_says_how_to_get_it(monkeypatch: pytest.Monk
     require_writer("csv")
     with pytest.raises(MissingDependencyError, match=r"pip install 'burg-drake\[parquet\]'"):
         require_writer("parquet")
+
+
+def test_what_other_programs_add_does_not_matter(tmp_path: Path) -> None:
+    write_table(tmp_path / "r.csv", columns())
+    header, *rows = (tmp_path / "r.csv").read_text().splitlines()
+    lines = [f",{header},note", *(f"{k},{row},text {k}" for k, row in enumerate(rows))]
+    (tmp_path / "more.csv").write_bytes(("\ufeff" + "\r\n".join(lines) + "\r\n\r\n").encode())
+    back = read_table(tmp_path / "more.csv")
+    assert back[""].tolist() == [0.0, 1.0] and back["note"].tolist() == ["text 0", "text 1"]
+    for name, values in columns().items():
+        np.testing.assert_array_equal(back[name], values, err_msg=name)
+
+
+def test_damaged_cells_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    for text, message in (
+        ("id,slip\na,1\nb\n", "row 2 has 1 cells, the header has 2"),
+        ("id,slip\na,much\n", "could not convert string to float: 'much'"),
+        ("id,moved_mug\na,much\n", "could not convert string to float: 'much'"),
+        ("\n", "it is empty"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InvalidInputError, match=f"r.csv is not a results table .{message}"):
+            read_table(path)
+
+
+def test_a_table_of_an_older_release_is_read_but_its_rows_need_their_run(tmp_path: Path) -> None:
+    (tmp_path / "old.csv").write_text(
+        "id,instance,outcome,stage,slip,others_moved,seed,engine,run\n"
+        "mug-1,mug,lifted,executed,0.002,0.0,0,standard,0a1b\n"
+    )
+    table = read_table(tmp_path / "old.csv")
+    assert table["slip"].tolist() == [0.002]
+    with pytest.raises(InvalidInputError, match=r"old.csv: column X_OG, scene, .* of its run"):
+        read_trial(table_row(table, 0), "old.csv")
 
 
 def test_bad_files_and_formats_are_named(tmp_path: Path) -> None:

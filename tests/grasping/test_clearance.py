@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from pydrake.geometry import Capsule, GeometryInstance, SceneGraph
+from pydrake.math import RigidTransform
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import (
     grasp_from_axes,
     inverse,
@@ -20,7 +23,7 @@ from burg_drake.core.frames import (
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance
+from burg_drake.grasping.clearance import HandClearance, _shape
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
@@ -131,6 +134,36 @@ def test_swapped_fingers_get_the_same_verdict(clearance: HandClearance) -> None:
         one, other = (clearance.check("box", X) for X in (X_WG, swap_fingers(X_WG)))
         assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
         assert one.overlap == pytest.approx(other.overlap, abs=1e-7)
+
+
+def test_agrees_with_drake_and_is_the_same_in_a_batch(clearance: HandClearance) -> None:
+    grasps = random_grasps(300)
+    verdicts = clearance.check_all("box", grasps)
+    assert verdicts[:40] == [clearance.check("box", X_WG) for X_WG in grasps[:40]]
+    assert 30 < sum(v.outcome is None for v in verdicts) < 270
+    for X_WG, verdict in zip(grasps, verdicts, strict=True):
+        touched = clearance.touched(X_WG)
+        assert verdict.overlap < 1e-6 or verdict.blocker in touched
+        assert bool(touched) == (verdict.outcome is not None) or verdict.overlap < 1e-6
+        if {"box", "table"} <= touched.keys():
+            assert verdict.blocker == "box"
+
+
+def test_what_is_not_a_pose_is_refused(clearance: HandClearance) -> None:
+    X_WG = np.eye(4)
+    X_WG[0, 3] = np.nan
+    with pytest.raises(InvalidInputError, match="X_WG has NaN"):
+        clearance.check("box", X_WG)
+    assert clearance.check_all("box", np.empty((0, 4, 4))) == []
+
+
+def test_a_shape_that_the_screen_does_not_know_is_named() -> None:
+    graph = SceneGraph()
+    source = graph.RegisterSource("test")
+    tip = GeometryInstance(RigidTransform(), Capsule(0.01, 0.02), "tip")
+    geometry = graph.RegisterAnchoredGeometry(source, tip)
+    with pytest.raises(InvalidInputError, match=r"'tip' is a Capsule; .* knows boxes, cylinders"):
+        _shape(graph.model_inspector(), geometry, np.eye(4))
 
 
 def test_depth_in_the_table_is_that_of_the_lowest_point(clearance: HandClearance) -> None:

@@ -66,7 +66,7 @@ def test_they_come_to_rest_where_they_are(scene: Scene) -> None:
     simulator = Simulator(diagram.diagram)
     plant = diagram.plant
     context = plant.GetMyContextFromRoot(simulator.get_context())
-    simulator.AdvanceTo(1.0)
+    simulator.AdvanceTo(2.0)
     for name, index in diagram.free.items():
         body = plant.get_body(index)
         X_WO, before = plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4(), diagram.X_WO(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import re
 
 import numpy as np
@@ -15,6 +16,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import Margins, TrialResult
+from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import Station, load_station
 from burg_drake.visualization.replay import CLEAR_VIEW, VIEW, camera_offset, describe, record_trial
 from burg_drake.visualization.scene_view import open_meshcat
@@ -41,9 +43,12 @@ def messages(meshcat: Meshcat) -> bytes:
 
 def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
+    early = HandTrial(scene, station).run("box", X_OG)
     result = record_trial(scene, station, "box", X_OG, meshcat)
-    assert result == HandTrial(scene, station).run("box", X_OG)
-    assert result.outcome is Outcome.LIFTED
+    whole = dataclasses.replace(ENGINES["standard"], whole_trial=True)
+    assert result == HandTrial(scene, station, engine=whole).run("box", X_OG)
+    assert result.outcome is early.outcome is Outcome.LIFTED
+    assert result.margins.end_time > early.margins.end_time + 1.0
     recording = meshcat.get_mutable_recording()
     assert recording.autoplay()
     assert recording.loop_mode() == type(recording).LoopMode.kLoopRepeat
@@ -100,22 +105,28 @@ def test_a_vertical_closing_axis_has_a_camera() -> None:
 
 def test_describe() -> None:
     lifted = TrialResult(
-        outcome=Outcome.LIFTED,
+        outcome=Outcome.LIFTED_DISTURBED,
         margins=Margins(
             overlap=0.0,
             slip=0.0012,
             tilt=np.deg2rad(2.0),
             pad_force=39.96,
+            patch_area=1.234e-4,
             lift=0.2996,
-            others_moved=0.0,
+            others_moved=0.0123,
             end_time=2.5,
         ),
+        displacements={"bowl": 0.0004, "can": 0.0123, "box": 0.0},
     )
     assert describe(lifted) == [
-        "lifted",
-        "lift 300 mm, slip 1.2 mm, tilt 2.0 deg, pad force 40.0 N, others moved 0.0 mm",
+        "lifted disturbed",
+        "lift 300 mm, slip 1.2 mm, tilt 2.0 deg, pad force 40.0 N, patch 123 mm²,"
+        " others moved 12.3 mm",
+        "moved can 12.3 mm, bowl 0.4 mm",
     ]
     blocked = TrialResult(
         outcome=Outcome.COLLISION_CLUTTER, margins=Margins(overlap=0.0034), blocker="mug"
     )
     assert describe(blocked) == ["collision clutter (mug, 3.4 mm deep)"]
+    arm = TrialResult(outcome=Outcome.ARM_COLLISION, margins=Margins(overlap=0.0), blocker="shelf")
+    assert describe(arm) == ["arm collision (shelf)"]

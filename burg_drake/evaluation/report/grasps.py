@@ -22,7 +22,7 @@ FAILURES = 50
 
 
 def margin_section(columns: Columns) -> Html | None:
-    """Histograms of slip, tilt and force; nothing where no grasp was held."""
+    """Histograms of slip, tilt, force and patch; nothing where no grasp was held."""
     lifted = columns["outcome"] == Outcome.LIFTED
     if not np.isfinite(columns["slip"]).any():
         return None
@@ -32,13 +32,15 @@ def margin_section(columns: Columns) -> Html | None:
             ("slip", "slip in the hand [mm]", "mm", 1e3),
             ("tilt", "tilt in the hand [°]", "°", 180 / math.pi),
             ("pad_force", "normal force of the weaker pad [N]", "N", 1.0),
+            ("patch_area", "contact patch of the weaker pad [mm²]", "mm²", 1e6),
         )
     ]
     groups = [g for g in GROUPS if _in_group(columns, g.name, "slip").any()]
     return section(
         "Margins",
         "Of all grasps that both fingers held once: movement of the object in the hand since the"
-        " grip, and force, when the outcome was decided. The last bar counts all beyond the axis.",
+        " grip, force and contact patch, when the outcome was decided. The last bar counts all"
+        " beyond the axis.",
         element("div", *charts, class_="charts"),
         legend([(STYLES[g.name], g.name) for g in groups]),
     )
@@ -66,13 +68,14 @@ def best_section(run: Run) -> Html | None:
     best = run.best(BEST)
     if not best:
         return None
-    head = ["grasp", "object", "slip", "tilt", "pad force", "others moved", "sampler's score"]
+    head = ["grasp", "object", "slip", "tilt", "pad force", "patch", "others moved", "score"]
     rows = []
     for row in map(run.row, best):
         cells = [
             f"{row['slip'] * 1e3:.2f} mm",
             f"{math.degrees(row['tilt']):.2f}°",
             f"{row['pad_force']:.1f} N",
+            "-" if math.isnan(row["patch_area"]) else f"{row['patch_area'] * 1e6:.0f} mm²",
             f"{row['others_moved'] * 1e3:.2f} mm",
             "-" if math.isnan(row["score"]) else f"{row['score']:.2f}",
         ]
@@ -87,10 +90,11 @@ def best_section(run: Run) -> Html | None:
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
     return section(
         "Best grasps",
-        "Lifted grasps whose object moved least in the hand, and that pushed others least. Any"
-        " grasp of the table can be watched by its id:",
+        "Lifted grasps whose object moved least in the hand, and that pushed others least, with the"
+        " contact patch of the weaker pad and the sampler's score. Any grasp can be watched by its"
+        " id, from here or from its row of the table alone:",
         command(line),
-        table(head, rows, numbers=(2, 3, 4, 5, 6)),
+        table(head, rows, numbers=(2, 3, 4, 5, 6, 7)),
     )
 
 

@@ -58,7 +58,8 @@ def funnel_section(summary: Summary) -> Html:
         "clear": ("collision_",),
         "reachable": ("no_ik", "arm_collision"),
         "executed": ("simulation_failed",),
-        "lifted": ("no_contact", "one_finger", "closed_empty", "slipped", "dropped"),
+        "held": ("no_contact", "one_finger", "closed_empty", "slipped", "dropped"),
+        "lifted": ("lifted_disturbed",),
     }
     losses = [_loss(total, why[name]) for name in names[1:]]
     return section(

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from burg_drake.core.files import atomic_write
+from burg_drake.evaluation.origin import engine_label
+from burg_drake.evaluation.report.bodies import collision_section, disturbed_section
 from burg_drake.evaluation.report.grasps import best_section, failure_section, margin_section
 from burg_drake.evaluation.report.markup import Child, Html, element
 from burg_drake.evaluation.report.outcomes import (
@@ -37,7 +41,9 @@ def report_page(run: Run) -> str:
         objects_section(summary),
         funnel_section(summary),
         count_section(summary),
+        collision_section(columns),
         margin_section(columns),
+        disturbed_section(columns, run.document.trial.get("disturbance", math.inf)),
         best_section(run),
         failure_section(run),
         cost_section(summary),
@@ -62,7 +68,8 @@ def _header(run: Run, title: str) -> Html:
     count = document.grasps.count
     how = "sampled" if document.grasps.origin == "sampled" else "given"
     day = document.stretches[0].started[:10] if document.stretches else ""
-    about = f"{count} {how} grasps, engine {document.engine.name}, seed {document.seed}"
+    engine = engine_label(document.engine)
+    about = f"{count} {how} grasps, engine {engine}, seed {document.seed}"
     return element(
         "header",
         element("p", "Grasp evaluation", class_="kind"),
@@ -89,10 +96,12 @@ def _tiles(summary: Summary) -> Html:
     interval = f"{100 * low:.0f} to {100 * high:.0f} % (95 % interval)" if total.executed else ""
     trial = next((c for c in summary.costs if c.name == "executed"), None)
     screened = "clear and reachable" if summary.reach else "clear"
+    disturbed = total.held - total.lifted
+    disturbing = f"; {disturbed} more disturbed others" if disturbed else ""
     tiles: list[tuple[str, Child, str]] = [
         ("Grasps judged", total.judged, f"on {len(summary.objects)} objects"),
         ("Executed", total.executed, f"those found {screened}"),
-        ("Lifted", total.lifted, f"of {total.executed} executed"),
+        ("Lifted", total.lifted, f"of {total.executed} executed{disturbing}"),
         ("Success when executed", share, interval),
         ("CPU time of a trial", duration(trial.median) if trial else "-", "median"),
     ]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shlex
 
+from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.markup import Html, command, element, join
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
 from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
 from burg_drake.evaluation.summary import duration
+from burg_drake.station.engine import ENGINES, Engine
 
 
 def provenance(run: Run) -> Html:
@@ -48,10 +50,12 @@ def reproduce_command(run: Run) -> str:
 
 
 def _text(document: RunDocument) -> str:
+    preset = document.engine in ENGINES.values()
+    by_hand = "" if preset else " The engine is not a preset: give it to `evaluate` in Python."
     return (
         "Results follow from the inputs, the seed and the versions below; not from the number of"
         " workers or the order of their work. In a folder that is complete the command returns at"
-        " once; give another -o to judge again."
+        f" once; give another -o to judge again.{by_hand}"
     )
 
 
@@ -72,18 +76,28 @@ def _inputs(document: RunDocument) -> list[tuple[str, str]]:
 
 def _settings(document: RunDocument) -> list[tuple[str, str]]:
     engine = document.engine
-    settings = (
-        f"{engine.name}: step {duration(engine.time_step)}, {engine.contact_approximation},"
-        f" {engine.contact_model.replace('_', ' ')}, {engine.contact_surface} surfaces"
-    )
     return [
-        ("engine", settings),
+        ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
         ("trial", _listed(document.trial)),
         ("arm", _listed(document.arm) if document.reach else "not asked"),
         ("seed", str(document.seed)),
         ("run", f"{document.hash} (all of the above; column run of the table)"),
         *document.versions.items(),
     ]
+
+
+def _engine_text(engine: Engine) -> str:
+    """All settings of an engine, by name."""
+    settings = {name: value for name, value in vars(engine).items() if name != "name"}
+    return ", ".join(
+        f"{name.replace('_', ' ')} {_engine_value(value)}" for name, value in settings.items()
+    )
+
+
+def _engine_value(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return duration(value) if isinstance(value, float) else str(value).replace("_", " ")
 
 
 def _listed(settings: dict[str, float]) -> str:

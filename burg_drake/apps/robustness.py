@@ -1,0 +1,147 @@
+"""`burg-drake robustness`: how hard lifted grasps can be tugged, how much goes wrong with noise."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import add_verb, not_negative, positive_int, seed
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.probes import RobustnessSettings
+
+# Kept in step with evaluation.probes and evaluation.robustness, which import too much for a help
+# text; a test compares them.
+TESTS = ("tug", "shake", "friction", "noise")
+DEFAULT_BEST = 20
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "robustness",
+        run_robustness,
+        "test how robust the lifted grasps of a run are: tug, shake, friction, noise",
+        "burg-drake robustness runs/first",
+        "burg-drake robustness runs/first --best 5 --tests tug,noise --repeats 50",
+        "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
+        "",
+        "The same command goes on where an interrupted one stopped.",
+    )
+    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--grasp",
+        metavar="ID",
+        nargs="+",
+        action="extend",
+        help="ids of lifted grasps, from the table of results",
+    )
+    which.add_argument(
+        "--best",
+        metavar="N",
+        type=positive_int,
+        default=DEFAULT_BEST,
+        help="the N lifted grasps that slipped and disturbed least (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--tests",
+        metavar="LIST",
+        type=_tests,
+        default=TESTS,
+        help=f"some of {','.join(TESTS)} (default: all)",
+    )
+    noise = parser.add_argument_group("noise, as standard deviations")
+    noise.add_argument(
+        "--repeats",
+        metavar="K",
+        type=positive_int,
+        default=20,
+        help="perturbed repeats of each grasp (default: %(default)s)",
+    )
+    for name, unit, default, what in (
+        ("translation", "mm", 5.0, "of the grasp along each axis"),
+        ("rotation", "deg", 5.0, "of the grasp about each axis"),
+        ("mass", "percent", 10.0, "of the object's mass"),
+        ("friction", "percent", 20.0, "of the object's friction coefficient"),
+    ):
+        noise.add_argument(
+            f"--{name}-{unit}",
+            metavar=unit.upper(),
+            type=not_negative,
+            default=default,
+            help=f"{what} (default: %(default)g)",
+        )
+    noise.add_argument("--seed", metavar="N", type=seed, help="(default: the run's)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="table, .csv or .parquet (default: robustness.csv in the run's folder)",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def run_robustness(arguments: argparse.Namespace) -> int:
+    """Tests; 1 if something could not be simulated."""
+    from rich.console import Console
+
+    from burg_drake.evaluation.robustness import assess_robustness
+    from burg_drake.evaluation.robustness_table import robustness_view
+    from burg_drake.evaluation.run_store import load_run
+
+    run = load_run(arguments.run_folder)
+    settings = _settings(arguments, run.document.seed)
+    found = assess_robustness(
+        run,
+        grasps=arguments.grasp,
+        best=arguments.best,
+        settings=settings,
+        out=arguments.output,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    Console().print(robustness_view(found.grasps, settings))
+    print(f"table   {found.table_path}")
+    if found.failures:
+        id, reason = next(iter(found.failures.items()))
+        print(
+            f"burg-drake: {len(found.failures)} tests could not be simulated, such as {id}:"
+            f" {reason}",
+            file=sys.stderr,
+        )
+        return 1
+    return 0
+
+
+def _settings(arguments: argparse.Namespace, seed: int) -> RobustnessSettings:
+    from burg_drake.evaluation.probes import RobustnessSettings
+    from burg_drake.simulation.perturbation import Noise
+
+    return RobustnessSettings(
+        tests=arguments.tests,
+        noise=Noise(
+            translation=arguments.translation_mm * 1e-3,
+            rotation=math.radians(arguments.rotation_deg),
+            mass=arguments.mass_percent / 100.0,
+            friction=arguments.friction_percent / 100.0,
+        ),
+        repeats=arguments.repeats,
+        seed=seed if arguments.seed is None else arguments.seed,
+    )
+
+
+def _tests(text: str) -> tuple[str, ...]:
+    """Names of tests, each once, in the usual order."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in TESTS:
+            raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(TESTS)}")
+    return tuple(test for test in TESTS if test in names)

@@ -1,0 +1,145 @@
+"""What the trials of a table have in common. Every row tells it, so that a row needs nothing else.
+
+Settings and versions are cells of the form `name=value name=value`: they need no quotes in CSV, and
+a spreadsheet leaves them alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.reader import Reader
+from burg_drake.core.yaml_nodes import parse_nodes
+from burg_drake.station.engine import ENGINES, Engine
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.hand_trial import TrialSettings
+
+T = TypeVar("T")
+
+ORIGIN_TEXT = (
+    "scene",
+    "scene_content",
+    "station",
+    "station_content",
+    "engine_settings",
+    "trial_settings",
+    "versions",
+)
+"""Columns of texts beside `engine` and `run`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """What made the trials of a table.
+
+    Attributes:
+        scene, station: where the documents were, or names of built-in ones.
+        scene_content, station_content: first digits of their content hashes.
+        engine: how time was stepped.
+        trial: settings of the trial's phases; see `simulation.hand_trial.TrialSettings`.
+        versions: of the software and the machine.
+        seed: of the run.
+        run: hash of the run.
+    """
+
+    scene: str
+    scene_content: str
+    station: str
+    station_content: str
+    engine: Engine
+    trial: Mapping[str, float]
+    versions: Mapping[str, str]
+    seed: int = 0
+    run: str = ""
+
+    def settings(self) -> TrialSettings:
+        """The trial's settings; those that were not recorded have their defaults.
+
+        Raises:
+            InvalidInputError: one of them is unknown or cannot be used.
+        """
+        from burg_drake.simulation.hand_trial import TrialSettings
+
+        return _typed(self.trial, TrialSettings, "trial settings")
+
+    def cells(self) -> dict[str, str]:
+        """The texts `ORIGIN_TEXT` by column."""
+        settings = {name: value for name, value in vars(self.engine).items() if name != "name"}
+        return {
+            "scene": self.scene,
+            "scene_content": self.scene_content,
+            "station": self.station,
+            "station_content": self.station_content,
+            "engine_settings": pairs_text(settings),
+            "trial_settings": pairs_text(self.trial),
+            "versions": pairs_text(self.versions),
+        }
+
+
+def read_origin(row: Mapping[str, Any], where: str) -> Origin:
+    """The origin that a row of a table tells.
+
+    Args:
+        row: cells by column.
+        where: names the row in messages.
+
+    Raises:
+        InvalidInputError: a cell cannot be read, or tells a setting that this release lacks.
+    """
+    settings = {"name": row["engine"], **_pairs(row["engine_settings"], where)}
+    trial = _pairs(row["trial_settings"], where)
+    try:
+        numbers = {name: float(value) for name, value in trial.items()}
+    except ValueError as error:
+        raise InvalidInputError(f"{where}: trial_settings: {error}") from error
+    return Origin(
+        scene=row["scene"],
+        scene_content=row["scene_content"],
+        station=row["station"],
+        station_content=row["station_content"],
+        engine=_typed(settings, Engine, f"{where}, engine_settings"),
+        trial=numbers,
+        versions=_pairs(row["versions"], where),
+        seed=row.get("seed", 0),
+        run=row.get("run", ""),
+    )
+
+
+def engine_label(engine: Engine) -> str:
+    """Name of an engine for tables and reports. One that has a preset's name and other settings
+    is marked as custom."""
+    preset = ENGINES.get(engine.name, engine)
+    return engine.name if preset == engine else f"{engine.name} (custom)"
+
+
+def pairs_text(values: Mapping[str, object]) -> str:
+    """`name=value` pairs as one text; floats keep every bit."""
+    words = {name: str(value).replace(" ", "_") for name, value in values.items()}
+    return " ".join(f"{name}={word}" for name, word in words.items())
+
+
+def _pairs(text: str, where: str) -> dict[str, str]:
+    pairs = [word.partition("=") for word in text.split()]
+    bad = [name for name, equals, _ in pairs if not equals]
+    if bad:
+        raise InvalidInputError(f"{where}: {bad[0]!r} is not name=value")
+    return {name: value for name, _, value in pairs}
+
+
+def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
+    """A dataclass from texts or numbers by field, checked as if it came from a document."""
+    known = {field.name for field in fields(schema)}  # type: ignore[arg-type]
+    unknown = [name for name in values if name not in known]
+    if unknown:
+        raise InvalidInputError(
+            f"{where}: {unknown[0]!r} is no setting of this release of burg_drake; install the one"
+            " that made the results"
+        )
+    text = "\n".join(f"{name}: {json.dumps(str(value))}" for name, value in values.items())
+    found: T = Reader(where).read(parse_nodes(text or "{}", where), schema, "")
+    return found

@@ -1,0 +1,113 @@
+"""Executes a recorded trial again and compares: outcome and margins have to be the same bits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from burg_drake.core.outcome import Stage
+from burg_drake.evaluation.judge import MARGINS, StationJudge, Verdict, judge_grasp
+from burg_drake.evaluation.origin import Origin
+from burg_drake.evaluation.run_document import software_versions
+from burg_drake.evaluation.trial import Trial
+from burg_drake.scene.scene import Scene
+from burg_drake.simulation.result import Margins, TrialResult
+from burg_drake.station.station import Station
+
+ROUNDING = 1e-14
+"""Relative difference that a table gets which a program wrote again with 15 digits, as
+spreadsheets do, or has read without care for the last bit."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A result that is not as recorded.
+
+    Attributes:
+        name: of the result.
+        recorded, now: its values; NaN or an empty text where there is none.
+    """
+
+    name: str
+    recorded: float | str
+    now: float | str
+
+    @property
+    def rounding(self) -> bool:
+        """Whether a table that was written again by another program explains it."""
+        if isinstance(self.recorded, str) or isinstance(self.now, str):
+            return False
+        return math.isclose(self.recorded, self.now, rel_tol=ROUNDING)
+
+    def __str__(self) -> str:
+        return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
+
+
+def rerun(scene: Scene, station: Station, trial: Trial, origin: Origin) -> Verdict:
+    """Judges a grasp again as its row tells; the arm is asked if it was the arm that decided.
+
+    Raises:
+        InvalidInputError: settings that this release lacks, or an unsound scene.
+    """
+    reach = trial.verdict is not None and trial.verdict.stage is Stage.REACHABLE
+    judge = StationJudge(
+        scene,
+        station,
+        engine=origin.engine,
+        reach=reach and station.document.arm is not None,
+        settings=origin.settings(),
+    )
+    return judge_grasp(judge, trial.candidate)
+
+
+def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
+    """Results that are not the same bits; times and arm configurations are not compared."""
+    there, here = _results(recorded), _results(now)
+    found = []
+    for name in {**there, **here}:
+        empty = "" if isinstance(there.get(name, here.get(name)), str) else math.nan
+        a, b = there.get(name, empty), here.get(name, empty)
+        if _bits(a) != _bits(b):
+            found.append(Difference(name, a, b))
+    return found
+
+
+def comparison(found: Sequence[Difference], origin: Origin) -> list[str]:
+    """What `differences` found as lines for people; `as recorded` if every bit is the same."""
+    if not found:
+        return ["as recorded"]
+    if all(difference.rounding for difference in found):
+        names = ", ".join(difference.name for difference in found)
+        return [f"as recorded, but for the last digits of {names}: the table was rounded"]
+    there, here = origin.versions, software_versions()
+    changed = [
+        f"{name} {there[name]}, now {here[name]}"
+        for name in there
+        if name in here and there[name] != here[name].replace(" ", "_")
+    ]
+    versions = f" (with {'; '.join(changed)})" if changed else ""
+    return [f"not as recorded{versions}", *map(str, found)]
+
+
+def _results(verdict: Verdict) -> dict[str, float | str]:
+    margins = {name: verdict.margins[name] for name in MARGINS if name in verdict.margins}
+    if margins.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
+        del margins["end_time"]
+    moved = {f"moved {name}": value for name, value in verdict.displacements.items()}
+    return {"outcome": verdict.outcome.value, "blocker": verdict.blocker, **margins, **moved}
+
+
+def _bits(value: float | str) -> str:
+    return value if isinstance(value, str) else float(value).hex()
+
+
+def as_result(verdict: Verdict) -> TrialResult:
+    """A verdict as a trial returns it."""
+    return TrialResult(
+        outcome=verdict.outcome,
+        margins=Margins(**verdict.margins),
+        blocker=verdict.blocker,
+        reason=verdict.reason,
+        displacements=verdict.displacements,
+    )

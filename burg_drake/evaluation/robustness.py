@@ -1,0 +1,171 @@
+"""Robustness of grasps that a run found to lift: probes in worker processes, journal and table.
+
+Answers are appended to a journal beside the table as they come. The same call goes on where an
+interrupted one stopped, and a call that asks for more asks only what is new.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import writable_folder
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executors import judge_all
+from burg_drake.evaluation.journal import Journal, read_journal
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.probes import (
+    Probe,
+    ProbeJudgeFactory,
+    RobustnessSettings,
+    make_probes,
+)
+from burg_drake.evaluation.progress import Listener, Progress, Reporter
+from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_columns
+from burg_drake.evaluation.run_document import origin_of, software_versions
+from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.table_file import require_writer, write_table
+
+TABLE_FILE = "robustness.csv"
+DEFAULT_BEST = 20
+"""So many of the best grasps are asked about if none are named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robustness:
+    """What was found.
+
+    Attributes:
+        grasps: answers by grasp, in the order asked.
+        table_path: the table.
+        failures: ids of probes that could not be simulated, with the reason.
+    """
+
+    grasps: tuple[GraspRobustness, ...]
+    table_path: Path
+    failures: dict[str, str]
+
+
+def assess_robustness(
+    run: Run | str | Path,
+    *,
+    grasps: Sequence[str] | None = None,
+    best: int = DEFAULT_BEST,
+    settings: RobustnessSettings | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool | Listener = True,
+) -> Robustness:
+    """Tests how robust lifted grasps of a run are, and writes a table.
+
+    Args:
+        run: the run, or its folder.
+        grasps: ids; the best ones of the run if None.
+        best: how many of those at most.
+        settings: what is asked; all tests with their defaults if None.
+        out: the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The journal
+            is the file of the same name with the suffix .jsonl.
+        workers: number of processes; as many as there are processors if None.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Raises:
+        UnknownNameError: a grasp is not in the run.
+        InvalidInputError: a grasp was not lifted, the scene has changed since the run, or the table
+            cannot be written.
+        SimulationError: the simulation of the scene cannot be built.
+    """
+    run = run if isinstance(run, Run) else load_run(run)
+    settings = RobustnessSettings() if settings is None else settings
+    table = run.path / TABLE_FILE if out is None else Path(out)
+    require_writer(table.suffix.removeprefix("."))
+    chosen = _choose(run, grasps, best)
+    factory = ProbeJudgeFactory(
+        run.scene(),
+        run.station(),
+        run.document.engine,
+        origin_of(run.document).settings(),
+        settings,
+    )
+    versions = software_versions()
+    context = [*factory.content(), versions["burg_drake"], versions["drake"]]
+    probes = [p for grasp in chosen for p in make_probes(grasp, factory.scene, settings, context)]
+    writable_folder(table.parent)
+    journal_path = table.with_suffix(".jsonl")
+    with Reporter(progress) as reporter, Journal(journal_path) as journal:
+        _answer(probes, factory, journal, read_journal(journal_path), workers, reporter)
+    answers = read_journal(journal_path)
+    found = tuple(_gather(grasp, probes, answers, factory) for grasp in chosen)
+    write_table(table, robustness_columns(found, settings, run.document.engine))
+    failures = {
+        p.id: answers[p.id].reason
+        for p in probes
+        if answers[p.id].outcome is Outcome.SIMULATION_FAILED
+    }
+    return Robustness(found, table, failures)
+
+
+def _choose(run: Run, ids: Sequence[str] | None, best: int) -> list[Candidate]:
+    if ids is None:
+        ids = run.best(best)
+        if not ids:
+            raise InvalidInputError(f"{run.path}: no grasp was lifted; there is nothing to test")
+    chosen = {id: run.candidate(id) for id in ids}
+    for id in chosen:
+        verdict = run.verdicts.get(id)
+        if verdict is None:
+            raise InvalidInputError(f"{run.path}: grasp {id!r} is not judged yet")
+        if verdict.outcome is not Outcome.LIFTED:
+            raise InvalidInputError(
+                f"{run.path}: grasp {id!r} was not lifted ({verdict.outcome}); robustness is tested"
+                " of lifted grasps"
+            )
+    return list(chosen.values())
+
+
+def _answer(
+    probes: Sequence[Probe],
+    factory: ProbeJudgeFactory,
+    journal: Journal,
+    known: dict[str, Verdict],
+    workers: int | None,
+    reporter: Reporter,
+) -> None:
+    """Asks what is not known yet; each answer is on disk at once."""
+    todo = [probe for probe in probes if probe.id not in known]
+    total = len({probe.grasp for probe in probes})
+    waiting: dict[str, int] = {}
+    for probe in todo:
+        waiting[probe.grasp] = waiting.get(probe.grasp, 0) + 1
+    before = total - len(waiting)
+    reporter.show(Progress("starting", before, total, before=before))
+    start = time.monotonic()
+    with closing(judge_all(todo, factory, workers=workers)) as answered:
+        for asked, verdict in answered:
+            assert isinstance(asked, Probe)
+            journal.append(asked.id, verdict)
+            waiting[asked.grasp] -= 1
+            done = total - sum(count > 0 for count in waiting.values())
+            elapsed = time.monotonic() - start
+            reporter.show(Progress("testing", done, total, before=before, elapsed=elapsed))
+
+
+def _gather(
+    grasp: Candidate,
+    probes: Sequence[Probe],
+    answers: dict[str, Verdict],
+    factory: ProbeJudgeFactory,
+) -> GraspRobustness:
+    instance = factory.scene.instance(grasp.instance)
+    own = [probe for probe in probes if probe.grasp == grasp.id]
+    return GraspRobustness.from_verdicts(
+        grasp.id,
+        grasp.instance,
+        instance.object,
+        factory.scene.entry(grasp.instance).friction,
+        [(probe.test, answers[probe.id]) for probe in own],
+    )

@@ -1,0 +1,119 @@
+"""One trial as a row of a table tells it: enough to execute it again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, check_pose
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import MARGINS, Verdict
+from burg_drake.evaluation.origin import ORIGIN_TEXT
+
+MOVED = "moved_"
+"""Columns of displacements begin with this; the instance's name follows."""
+NEEDED = ("id", "instance", "outcome", "stage", "X_OG", "engine", *ORIGIN_TEXT)
+"""Columns without which a row cannot be executed again."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trial:
+    """A grasp and what became of it.
+
+    Attributes:
+        id: of the grasp, or of this trial of it.
+        instance: name of the target in the scene.
+        object: its name in the library.
+        X_OG: (4, 4) grasp in the target's frame.
+        width: distance of the contacts [m].
+        score: the sampler's.
+        friction: coefficient in place of the library's.
+        mass: in place of the library's [kg].
+        verdict: what became of it; None if nobody has judged it.
+    """
+
+    id: str
+    instance: str
+    object: str = ""
+    X_OG: Array
+    width: float = math.nan
+    score: float = math.nan
+    friction: float | None = None
+    mass: float | None = None
+    verdict: Verdict | None = None
+
+    @property
+    def candidate(self) -> Candidate:
+        """What a judge has to know."""
+        return Candidate(self.id, self.instance, self.X_OG, self.friction, self.mass)
+
+
+def pose_text(X_OG: Array) -> str:
+    """The upper three rows of a pose (4, 4), one after the other; every bit is kept."""
+    return " ".join(map(repr, X_OG[:3].ravel().tolist()))
+
+
+def pose_from_text(text: str, where: str) -> Array:
+    """The pose (4, 4) that `pose_text` wrote.
+
+    Raises:
+        InvalidInputError: the text is something else.
+    """
+    try:
+        upper = np.array([float(word) for word in text.split()]).reshape(3, 4)
+    except ValueError as error:
+        raise InvalidInputError(
+            f"{where}: X_OG has to be the 12 numbers of the upper three rows ({error})"
+        ) from error
+    return check_pose(np.vstack([upper, (0.0, 0.0, 0.0, 1.0)]), f"{where}: X_OG")
+
+
+def read_trial(row: Mapping[str, Any], where: str) -> Trial:
+    """The trial that a row tells.
+
+    Args:
+        row: cells by column.
+        where: names the row in messages.
+
+    Raises:
+        InvalidInputError: columns are missing, or a cell cannot be read.
+    """
+    missing = [name for name in NEEDED if name not in row]
+    if missing:
+        raise InvalidInputError(
+            f"{where}: column {', '.join(missing)} is missing, without which a row alone cannot be"
+            " replayed (older releases did not write it); give the folder of its run"
+        )
+    try:
+        outcome, stage = Outcome(row["outcome"]), Stage(row["stage"])
+    except ValueError as error:
+        raise InvalidInputError(f"{where}: {error}; was it made by a newer release?") from error
+    moved = {name.removeprefix(MOVED): v for name, v in row.items() if name.startswith(MOVED)}
+    verdict = Verdict(
+        outcome,
+        stage,
+        blocker=row.get("blocker", ""),
+        reason=row.get("reason", ""),
+        margins={name: row[name] for name in MARGINS if name in row},
+        displacements={name: v for name, v in moved.items() if math.isfinite(v)},
+    )
+    return Trial(
+        id=row["id"],
+        instance=row["instance"],
+        object=row.get("object", ""),
+        X_OG=pose_from_text(row["X_OG"], where),
+        friction=_given(row, "friction"),
+        mass=_given(row, "mass"),
+        verdict=verdict,
+    )
+
+
+def _given(row: Mapping[str, Any], name: str) -> float | None:
+    value = float(row.get(name, math.nan))
+    return None if math.isnan(value) else value

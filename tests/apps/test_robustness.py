@@ -1,0 +1,124 @@
+"""`burg-drake robustness` on a run with one lifted grasp."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from burg_drake.apps import robustness
+from burg_drake.apps.cli import main
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation import probes
+from burg_drake.evaluation import robustness as tested
+from burg_drake.evaluation.probes import RobustnessSettings
+from burg_drake.evaluation.robustness import assess_robustness
+from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.table_file import read_table
+from burg_drake.simulation.friction_limit import friction_limit
+from burg_drake.simulation.grip import Grip, take_grip
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.hold_force import tug
+from burg_drake.simulation.perturbation import success_rate
+
+Capture = pytest.CaptureFixture[str]
+
+OPTIONS = ["--tests", "tug,friction,noise", "--repeats", "3", "--workers", "1", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def copied(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run of its own, tested once."""
+    folder = tmp_path_factory.mktemp("robustness") / "run"
+    shutil.copytree(run.path, folder)
+    copied = load_run(folder)
+    assert main(["robustness", str(folder), *OPTIONS]) == 0
+    return copied
+
+
+def test_the_table_has_what_the_functions_say(copied: Run) -> None:
+    table = read_table(copied.path / "robustness.csv")
+    (id,) = copied.best()
+    assert table["id"].tolist() == [id]
+    candidate = copied.candidate(id)
+    trial = HandTrial(copied.scene(), copied.station(), engine=copied.document.engine)
+    grip = take_grip(trial, candidate.instance, candidate.X_OG)
+    assert isinstance(grip, Grip)
+    found = tug(grip)
+    for name, value in found.accelerations.items():
+        assert table[f"tug_{name}_g"][0] == value
+        assert table[f"tug_{name}_N"][0] == pytest.approx(value * grip.weight)
+    assert table["friction_min"][0] == friction_limit(trial, "box", candidate.X_OG)
+    rate = success_rate(trial, "box", candidate.X_OG, repeats=3, grasp=id)
+    assert (table["repeats"][0], table["lifted"][0]) == (3, rate.lifted)
+    assert (table["success_low"][0], table["success_high"][0]) == rate.interval
+    for outcome in Outcome:
+        assert table[f"n_{outcome}"][0] == rate.outcomes[outcome]
+    assert table["shake_x_g"][0] != table["shake_x_g"][0]  # not asked for
+
+
+def test_an_interrupted_test_goes_on_with_the_same_result(copied: Run, tmp_path: Path) -> None:
+    table, journal = copied.path / "robustness.csv", copied.path / "robustness.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 5
+    (tmp_path / "again.jsonl").write_bytes(b"".join(lines[:2]) + lines[2][:40])
+    again = tmp_path / "again.csv"
+    assert main(["robustness", str(copied.path), *OPTIONS, "-o", str(again)]) == 0
+    assert again.read_bytes() == table.read_bytes()
+    assert (tmp_path / "again.jsonl").read_bytes().startswith(b"".join(lines[:2]))
+    assert len((tmp_path / "again.jsonl").read_bytes().splitlines()) == 5
+
+
+def test_two_workers_and_no_journal_give_the_same_bits(copied: Run, tmp_path: Path) -> None:
+    options = [*OPTIONS, "--workers", "2", "-o", str(tmp_path / "two.csv")]
+    assert main(["robustness", str(copied.path), *options]) == 0
+    assert (tmp_path / "two.csv").read_bytes() == (copied.path / "robustness.csv").read_bytes()
+
+
+def test_what_is_known_is_not_asked_again(copied: Run, monkeypatch, capsys: Capture) -> None:
+    asked = []
+    judge_all = tested.judge_all
+    monkeypatch.setattr(
+        tested, "judge_all", lambda todo, *a, **k: asked.extend(todo) or judge_all(todo, *a, **k)
+    )
+    assert main(["robustness", str(copied.path), *OPTIONS]) == 0
+    assert asked == []
+    out = capsys.readouterr().out
+    assert "Robustness of lifted grasps" in out and copied.best()[0] in out.replace("\n", "")
+    assert f"table   {copied.path / 'robustness.csv'}" in out
+    more = RobustnessSettings(tests=("noise",), repeats=4)
+    found = assess_robustness(
+        copied, settings=more, out=copied.path / "robustness.csv", workers=1, progress=False
+    )
+    assert [probe.test for probe in asked] == ["noise"]
+    assert found.grasps[0].success is not None and found.grasps[0].success.trials == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--grasp", "box-nothing"], "has no judged grasp 'box-nothing'"),
+        (["--grasp", "COLLIDING"], "was not lifted (collision_target); robustness is tested of"),
+        (["--tests", "tug,pull"], "'pull' is none of tug, shake, friction, noise"),
+        (["--repeats", "0"], "'0' is not a whole number from 1"),
+        (["--translation-mm", "-1"], "-1 is below 0"),
+        (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),
+        (["-o", "table.xlsx"], "table format 'xlsx' does not exist; give csv or parquet"),
+    ],
+)
+def test_bad_arguments(options: list[str], message: str, run: Run, capsys: Capture) -> None:
+    colliding = run.results["id"][1]
+    options = [colliding if option == "COLLIDING" else option for option in options]
+    try:
+        code = main(["robustness", str(run.path), *options])
+    except SystemExit as ended:
+        code = ended.code  # type: ignore[assignment]
+    assert code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("burg-drake: error: ") and message in line
+
+
+def test_the_parser_knows_tests_and_defaults() -> None:
+    assert robustness.TESTS == probes.TESTS
+    assert robustness.DEFAULT_BEST == tested.DEFAULT_BEST

@@ -1,0 +1,79 @@
+"""Scene and station of a row: found by content, beside the table, where they were, or as given."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.inputs import find_inputs
+from burg_drake.evaluation.run_document import origin_of
+from burg_drake.evaluation.run_store import Run
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+
+@pytest.fixture
+def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
+    return evaluate(scene, station, tmp_path / "run", grasps_per_object=3, progress=False)
+
+
+def spoil(path: Path) -> None:
+    path.write_text(path.read_text().replace("0.35", "0.36"))
+
+
+def test_documents_are_where_they_were(run: Run, scene: Scene, tmp_path: Path) -> None:
+    found = find_inputs(origin_of(run.document), "row 1", tmp_path / "elsewhere")
+    assert found.scene.content == scene.content and found.scene.path == scene.path
+    assert found.station.content == run.document.station.content
+    assert found.notes == ()
+
+
+def test_the_copies_of_the_run_serve_its_own_table(run: Run, scene: Scene, tmp_path: Path) -> None:
+    spoil(scene.path)
+    origin = origin_of(run.document)
+    assert find_inputs(origin, "row 1", run.path).scene.content == scene.content
+    with pytest.raises(InvalidInputError, match=r"three.yaml has content"):
+        find_inputs(origin, "row 1", tmp_path)
+
+
+def test_a_lost_scene_is_asked_for_by_its_content(run: Run, scene: Scene, tmp_path: Path) -> None:
+    content, origin = scene.content, origin_of(run.document)
+    moved = scene.path.rename(tmp_path / "moved.yaml")
+    with pytest.raises(InvalidInputError) as caught:
+        find_inputs(origin, "a.csv, row 1", tmp_path)
+    message = str(caught.value)
+    assert message.startswith(f"a.csv, row 1 needs the scene with content {content[:12]}")
+    assert f"{scene.path} does not exist" in message
+    assert f"give --scene FILE (a copy is scene.yaml in the folder of run {origin.run})" in message
+    assert "--force" not in message  # there is nothing to replay on
+    assert find_inputs(origin, "row 1", tmp_path, scene=str(moved)).scene.content == content
+
+
+def test_a_changed_scene_is_taken_by_force_only(run: Run, scene: Scene, tmp_path: Path) -> None:
+    spoil(scene.path)
+    origin = origin_of(run.document)
+    with pytest.raises(InvalidInputError, match=f"or --force to replay on {scene.path}"):
+        find_inputs(origin, "row 1", tmp_path)
+    found = find_inputs(origin, "row 1", tmp_path, force=True)
+    assert found.scene.content != scene.content
+    (note,) = found.notes
+    assert note.startswith(f"the scene is not the one of the trial (content {scene.content[:12]})")
+
+
+def test_a_missing_library_is_named(run: Run, scene: Scene, tmp_path: Path) -> None:
+    shutil.rmtree(scene.library.root)
+    with pytest.raises(InvalidInputError, match=r"three.yaml: library: shapes does not exist"):
+        find_inputs(origin_of(run.document), "row 1", tmp_path)
+
+
+def test_another_station_is_refused(run: Run, tmp_path: Path) -> None:
+    text = (run.path / "station.yaml").read_text().replace("0.24", "0.25")
+    (tmp_path / "other.yaml").write_text(text)
+    with pytest.raises(InvalidInputError, match=r"needs the station .*robot models count"):
+        find_inputs(
+            origin_of(run.document), "row 1", run.path, station=str(tmp_path / "other.yaml")
+        )

@@ -1,0 +1,86 @@
+"""What every row tells about its run: whole, exact, and refused where it is not understood."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.evaluation.origin import Origin, engine_label, read_origin
+from burg_drake.simulation.hand_trial import TrialSettings
+from burg_drake.station.engine import ENGINES, Engine
+
+CUSTOM = Engine(
+    name="mine",
+    time_step=1 / 3000,
+    contact_approximation="similar",
+    contact_model="point",
+    contact_surface="triangle",
+    whole_trial=True,
+)
+
+
+def origin(engine: Engine) -> Origin:
+    return Origin(
+        scene="/a folder/scene, 1.yaml",
+        scene_content="0123456789ab",
+        station="panda_tabletop",
+        station_content="ba9876543210",
+        engine=engine,
+        trial={"lift_height": 0.1 + 0.2, "disturbance": 1e-7},
+        versions={"drake": "1.51.1", "platform": "Linux-6.1-x86_64"},
+        seed=7,
+        run="0a1b",
+    )
+
+
+def row(made: Origin) -> dict[str, object]:
+    return {
+        **made.cells(),
+        "engine": engine_label(made.engine),
+        "seed": made.seed,
+        "run": made.run,
+    }
+
+
+@pytest.mark.parametrize("engine", [*ENGINES.values(), CUSTOM], ids=lambda engine: engine.name)
+def test_cells_give_back_the_origin(engine: Engine) -> None:
+    assert read_origin(row(origin(engine)), "here") == origin(engine)
+
+
+def test_settings_are_those_of_the_trial_and_defaults_where_none_were_recorded() -> None:
+    settings = origin(CUSTOM).settings()
+    assert settings == TrialSettings(lift_height=0.1 + 0.2, disturbance=1e-7)
+
+
+def test_an_engine_that_only_shares_the_name_of_a_preset_is_marked() -> None:
+    changed = dataclasses.replace(ENGINES["standard"], time_step=0.004)
+    assert engine_label(ENGINES["standard"]) == "standard"
+    assert engine_label(changed) == "standard (custom)"
+    assert engine_label(CUSTOM) == "mine"
+    back = read_origin(row(origin(changed)), "here").engine
+    assert dataclasses.replace(back, name="standard") == changed
+
+
+@pytest.mark.parametrize(
+    ("column", "text", "message"),
+    [
+        ("engine_settings", "time_step=0.002 warp=9", "here.*'warp' is no setting of this release"),
+        ("engine_settings", "time_step=fast", "here.*time_step: 'fast' is not a finite number"),
+        ("engine_settings", "time_step=0.002 contact_model=soft", "'soft' is not valid"),
+        ("engine_settings", "time_step=0.5", "give 0 to 0.02 s"),
+        ("engine_settings", "", "key 'time_step' is missing"),
+        ("trial_settings", "lift_height", "'lift_height' is not name=value"),
+        ("trial_settings", "lift_height=high", "trial_settings: could not convert"),
+    ],
+)
+def test_what_cannot_be_read_is_said(column: str, text: str, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        read_origin({**row(origin(ENGINES["standard"])), column: text}, "here")
+
+
+def test_a_trial_setting_of_another_release_is_refused() -> None:
+    other = dataclasses.replace(origin(CUSTOM), trial={"spin": 1.0})
+    with pytest.raises(InvalidInputError, match="'spin' is no setting of this release"):
+        other.settings()

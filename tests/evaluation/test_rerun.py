@@ -1,0 +1,89 @@
+"""Comparing a trial with its record: the last bit counts, and a rounded table is recognised."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.origin import Origin
+from burg_drake.evaluation.rerun import comparison, differences
+from burg_drake.evaluation.run_document import software_versions
+from burg_drake.station.engine import ENGINES
+
+VERDICT = Verdict(
+    Outcome.LIFTED,
+    Stage.EXECUTED,
+    margins={"overlap": 0.0, "slip": 0.1 + 0.2, "tilt": math.nan},
+    displacements={"mug": 0.0, "bowl": 1 / 3},
+    q_grasp=(1.0,),
+    cpu={Stage.CLEAR: 1.0},
+)
+ORIGIN = Origin(
+    scene="s",
+    scene_content="0",
+    station="t",
+    station_content="1",
+    engine=ENGINES["standard"],
+    trial={},
+    versions=software_versions(),
+)
+
+
+def changed(**margins: float) -> Verdict:
+    return dataclasses.replace(VERDICT, margins={**VERDICT.margins, **margins})
+
+
+def test_the_same_bits_are_as_recorded() -> None:
+    again = dataclasses.replace(changed(slip=0.1 + 0.2), cpu={}, q_grasp=())
+    assert differences(VERDICT, again) == []
+    assert comparison([], ORIGIN) == ["as recorded"]
+    # a table tells margins that were not measured as NaN, a journal does not tell them
+    assert differences(changed(lift=math.nan), VERDICT) == []
+
+
+def test_the_last_bit_counts() -> None:
+    found = differences(VERDICT, changed(slip=np.nextafter(0.1 + 0.2, 1.0)))
+    assert [difference.name for difference in found] == ["slip"]
+    assert found[0].rounding
+    assert comparison(found, ORIGIN) == [
+        "as recorded, but for the last digits of slip: the table was rounded"
+    ]
+    assert [d.name for d in differences(VERDICT, changed(overlap=-0.0))] == ["overlap"]
+
+
+def test_15_digits_are_rounding_and_14_are_not() -> None:
+    value = 1.2345678901234567e-3
+    for digits, rounding in ((15, True), (13, False)):
+        recorded = changed(slip=float(f"{value:.{digits}g}"))
+        (found,) = differences(recorded, changed(slip=value))
+        assert found.rounding is rounding
+
+
+def test_everything_that_differs_is_listed() -> None:
+    moved = {"mug": 0.25, "bowl": 1 / 3}
+    other = dataclasses.replace(
+        changed(slip=0.4, tilt=0.5),
+        outcome=Outcome.LIFTED_DISTURBED,
+        blocker="box",
+        displacements=moved,
+    )
+    assert comparison(differences(VERDICT, other), ORIGIN) == [
+        "not as recorded",
+        "outcome: recorded 'lifted', now 'lifted_disturbed'",
+        "blocker: recorded '', now 'box'",
+        f"slip: recorded {0.1 + 0.2!r}, now 0.4",
+        "tilt: recorded nan, now 0.5",
+        "moved mug: recorded 0.0, now 0.25",
+    ]
+
+
+def test_other_versions_are_named() -> None:
+    origin = dataclasses.replace(ORIGIN, versions={**ORIGIN.versions, "drake": "1.2.3"})
+    found = differences(VERDICT, changed(slip=0.4))
+    first, *_ = comparison(found, origin)
+    assert first == f"not as recorded (with drake 1.2.3, now {software_versions()['drake']})"
+    assert comparison([], origin) == ["as recorded"]

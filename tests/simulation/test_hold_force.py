@@ -1,0 +1,141 @@
+"""Tugging and shaking a block between two pads, against statics."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from trial_world import FORCE, GRAVITY, from_above, make_station
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.schema import Pose
+from burg_drake.scene.scene import Instance
+from burg_drake.simulation.grip import Grip, take_grip
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.hold_force import DIRECTIONS, HoldForces, LoadSettings, shake, tug
+from burg_drake.simulation.result import TrialResult
+
+CENTRE = from_above(0.025)
+"""At the block's centre of mass."""
+MASS = 0.3
+WEIGHT = MASS * GRAVITY
+FRICTION = 0.3
+CARRIED = 2 * FRICTION * FORCE
+"""What two pads carry by friction [N]."""
+FINE = LoadSettings(tolerance=0.01)
+LIMITS = {
+    # Both fingers hang on one drive of 2 N. A load F along the closing direction leaves them where
+    # they are, N + F/2 on one side and N - F/2 on the other, until the second lets go at F = 2 N.
+    "+x": 2 * FORCE,
+    "-x": 2 * FORCE,
+    # sideways and downwards at once
+    "+y": math.sqrt(CARRIED**2 - WEIGHT**2),
+    "-y": math.sqrt(CARRIED**2 - WEIGHT**2),
+    # z approaches, which is downwards here
+    "+z": CARRIED - WEIGHT,
+    "-z": CARRIED + WEIGHT,
+}
+
+
+@pytest.fixture(scope="module")
+def trial(make_scene) -> HandTrial:
+    return HandTrial(make_scene(("block", 0.3, 0.2, 0.0)), make_station())
+
+
+def grip_of(trial: HandTrial, mass: float = MASS) -> Grip:
+    grip = take_grip(trial, "block", CENTRE, friction=FRICTION, mass=mass)
+    assert isinstance(grip, Grip)
+    return grip
+
+
+@pytest.fixture(scope="module")
+def tugged(trial: HandTrial) -> HoldForces:
+    return tug(grip_of(trial), FINE)
+
+
+@pytest.mark.parametrize("direction", LIMITS)
+def test_tug_to_the_limit_of_statics(tugged: HoldForces, direction: str) -> None:
+    assert tugged.forces[direction] == pytest.approx(LIMITS[direction], rel=0.03)
+
+
+def test_units_and_the_weakest_direction(tugged: HoldForces) -> None:
+    assert tugged.weight == pytest.approx(WEIGHT, rel=1e-6)
+    assert tugged.weakest == ("+z", tugged.accelerations["+z"])
+    assert tugged.weakest[1] == pytest.approx((CARRIED - WEIGHT) / WEIGHT, rel=0.03)
+
+
+def test_any_order_gives_the_same_bits(trial: HandTrial, tugged: HoldForces) -> None:
+    backwards = tug(grip_of(trial), FINE, directions=reversed(DIRECTIONS))
+    assert backwards.accelerations == tugged.accelerations
+
+
+def test_a_trial_after_a_tug_is_as_if_there_had_been_none(trial: HandTrial) -> None:
+    fresh = HandTrial(trial.diagram.scene, trial.diagram.station).run("block", CENTRE)
+    grip = grip_of(trial)
+    assert not grip.bears(lambda t: np.array([0.0, 0.0, 1e3]), 0.2, 0.005)
+    assert trial.run("block", CENTRE) == fresh
+
+
+def test_a_slow_shake_is_borne_as_far_as_statics_says(trial: HandTrial) -> None:
+    """When hardly any sliding is allowed, the peaks of the load are like tugs."""
+    strict = LoadSettings(slide=2e-4, tolerance=0.01)
+    shaken = shake(grip_of(trial), strict, axes="yz").forces
+    assert shaken["y"] == pytest.approx(LIMITS["+y"], rel=0.03)
+    assert shaken["z"] == pytest.approx(LIMITS["+z"], rel=0.03)
+
+
+def test_a_fast_shake_is_borne_better_than_a_slow_one(trial: HandTrial) -> None:
+    """In a shorter period the box slides less far before it is carried back."""
+    grip = grip_of(trial)
+    slow, fast = (
+        shake(grip, LoadSettings(frequency=f), axes="y").accelerations["y"] for f in (5.0, 20.0)
+    )
+    assert fast > 1.1 * slow
+
+
+def test_beyond_what_is_tried(trial: HandTrial) -> None:
+    grip = grip_of(trial)
+    for low, high, found in ((0.5, 5.0, math.inf), (40.0, 50.0, 0.0)):
+        tugged = tug(grip, LoadSettings(smallest=low, largest=high))
+        assert set(tugged.accelerations.values()) == {found}
+
+
+def test_a_heavier_box_is_held_against_less(trial: HandTrial) -> None:
+    """The force is the same, but for the weight."""
+    grip = grip_of(trial, mass=1.0)
+    found = tug(grip, FINE, directions=["+z"])
+    assert found.weight == pytest.approx(9.81)
+    assert found.forces["+z"] == pytest.approx(CARRIED - 9.81, rel=0.03)
+
+
+def test_what_stands_around_does_not_matter(trial: HandTrial, tugged, make_scene) -> None:
+    """A block beside the gripped one would be hit by it."""
+    crowded = HandTrial(
+        make_scene(
+            ("block", 0.3, 0.2, 0.0),
+            Instance(name="beside", object="block", X_SO=Pose((0.3, 0.252, 0.0))),
+        ),
+        make_station(),
+    )
+    found = tug(grip_of(crowded), FINE, directions=["-y"])
+    assert found.forces["-y"] == pytest.approx(tugged.forces["-y"], rel=0.02)
+
+
+def test_what_is_not_held_has_no_grip(trial: HandTrial) -> None:
+    result = take_grip(trial, "block", CENTRE, friction=0.01)
+    assert isinstance(result, TrialResult)
+    assert result.outcome is Outcome.SLIPPED
+
+
+def test_bad_settings() -> None:
+    with pytest.raises(InvalidInputError, match="loads from 5 to 1 g: must rise from above 0"):
+        LoadSettings(smallest=5.0, largest=1.0)
+    with pytest.raises(InvalidInputError, match="frequency is 0; give more than 0"):
+        LoadSettings(frequency=0.0)
+
+
+def test_unknown_direction(trial: HandTrial) -> None:
+    with pytest.raises(UnknownNameError, match="direction 'x' does not exist"):
+        tug(grip_of(trial), directions=["x"])

@@ -1,0 +1,153 @@
+"""Stacks, heaps and rolling balls come to rest, or it is told what still moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from trial_world import GRAVITY, from_above, make_station
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import inverse
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.schema import Pose
+from burg_drake.objects.library import load_library
+from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.settle_scene import settle_scene
+from burg_drake.station.check import overlaps
+from burg_drake.station.diagram import build_station_diagram
+
+EDGE = 0.05
+"""Of the blocks [m]; they stand on their origins."""
+
+
+def placed(name: str, object: str, x: float, y: float, z: float, **options) -> Instance:
+    return Instance(name=name, object=object, X_SO=Pose((x, y, z), **options))
+
+
+@pytest.fixture(scope="module")
+def stack(make_scene) -> Scene:
+    """Three blocks, 1 mm above each other, the upper ones turned."""
+    return make_scene(
+        placed("low", "block", 0.3, 0.2, 0.001),
+        placed("middle", "block", 0.303, 0.2, EDGE + 0.002, rpy_deg=(0.0, 0.0, 5.0)),
+        placed("high", "block", 0.298, 0.202, 2 * EDGE + 0.003, rpy_deg=(0.0, 0.0, -3.0)),
+    )
+
+
+@pytest.fixture(scope="module")
+def settled_stack(stack: Scene) -> Scene:
+    return settle_scene(stack, make_station()).scene
+
+
+def test_a_stack_stays_a_stack(stack: Scene) -> None:
+    settled = settle_scene(stack, make_station())
+    assert settled.at_rest and settled.fallen == () and settled.duration < 1.0
+    for k, name in enumerate(("low", "middle", "high")):
+        fall = 0.001 * (k + 1)
+        assert settled.scene.X_SO(name)[2, 3] == pytest.approx(k * EDGE, abs=3e-4)
+        assert settled.displacements[name].distance == pytest.approx(fall, abs=5e-4)
+        assert settled.displacements[name].angle < 0.01
+
+
+def test_what_is_settled_stays_where_it_is(settled_stack: Scene) -> None:
+    again = settle_scene(settled_stack, make_station())
+    assert again.at_rest
+    assert max(moved.distance for moved in again.displacements.values()) < 1e-4
+
+
+def test_the_board_may_lie_anywhere(stack: Scene, settled_stack: Scene) -> None:
+    station = make_station(Pose((0.4, -0.1, 0.0), rpy_deg=(0.0, 0.0, 37.0)))
+    moved = settle_scene(stack, station)
+    for name in stack.instances:
+        difference = inverse(settled_stack.X_SO(name)) @ moved.scene.X_SO(name)
+        np.testing.assert_allclose(difference, np.eye(4), atol=2e-3)
+
+
+def test_a_heap_of_household_objects(tmp_path) -> None:
+    library = load_library("household")
+    instances = (
+        placed("bowl", "bowl", 0.3, 0.2, 0.0),
+        placed("banana", "banana", 0.3, 0.2, 0.12),
+        placed("can", "can", 0.31, 0.2, 0.25, rpy_deg=(30.0, 10.0, 0.0)),
+        placed("screwdriver", "screwdriver", 0.3, 0.2, 0.42),
+    )
+    document = SceneDocument(name="heap", library="household", instances=instances)
+    heap = Scene(document, library, tmp_path / "heap.yaml")
+    settled = settle_scene(heap, make_station())
+    assert settled.at_rest, (settled.moving, settled.fallen)
+    assert settled.displacements["screwdriver"].distance > 0.2
+    depths = overlaps(build_station_diagram(settled.scene, make_station(), robot="none"))
+    assert max(depths.values()) < 1e-3
+    again = settle_scene(settled.scene, make_station())
+    assert again.at_rest
+    assert max(moved.distance for moved in again.displacements.values()) < 2e-3
+
+
+def test_what_falls_when_time_is_up_is_named_with_its_speed(make_scene) -> None:
+    """The mean speed of the last 40 ms is that of free fall at their middle."""
+    scene = make_scene(("block", 0.2, 0.2, 0.0), placed("high", "ball", 0.4, 0.2, 1.0))
+    settled = settle_scene(scene, make_station(), time_limit=0.2)
+    assert not settled.at_rest and list(settled.moving) == ["high"]
+    assert settled.moving["high"].speed == pytest.approx(GRAVITY * 0.18, rel=0.02)
+    assert settled.displacements["high"].distance == pytest.approx(GRAVITY * 0.2**2 / 2, rel=0.02)
+
+
+def test_a_ball_that_rolls_away(make_scene) -> None:
+    """It lies on the edge of a block, rolls off, and on along the table."""
+    scene = make_scene(
+        ("block", 0.3, 0.2, 0.0), placed("ball", "ball", 0.3 + EDGE / 2 - 0.002, 0.2, EDGE)
+    )
+    early = settle_scene(scene, make_station(), time_limit=1.0)
+    assert list(early.moving) == ["ball"]
+    speed = early.moving["ball"]
+    assert speed.speed == pytest.approx(speed.turning * 0.03, rel=0.1)  # it rolls, on its radius
+    late = settle_scene(scene, make_station(), time_limit=20.0)
+    assert late.at_rest
+    assert late.scene.X_SO("ball")[0, 3] > early.scene.X_SO("ball")[0, 3] > 0.35
+    assert late.displacements["block"].distance < 0.005
+
+
+def test_background_stays_and_carries(make_scene) -> None:
+    scene = make_scene(("block", 0.1, 0.1, 0.0), placed("top", "block", 0.4, 0.2, 0.252))
+    shelf = placed("shelf", "block", 0.4, 0.2, 0.2)
+    document = SceneDocument(
+        name="shelf",
+        library=scene.document.library,
+        instances=scene.document.instances,
+        background=(shelf,),
+    )
+    settled = settle_scene(Scene(document, scene.library, scene.path), make_station())
+    assert settled.at_rest
+    assert settled.scene.background == {"shelf": shelf}
+    assert settled.scene.X_SO("top")[2, 3] == pytest.approx(0.25, abs=2e-4)
+    assert settled.displacements.keys() == {"block", "top"}
+    assert settled.scene.instances["block"] == scene.instances["block"]  # to the last digit
+
+
+def test_what_falls_off_the_table_is_left_out(make_scene) -> None:
+    scene = make_scene(("block", 0.3, 0.2, 0.0), placed("gone", "block", 5.0, 0.2, 0.0))
+    settled = settle_scene(scene, make_station())
+    assert settled.fallen == ("gone",) and not settled.moving and not settled.at_rest
+    assert list(settled.scene.instances) == list(settled.displacements) == ["block"]
+    assert settled.duration < 2.0
+
+
+def test_clear_errors(make_scene) -> None:
+    scene = make_scene(("block", 0.3, 0.2, 0.0), placed("other", "block", 0.33, 0.2, 0.0))
+    with pytest.raises(InvalidInputError, match=r"'block' and 'other' overlap by 20\.0 mm, and"):
+        settle_scene(scene, make_station())
+    with pytest.raises(InvalidInputError, match="time limit is 0 s; give more than 0"):
+        settle_scene(scene, make_station(), time_limit=0.0)
+
+
+def test_the_top_of_a_stack_is_lifted_off(settled_stack: Scene) -> None:
+    """The one below is touched from the start, and stays where it is."""
+    trial = HandTrial(settled_stack, make_station())
+    result = trial.run("high", from_above(0.035))
+    assert result.outcome is Outcome.LIFTED
+    assert result.displacements.keys() == {"low", "middle"}
+    assert 0.0 < result.displacements["middle"] < 0.005
+    free = HandTrial(settled_stack, make_station(), lock=False).run("high", from_above(0.035))
+    assert free.outcome is result.outcome
+    assert free.margins.others_moved == pytest.approx(result.margins.others_moved, abs=5e-3)

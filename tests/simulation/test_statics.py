@@ -1,0 +1,248 @@
+"""Trials judged by statics: forces, patches and limits of friction in closed form.
+
+Pads are elastic foundations: a layer of thickness h and modulus E yields to a pressure p by
+p h / E. A finger presses with N, and both pads together hold 2 mu N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from trial_world import (
+    BOX,
+    BOX_MASS,
+    CENTRE,
+    FORCE,
+    GRAVITY,
+    PAD,
+    SLOW,
+    from_above,
+    make_station,
+)
+
+from burg_drake.core.outcome import Outcome
+from burg_drake.scene.scene import Scene
+from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+from burg_drake.station.engine import ENGINES
+
+STIFFNESS = 1e7 / 0.0076
+"""Modulus of the pads over their thickness from the middle to the front [N/m^3]."""
+PAD_OFFSET = 0.00025
+"""The pads' middle is so far beyond the grasp frame [m]."""
+COULOMB_FRICTION = BOX_MASS * GRAVITY / (2 * FORCE)
+"""With this coefficient the pads just carry the box."""
+COULOMB_MASS = 2 * FORCE * 0.08 / GRAVITY
+"""With a coefficient of 0.08 the pads just carry this [kg]."""
+
+BAR_MASS, BAR_LENGTH = 0.2, 0.30
+LEVER = 0.05
+"""The bar is gripped so far beside its middle [m]."""
+STEEP = TrialSettings(lift_height=0.02, lift_time=1.4, hold_time=0.1)
+"""Raises the hand by 20 mm, also at 0.04 m/s^2."""
+
+
+@pytest.fixture(scope="module")
+def slow_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
+    """The box, lifted slowly, by engine."""
+    scene = make_scene(("box", 0.3, 0.2, 0.0))
+    return {
+        name: HandTrial(scene, make_station(), engine=engine, settings=SLOW)
+        for name, engine in ENGINES.items()
+    }
+
+
+def bisected(holds: Callable[[float], bool], low: float, high: float, *, steps: int = 6) -> float:
+    """Where `holds` changes between two values."""
+    assert holds(high) and not holds(low)
+    for _ in range(steps):
+        middle = (low + high) / 2
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return (low + high) / 2
+
+
+# --- pad force and load -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_pads_press_with_the_commanded_force(make_scene, engine: str) -> None:
+    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=ENGINES[engine])
+    result = trial.run("box", CENTRE)
+    assert result.outcome is Outcome.LIFTED
+    assert result.margins.pad_force == pytest.approx(FORCE, rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "height"), [("ball", 0.03), ("can", 0.08)])
+def test_pads_press_round_objects_with_the_commanded_force(make_scene, name, height) -> None:
+    trial = HandTrial(make_scene((name, 0.3, 0.2, 0.0)), make_station())
+    result = trial.run(name, from_above(height))
+    assert result.outcome is Outcome.LIFTED
+    assert result.margins.pad_force == pytest.approx(FORCE, rel=0.01)
+
+
+def test_pads_carry_the_weight_and_press_against_each_other(slow_trials) -> None:
+    """Held at rest: both forces on the box and its weight are in equilibrium."""
+    execution = slow_trials["standard"].begin("box", box_grasp(slow_trials["standard"]))
+    assert [execution.close(), execution.lift()] == [None, Outcome.LIFTED]
+    left, right = execution.contact.force
+    assert left[2] + right[2] == pytest.approx(BOX_MASS * GRAVITY, rel=0.01)
+    assert left[:2] + right[:2] == pytest.approx(np.zeros(2), abs=0.01 * FORCE)
+
+
+@pytest.mark.parametrize("friction", [0.005, 0.01, 0.02])
+def test_pads_that_slide_pull_with_coulombs_force(slow_trials, friction: float) -> None:
+    """The box stays on the table, and the hand rises past it at a steady speed."""
+    trial = slow_trials["standard"]
+    execution = trial.begin("box", box_grasp(trial), friction=friction)
+    assert execution.close() is None
+    trial.command("lift", np.array([0.0, 0.05]))
+    pulls = []
+    for _ in range(20):
+        execution.advance()
+        pulls.append(execution.contact.force[:, 2].sum())
+    assert execution.risen() == pytest.approx(0.0, abs=1e-4)
+    assert np.mean(pulls[5:]) == pytest.approx(2 * friction * FORCE, rel=0.02)
+
+
+def box_grasp(trial: HandTrial) -> np.ndarray:
+    return trial.X_WG("box", CENTRE)
+
+
+# --- payload ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ["standard", "screening"])
+def test_smallest_friction_that_holds(slow_trials, engine: str) -> None:
+    """2 mu N = m g."""
+    trial = slow_trials[engine]
+
+    def holds(share: float) -> bool:
+        return trial.run("box", CENTRE, friction=share * COULOMB_FRICTION).outcome.held
+
+    assert bisected(holds, 0.9, 1.1) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("engine", ["standard", "screening"])
+def test_largest_mass_that_is_held(slow_trials, engine: str) -> None:
+    """2 mu N = m g."""
+    trial = slow_trials[engine]
+
+    def holds(share: float) -> bool:
+        return trial.run("box", CENTRE, friction=0.08, mass=COULOMB_MASS / share).outcome.held
+
+    assert bisected(holds, 0.9, 1.1) == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_reference_knows_the_payload_as_well(slow_trials) -> None:
+    for share in (0.98, 1.02):
+        by_friction = slow_trials["reference"].run("box", CENTRE, friction=share * COULOMB_FRICTION)
+        by_mass = slow_trials["reference"].run(
+            "box", CENTRE, friction=0.08, mass=COULOMB_MASS / share
+        )
+        assert by_friction.outcome.held is by_mass.outcome.held is (share > 1.0)
+
+
+# --- torsion ------------------------------------------------------------------------------------
+
+
+def limit_friction(width: float, length: float, lever: float) -> float:
+    """Smallest coefficient with which a patch of even pressure and unit normal force carries a
+    unit force at a lever [m], by integration over the patch: at the limit it turns about a point
+    beside its middle, and each spot rubs across the line to that point."""
+    n = 200
+    x, z = np.meshgrid(*(((np.arange(n) + 0.5) / n - 0.5) * size for size in (width, length)))
+
+    def rubbing(centre: float) -> tuple[float, float]:
+        """Force and moment about the middle of the patch that turns about x = -centre."""
+        r = np.hypot(x + centre, z)
+        force_x, force_z = -z / r, (x + centre) / r
+        return float(force_z.mean()), float((x * force_z - z * force_x).mean())
+
+    def excess(centre: float) -> float:
+        force, moment = rubbing(centre)
+        return moment - lever * force
+
+    return 1.0 / rubbing(brentq(excess, 1e-6, 1.0))[0]
+
+
+def test_limit_of_torsion_has_known_special_cases() -> None:
+    side = 0.018
+    mean_distance = side * (np.sqrt(2) + np.log(1 + np.sqrt(2))) / 6  # from the square's middle
+    assert limit_friction(side, side, 1.0) == pytest.approx(1.0 / mean_distance, rel=1e-3)
+    assert limit_friction(side, side, 1e-4) == pytest.approx(1.0, rel=1e-3)
+    # Howe and Cutkosky (1996) approximate the limit surface by an ellipsoid
+    lever = 0.02
+    ellipsoid = np.hypot(1.0, lever / mean_distance)
+    assert limit_friction(side, side, lever) == pytest.approx(ellipsoid, rel=0.03)
+
+
+@pytest.fixture(scope="module")
+def bar_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
+    """The bar, lifted slowly, by engine."""
+    scene = make_scene(("bar", 0.3, 0.2, 0.0))
+    return {
+        name: HandTrial(scene, make_station(), engine=engine, settings=STEEP)
+        for name, engine in ENGINES.items()
+    }
+
+
+BAR_FRICTION = limit_friction(*PAD, LEVER) * BAR_MASS * GRAVITY / (2 * FORCE)
+
+
+@pytest.mark.parametrize(("engine", "tolerance"), [("standard", 0.06), ("screening", 0.12)])
+def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance) -> None:
+    """Of what is above 1, the pad's eight triangles make 0.03, as they stand for the whole patch
+    with their middles; the rest is creep, as Drake's friction is slightly viscous."""
+    far_end = BAR_LENGTH / 2 + LEVER  # stays on the table while the bar turns in the hand
+
+    def tilt(share: float) -> float:
+        X_OG, friction = from_above(0.02, y=LEVER), share * BAR_FRICTION
+        return bar_trials[engine].run("bar", X_OG, friction=friction).margins.tilt
+
+    assert tilt(0.9) == pytest.approx(STEEP.lift_height / far_end, rel=0.05)
+    assert tilt(1.3) < np.deg2rad(0.5)
+    limit = bisected(lambda share: tilt(share) < np.deg2rad(2.5), 0.9, 1.3, steps=5)
+    assert limit == pytest.approx(1.0, abs=tolerance)
+
+
+# --- contact patches ----------------------------------------------------------------------------
+
+
+def patch_area(trial: HandTrial, name: str, X_OG: np.ndarray) -> float:
+    result = trial.run(name, X_OG)
+    assert result.outcome is Outcome.LIFTED
+    return result.margins.patch_area
+
+
+@pytest.mark.parametrize("above_grasp", [0.03, 0.0, -0.004])
+def test_patch_of_a_flat_face_is_the_overlap(box_trial: HandTrial, above_grasp: float) -> None:
+    """Of the top face counts the strip that the box sinks in by."""
+    width, length = PAD
+    face = above_grasp + length / 2 + PAD_OFFSET
+    expected = width * length
+    if face < length:
+        expected = width * face + FORCE / (STIFFNESS * face)
+    area = patch_area(box_trial, "box", from_above(BOX[2] - above_grasp))
+    assert area == pytest.approx(expected, rel=0.01)
+
+
+def test_patch_of_a_ball_is_that_of_an_elastic_foundation(make_scene) -> None:
+    """The ball sinks in by d: N = pi E/h R d^2 on a cap of 2 pi R d."""
+    radius = 0.03
+    depth = np.sqrt(FORCE / (np.pi * STIFFNESS * radius))
+    trial = HandTrial(make_scene(("ball", 0.3, 0.2, 0.0)), make_station())
+    area = patch_area(trial, "ball", from_above(radius))
+    assert area == pytest.approx(2 * np.pi * radius * depth, rel=0.02)
+
+
+def test_patch_of_a_can_is_that_of_an_elastic_foundation(make_scene) -> None:
+    """Gripped across its axis, the can touches on a strip of half width b over the pad's length:
+    N = 2/3 E/h b^3 L / R."""
+    radius, length = 0.03, PAD[1]
+    half_width = (1.5 * FORCE * radius / (STIFFNESS * length)) ** (1 / 3)
+    assert half_width < PAD[0] / 2
+    trial = HandTrial(make_scene(("can", 0.3, 0.2, 0.0)), make_station())
+    area = patch_area(trial, "can", from_above(0.07))
+    assert area == pytest.approx(2 * half_width * length, rel=0.05)

@@ -1,0 +1,84 @@
+"""What is in the way of hand and target on their way up is met, though a trial may end early."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trial_world import BOX, CENTRE, from_above, make_station
+
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.schema import Pose
+from burg_drake.scene.scene import Instance
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.result import TrialResult
+from burg_drake.station.engine import ENGINES
+from burg_drake.station.station import Obstacle
+
+UNDECIDED = 0.6
+"""A trial in free air is decided before this [s]."""
+
+
+def shelf(height: float, y: float) -> dict[str, Obstacle]:
+    """A board of 20 mm, its underside at a height, from y to y + 0.2 m, over the whole width."""
+    return {
+        "shelf": Obstacle(X_WB=Pose((0.3, y + 0.1, height + 0.01)), size=(0.6, 0.2, 0.02)),
+    }
+
+
+def both(make_scene, *instances, X_OG=CENTRE, **obstacles) -> tuple[TrialResult, TrialResult]:
+    """The trial that may end early, and the one that is simulated to its end."""
+    engine = ENGINES["standard"]
+    early, whole = (
+        HandTrial(make_scene(*instances), make_station(**obstacles), engine=e).run("box", X_OG)
+        for e in (engine, replace(engine, whole_trial=True))
+    )
+    assert early.outcome is whole.outcome
+    return early, whole
+
+
+def test_a_shelf_above_the_end_of_the_target_turns_it_in_the_hand(make_scene) -> None:
+    """It covers the box beyond the hand, which itself passes."""
+    early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.25, 0.225))
+    assert early.margins.end_time > UNDECIDED
+    assert early.margins.tilt > np.deg2rad(30.0)
+    assert early.margins.tilt == pytest.approx(whole.margins.tilt, rel=0.05)
+
+
+def test_a_low_shelf_keeps_the_target_below(make_scene) -> None:
+    """The box meets it after 0.22 m."""
+    early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.30, 0.1))
+    assert early.outcome is Outcome.SLIPPED
+    for result in (early, whole):
+        assert result.margins.lift == pytest.approx(0.30 - BOX[2], abs=0.002)
+
+
+def test_a_shelf_above_all_is_no_obstacle(make_scene) -> None:
+    """The hand reaches 0.15 m above the grasp frame, and 0.50 m at the top."""
+    early, _ = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.60, 0.1))
+    assert early.outcome is Outcome.LIFTED
+    assert early.margins.end_time < UNDECIDED
+
+
+def test_a_neighbour_that_lies_on_a_shelf_in_the_way_is_knocked_down(make_scene) -> None:
+    """A block on the shelf reaches over its edge, and the rising box takes it along."""
+    block = Instance(object="block", X_SO=Pose((0.3, 0.245, 0.20)))
+    early, whole = both(
+        make_scene, ("box", 0.3, 0.2, 0.0), block, X_OG=from_above(0.05, y=-0.02),
+        obstacles=shelf(0.18, 0.248),
+    )  # fmt: skip
+    assert early.margins.others_moved == pytest.approx(whole.margins.others_moved, rel=0.01)
+    assert early.margins.end_time > UNDECIDED
+    assert early.displacements["block"] > 0.01
+
+
+def test_a_neighbour_beside_the_way_stays_asleep(make_scene) -> None:
+    block = Instance(object="block", X_SO=Pose((0.3, 0.29, 0.20)))
+    early, _ = both(
+        make_scene, ("box", 0.3, 0.2, 0.0), block, X_OG=from_above(0.05, y=-0.02),
+        obstacles=shelf(0.18, 0.265),
+    )  # fmt: skip
+    assert early.outcome is Outcome.LIFTED
+    assert early.margins.end_time < UNDECIDED
+    assert early.displacements == {"block": 0.0}
