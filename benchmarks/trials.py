@@ -1,89 +1,206 @@
-"""CPU time of floating-hand trials in a scene, beside the figures of the PyBullet peer.
+"""CPU time of grasp trials, beside a trial of the same grasps on PyBullet.
 
-    python benchmarks/trials.py [SCENE] [--station S] [--engine NAME] [--grasps N] [--trials N]
+    python benchmarks/trials.py [SCENE ...] [--station S] [--engine NAME ...] [--trials N]
 
-Samples grasps on every object of the scene, screens all of them and executes some. Prints a row an
-object and the ratio to the peer: BURG-Toolkit on PyBullet takes 0.45 s an executed trial and 0.07 s
-a grasp that collides, CPU time of one core in a scene of five objects.
+Samples grasps on every object, screens them one by one and all at a time, and executes clear ones
+with each engine. Every second one is executed with less friction, so that not all hold. With
+PyBullet installed (`pip install pybullet`) the same grasps are executed there, in this process.
+Without it the ratios are to published figures: BURG-Toolkit takes 0.45 s an executed trial and
+0.07 s a grasp that collides, CPU time of one core in a scene of five objects.
 """
 
 from __future__ import annotations
 
 import argparse
 import resource
+import sys
 import time
 from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
+from mixed_grasps import clear_grasps, frictions, hand_only, sampled_grasps
+from peer_pybullet import Peer, is_installed
 
 import burg_drake as burg
-from burg_drake.core.content import rng_from
-from burg_drake.station.engine import engine_preset
+from burg_drake.core.outcome import Outcome
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import ENGINES, engine_preset
+from burg_drake.station.station import Station
 
-PEER_EXECUTED = 0.45
-PEER_REJECTED = 0.07
+PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
+"""The peer's CPU times [s]."""
+PEER = "pybullet"
+
+T = TypeVar("T")
+
+
+@dataclass
+class Rows:
+    """What was measured on some objects.
+
+    Attributes:
+        seconds: CPU time of every executed trial, by engine or `PEER`, in the same order.
+        held: whether the grasp held, by engine or `PEER`, in the same order.
+        outcomes: by engine or `PEER`.
+        rejected: CPU time of every grasp that collides, screened alone [s].
+        screened: CPU time of all grasps in one batch, and their number.
+    """
+
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+    held: dict[str, list[bool]] = field(default_factory=dict)
+    outcomes: dict[str, Counter[str]] = field(default_factory=dict)
+    rejected: list[float] = field(default_factory=list)
+    screened: list[tuple[float, int]] = field(default_factory=list)
+
+    def add(self, name: str, seconds: float, outcome: Outcome) -> None:
+        """Takes down one trial."""
+        self.seconds.setdefault(name, []).append(seconds)
+        self.held.setdefault(name, []).append(outcome.held)
+        self.outcomes.setdefault(name, Counter())[str(outcome)] += 1
+
+    def merge(self, other: Rows) -> None:
+        """Adds all that another one holds."""
+        for name, seconds in other.seconds.items():
+            self.seconds.setdefault(name, []).extend(seconds)
+            self.held.setdefault(name, []).extend(other.held[name])
+            self.outcomes.setdefault(name, Counter()).update(other.outcomes[name])
+        self.rejected += other.rejected
+        self.screened += other.screened
 
 
 def main() -> None:
     """Runs the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene", nargs="?", default="tabletop_six")
+    parser.add_argument("scenes", nargs="*", default=["tabletop_six"], metavar="SCENE")
     parser.add_argument("--station", default="panda_tabletop")
-    parser.add_argument("--engine", default="standard")
-    parser.add_argument("--grasps", type=int, default=400, help="sampled for each object")
+    parser.add_argument("--engine", nargs="+", default=list(ENGINES), dest="engines")
+    parser.add_argument("--grasps", type=int, default=400, help="screened for each object")
     parser.add_argument("--trials", type=int, default=12, help="executed for each object")
     arguments = parser.parse_args()
-    scene, station = burg.load_scene(arguments.scene), burg.load_station(arguments.station)
-    trial = burg.HandTrial(scene, station, engine=engine_preset(arguments.engine))
-    executed_all: list[float] = []
-    rejected_all: list[float] = []
-    print(f"{'object':20} {'pieces':>6} {'clear':>9} {'rejected':>9} {'executed':>9}  outcomes")
-    for name in scene.instances:
-        executed, rejected, outcomes = measure(trial, name, arguments.grasps, arguments.trials)
-        executed_all += executed
-        rejected_all += rejected
-        print(
-            f"{name:20} {len(scene.entry(name).pieces):6}"
-            f" {outcomes.total() / arguments.grasps:9.1%} {np.median(rejected) * 1e3:6.2f} ms"
-            f" {np.median(executed) if executed else np.nan:7.3f} s  {dict(outcomes)}",
-            flush=True,
-        )
-    rows = (("executed", executed_all, PEER_EXECUTED), ("rejected", rejected_all, PEER_REJECTED))
-    for label, seconds, peer in rows:
-        if not seconds:
-            continue
-        median = float(np.median(seconds))
-        quarters = np.percentile(seconds, (25, 75))
-        print(
-            f"{label}: median {median:.4f} s (quartiles {quarters[0]:.4f} to {quarters[1]:.4f}),"
-            f" peer {peer:.2f} s, {peer / median:.1f} times as fast"
-        )
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+    names = [*arguments.engines, *([PEER] if is_installed() else [])]
+    print(f"{'object':22}{'executed':>9}" + "".join(f"{name:>24}" for name in names), "  outcomes")
+    print(" " * 31 + "".join(f"{'median  mean  trials/s':>24}" for _ in names))
+    overall = Rows()
+    for scene_name in arguments.scenes:
+        scene = burg.load_scene(scene_name)
+        station = hand_only(burg.load_station(arguments.station))
+        bench = Bench(scene, station, arguments.engines)
+        for name in scene.instances:
+            rows = bench.measure(name, arguments.grasps, arguments.trials)
+            print_row(name, rows, names)
+            overall.merge(rows)
+    print_row("all", overall, names)
+    print_screen(overall)
+    for name in arguments.engines:
+        print_ratio(name, overall)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"peak memory {peak / (2**20 if sys.platform == 'darwin' else 2**10):.0f} MiB")
 
 
-def measure(
-    trial: burg.HandTrial, name: str, grasps: int, trials: int
-) -> tuple[list[float], list[float], Counter[str]]:
-    """CPU seconds of executed trials and of rejected grasps, and the outcomes of the clear ones."""
-    scene = trial.diagram.scene
-    entry = scene.entry(name)
-    mesh = scene.library.surface(scene.instance(name).object)
-    rng = rng_from("benchmark", name)
-    sampled = burg.sample_antipodal(mesh, grasps, rng, friction=entry.friction)
-    executed, rejected, outcomes = [], [], Counter[str]()
-    X_WO = trial.diagram.X_WO(name)
-    for X_OG in sampled.X_OG:
-        start = time.process_time()
-        clear = trial.clearance.check(name, X_WO @ X_OG).outcome is None
-        if not clear:
-            rejected.append(time.process_time() - start)
-        elif len(executed) < trials:
-            start = time.process_time()
-            outcomes[str(trial.run(name, X_OG).outcome)] += 1
-            executed.append(time.process_time() - start)
+class Bench:
+    """Executes grasps of one scene with each engine, and with the peer where it is installed.
+
+    Args:
+        scene: the scene.
+        station: a station with the hand alone.
+        engines: names of presets.
+    """
+
+    def __init__(self, scene: Scene, station: Station, engines: Sequence[str]) -> None:
+        self._trials = {
+            name: burg.HandTrial(scene, station, engine=engine_preset(name)) for name in engines
+        }
+        self._peer = Peer(scene, station) if is_installed() else None
+
+    def measure(self, name: str, screened: int, executed: int) -> Rows:
+        """Screens and executes grasps on one object."""
+        trial = next(iter(self._trials.values()))
+        scene, station, rows = trial.diagram.scene, trial.diagram.station, Rows()
+        self._screen(trial, name, sampled_grasps(scene, station, name, screened), rows)
+        grasps = clear_grasps(trial, name, executed)
+        for X_OG, mu in zip(grasps, frictions(scene, name, len(grasps)), strict=True):
+            for engine, one in self._trials.items():
+                seconds, result = timed(lambda o=one, X=X_OG, m=mu: o.run(name, X, friction=m))
+                rows.add(engine, seconds, result.outcome)
+            if self._peer is not None:
+                seconds, outcome = timed(
+                    lambda p=self._peer, X=X_OG, m=mu: p.run(name, X, friction=m)
+                )
+                rows.add(PEER, seconds, outcome)
+        return rows
+
+    @staticmethod
+    def _screen(trial: burg.HandTrial, name: str, grasps: np.ndarray, rows: Rows) -> None:
+        X_WG = trial.diagram.X_WO(name) @ grasps
+        for X in X_WG:
+            seconds, verdict = timed(lambda X=X: trial.clearance.check(name, X))
+            if verdict.outcome is not None:
+                rows.rejected.append(seconds)
+        if len(X_WG):
+            trial.clearance.check_all(name, X_WG[:1])  # builds the screen
+            seconds, _ = timed(lambda: trial.clearance.check_all(name, X_WG))
+            rows.screened.append((seconds, len(X_WG)))
+
+
+def timed(function: Callable[[], T]) -> tuple[float, T]:
+    """CPU time of a call [s], and what it returns."""
+    start = time.process_time()
+    value = function()
+    return time.process_time() - start, value
+
+
+def print_row(label: str, rows: Rows, names: Sequence[str]) -> None:
+    """Prints the line of an object."""
+    count = max((len(s) for s in rows.seconds.values()), default=0)
+    cells = ""
+    for name in names:
+        seconds = rows.seconds.get(name)
+        if seconds:
+            mean = np.mean(seconds)
+            cells += f"{np.median(seconds):11.3f}{mean:6.3f}{1 / mean:7.1f}"
         else:
-            outcomes["not executed"] += 1
-    return executed, rejected, outcomes
+            cells += f"{'-':>24}"
+    first = rows.outcomes.get(names[0], Counter())
+    print(f"{label:22}{count:9}{cells}  {dict(first)}", flush=True)
+
+
+def print_screen(rows: Rows) -> None:
+    """Prints what a rejected grasp costs."""
+    if rows.rejected:
+        median = float(np.median(rows.rejected))
+        print(
+            f"rejected grasp, screened alone: median {1e3 * median:.3f} ms (published peer"
+            f" {1e3 * PUBLISHED_REJECTED:.0f} ms, {PUBLISHED_REJECTED / median:.0f} times)"
+        )
+    if rows.screened:
+        seconds, count = np.sum(rows.screened, axis=0)
+        each = seconds / count
+        ratio = PUBLISHED_REJECTED / each
+        print(f"grasp screened in a batch: mean {1e3 * each:.3f} ms ({ratio:.0f} times)")
+
+
+def print_ratio(name: str, rows: Rows) -> None:
+    """Prints how an engine compares with the peer in time and verdicts."""
+    if not rows.seconds.get(name):
+        return
+    ours = rows.seconds[name]
+    line = (
+        f"{name}: {PUBLISHED_EXECUTED / np.mean(ours):.1f} times as fast as the published peer"
+        f" (mean; median {PUBLISHED_EXECUTED / np.median(ours):.1f})"
+    )
+    if PEER in rows.seconds:
+        theirs = rows.seconds[PEER]
+        same = np.equal(rows.held[name], rows.held[PEER])
+        line += (
+            f"; {np.mean(theirs) / np.mean(ours):.1f} times PyBullet in this process (median"
+            f" {np.median(theirs) / np.median(ours):.1f}), {same.sum()} of {same.size} verdicts"
+            f" alike: both hold {np.sum(same & rows.held[name])}, only this one"
+            f" {np.sum(~same & rows.held[name])}, only the peer {np.sum(~same & rows.held[PEER])}"
+        )
+    print(line + ("" if PEER in rows.seconds else "; PyBullet is not installed"))
 
 
 if __name__ == "__main__":

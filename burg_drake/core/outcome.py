@@ -1,6 +1,6 @@
 """What can become of a grasp: the stages it passes and the one outcome that it ends with.
 
-Both enums are append-only: results files store their values.
+Results files store their values: add new ones, rename none.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ class Outcome(StrEnum):
     """The target was touched, but escaped while the fingers closed."""
     SLIPPED = "slipped"
     """Both fingers held the target and lost it during the lift."""
+    BLOCKED = "blocked"
+    """On its way up the hand met something fixed."""
     DROPPED = "dropped"
     """The target was lifted and lost while being held."""
     LIFTED = "lifted"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,20 +111,16 @@ def reached(
     contacts: list[Contact], moving: Collection[BodyIndex], still: Collection[BodyIndex]
 ) -> set[BodyIndex]:
     """Those of the bodies in `still` that a body in `moving` touches."""
-    return {other for contact in contacts for one, other in _ways(contact) if one in moving} & set(
-        still
-    )
+    found = set()
+    for contact in contacts:
+        one, other = contact.body_A, contact.body_B
+        if one in moving and other in still:
+            found.add(other)
+        elif other in moving and one in still:
+            found.add(one)
+    return found
 
 
 def touched_from_outside(contacts: list[Contact], bodies: Collection[BodyIndex]) -> bool:
     """Whether one of the bodies touches a body that is not one of them."""
-    return any(
-        one in bodies and other not in bodies
-        for contact in contacts
-        for one, other in _ways(contact)
-    )
-
-
-def _ways(contact: Contact) -> Iterator[tuple[BodyIndex, BodyIndex]]:
-    yield contact.body_A, contact.body_B
-    yield contact.body_B, contact.body_A
+    return any((c.body_A in bodies) != (c.body_B in bodies) for c in contacts)

@@ -32,8 +32,9 @@ of a pad."""
 class Execution:
     """Runs a trial from a Context that has been brought to its start.
 
-    Objects that are locked are released when something moving touches them: the trial goes back to
-    the look before, where they were still apart, and goes on from there.
+    Objects that are locked are released when something moving touches them, and with them those
+    that stand close to them: the trial goes back to the look before, where they were still apart,
+    and goes on from there.
 
     Args:
         trial: the trial.
@@ -64,6 +65,7 @@ class Execution:
         self._X_GO_last = self.X_GO()
         self._X_GO_grip: Array | None = None
         self._touched = False
+        self._blocker = ""
         self._creep: list[float] = []
         self._in_free_air = 0.0
         self._way_blocked = False
@@ -109,6 +111,8 @@ class Execution:
             speed = top_speed * (1 - abs(2 * i + 1 - steps) / steps)  # of the interval's middle
             self._trial.command("lift", np.array([0.0, speed]))
             self.advance()
+            if self._blocker:
+                return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.SLIPPED
             if i < steps // 2 and self._is_decided():
@@ -200,6 +204,7 @@ class Execution:
                 break
             self._context.SetTime(before)
             self._context.SetDiscreteState(state)
+            found = self._trial.neighbours.close_to(found) & self._still
             self._still -= found
             self._trial.release(found, self._still)
         self._look(contacts)
@@ -217,6 +222,8 @@ class Execution:
             self._creep.append(max(distance, angle * LEVER))
         else:
             self._creep.clear()
+        hit = reached(contacts, self._hand, self._trial.diagram.fixed.values())
+        self._blocker = self._trial.diagram.body_names[min(hit)] if hit else ""
         free = not touched_from_outside(contacts, self._hand | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
@@ -264,7 +271,10 @@ class Execution:
             end_time=self._context.get_time(),
         )
         displacements = {name: self._displacements[i] for i, name in self._names.items()}
-        return TrialResult(outcome=outcome, margins=margins, displacements=displacements)
+        blocker = self._blocker if outcome is Outcome.BLOCKED else ""
+        return TrialResult(
+            outcome=outcome, margins=margins, blocker=blocker, displacements=displacements
+        )
 
 
 def motion_in_hand(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:

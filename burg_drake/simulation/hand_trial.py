@@ -33,6 +33,7 @@ from burg_drake.grasping.clearance import HandClearance
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.contacts import ContactReader
 from burg_drake.simulation.execution import Execution
+from burg_drake.simulation.neighbours import Neighbours
 from burg_drake.simulation.result import Margins, TrialResult
 from burg_drake.simulation.rise import Rise
 from burg_drake.station.diagram import build_station_diagram
@@ -96,6 +97,7 @@ class HandTrial:
         clearance: the screen of the open hand in it.
         hand: the floating hand in it.
         contacts: reader of its contact results.
+        neighbours: which free objects stand close to each other.
         simulator: the simulator that runs the trials.
         settings: phases of a trial.
         X_WG_start: (4, 4) grasp of the trial that runs or ran last, before the lift.
@@ -122,6 +124,7 @@ class HandTrial:
         self._lock = lock
         self._default = self.diagram.diagram.CreateDefaultContext()
         self.simulator = Simulator(self.diagram.diagram, self._default.Clone())
+        self.neighbours = Neighbours(self.diagram)
         self._rises: dict[BodyIndex, Rise] = {}
         self._prepared: tuple[str, float | None, float | None] | None = None
         """Target, friction and mass that the Context is prepared for; None if for nothing."""
@@ -194,9 +197,9 @@ class HandTrial:
         """Brings the Context to the start of a trial; nothing of an earlier one remains.
 
         The fingers start where they would touch something first: until then nothing happens. Only
-        the target is free to move; others are released when something moving touches them. What
-        nothing touches stays at rest, so that the result is the one with all objects free, at the
-        cost of those that matter.
+        the target, and what stands so close that it may lean on it, is free to move; others are
+        released when something moving touches them. What nothing touches stays at rest, so that
+        the result is the one with all objects free, at the cost of those that matter.
 
         Args:
             instance: the target.
@@ -204,11 +207,12 @@ class HandTrial:
             friction, mass: as in `run`.
         """
         target = self.diagram.free[instance]
-        moving = {target} if self._lock else set(self.diagram.free.values())
+        everything = set(self.diagram.free.values())
+        moving = self.neighbours.close_to({target}) if self._lock else everything
         context = self.context
         if self._prepared != (instance, friction, mass):
             context.SetTimeStateAndParametersFrom(self._default)
-            self._set_still(set(self.diagram.free.values()) - moving)
+            self._set_still(everything - moving)
             self.set_friction(instance, friction)
             self._set_mass(target, mass)
             self._prepared = (instance, friction, mass)

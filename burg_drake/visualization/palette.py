@@ -36,7 +36,11 @@ class Group:
 GROUPS = (
     Group("lifted", (0.0, 0.62, 0.45, 1.0), (Outcome.LIFTED,)),
     Group("lifted, others disturbed", (0.94, 0.89, 0.26, 1.0), (Outcome.LIFTED_DISTURBED,)),
-    Group("lost during lift or hold", (0.90, 0.62, 0.0, 1.0), (Outcome.SLIPPED, Outcome.DROPPED)),
+    Group(
+        "lost during lift or hold",
+        (0.90, 0.62, 0.0, 1.0),
+        (Outcome.SLIPPED, Outcome.BLOCKED, Outcome.DROPPED),
+    ),
     Group(
         "never held",
         (0.80, 0.47, 0.65, 1.0),

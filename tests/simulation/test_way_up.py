@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trial_world import BOX, CENTRE, from_above, make_station
+from trial_world import CENTRE, from_above, make_station
 
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
@@ -40,22 +40,38 @@ def both(make_scene, *instances, X_OG=CENTRE, **obstacles) -> tuple[TrialResult,
 
 def test_a_shelf_above_the_end_of_the_target_turns_it_in_the_hand(make_scene) -> None:
     """It covers the box beyond the hand, which itself passes."""
-    early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.25, 0.225))
+    early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.25, 0.235))
     assert early.margins.end_time > UNDECIDED
     assert early.margins.tilt > np.deg2rad(30.0)
     assert early.margins.tilt == pytest.approx(whole.margins.tilt, rel=0.05)
 
 
-def test_a_low_shelf_keeps_the_target_below(make_scene) -> None:
-    """The box meets it after 0.22 m."""
-    early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.30, 0.1))
-    assert early.outcome is Outcome.SLIPPED
-    for result in (early, whole):
-        assert result.margins.lift == pytest.approx(0.30 - BOX[2], abs=0.002)
+@pytest.mark.parametrize("height", [0.30, 0.40, 0.45])
+def test_a_shelf_in_the_way_of_the_hand_ends_the_trial(make_scene, height: float) -> None:
+    """The hand's top is 0.112 m above the grasp frame, which starts at 0.05 m."""
+    for result in both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(height, 0.1)):
+        assert (result.outcome, result.blocker) == (Outcome.BLOCKED, "shelf")
+        assert result.margins.lift == pytest.approx(height - 0.162, abs=0.006)
+
+
+def test_a_block_that_stands_a_hair_above_another_goes_with_it(make_scene) -> None:
+    """The fingers centre the box, which pushes a row of two blocks, and a third one on the last."""
+    scene = make_scene(
+        ("box", 0.3, 0.2, 0.0),
+        Instance(name="near", object="block", X_SO=Pose((0.357, 0.21, 0.0))),
+        Instance(name="behind", object="block", X_SO=Pose((0.409, 0.215, 0.0))),
+        Instance(name="above", object="block", X_SO=Pose((0.420, 0.215, 0.0501))),
+    )
+    X_OG = from_above(0.065, x=0.006)
+    locked, free = (
+        HandTrial(scene, make_station(), lock=lock).run("box", X_OG) for lock in (True, False)
+    )
+    assert locked.outcome is free.outcome is Outcome.LIFTED
+    for result in (locked, free):
+        assert result.displacements["above"] > 0.0005
 
 
 def test_a_shelf_above_all_is_no_obstacle(make_scene) -> None:
-    """The hand reaches 0.15 m above the grasp frame, and 0.50 m at the top."""
     early, _ = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.60, 0.1))
     assert early.outcome is Outcome.LIFTED
     assert early.margins.end_time < UNDECIDED
