@@ -112,7 +112,7 @@ def execute(
 def report(crowd: str, column: Column, base: float) -> None:
     """Prints one crowd."""
     locked, free = np.array(column.locked), np.array(column.free)
-    same = [one.outcome.held is other.outcome.held for _, one, other in column.pairs]
+    same = [one.outcome is other.outcome for _, one, other in column.pairs]
     ratio = np.sum(locked) / base
     print(
         f"  {crowd:10} locked {locked.mean():.3f} s (median {np.median(locked):.3f}), free"

@@ -157,9 +157,10 @@ class Peer:
                 body, X_WO[:3, :3] @ p_OOcm + X_WO[:3, 3], quaternion_xyzw(X_WO)
             )
             p.resetBaseVelocity(body, (0, 0, 0), (0, 0, 0))
+            # Bullet multiplies two coefficients
+            mu = friction if name == instance else self._scene.entry(name).friction
+            p.changeDynamics(body, -1, lateralFriction=mu)
         target = self._objects[instance]
-        # Bullet multiplies two coefficients
-        p.changeDynamics(target, -1, lateralFriction=friction)
         X_WH = self._station.hand.X_AH(X_WG)
         hand_center = X_WH @ make_pose(p_AB=self._hand_center)
         p.resetBasePositionAndOrientation(

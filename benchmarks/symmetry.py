@@ -6,7 +6,7 @@ Executes each grasp four times: as it is, with the fingers swapped, in a world t
 moved, and as it is once more, after all the others and in reverse order. The first three are the
 same grasp to physics, though not to rounding; the last has to be the same to the bit.
 
-Every changed verdict (held or not) is listed with its margins. It is marginal if the reference
+Every changed verdict (success or not) is listed with its margins. It is marginal if the reference
 engine changes its own verdict, too, when the friction of the object changes by 2 %. The PyBullet
 peer (BURG-Toolkit) changes 8.8 % of its verdicts with the fingers swapped and 5.6 % with the world
 turned by 37 degrees.
@@ -74,6 +74,11 @@ class Tally:
     lines: list[str] = field(default_factory=list)
 
 
+def succeeded(result: TrialResult) -> bool:
+    """Held, and nothing else disturbed."""
+    return result.outcome is burg.Outcome.LIFTED
+
+
 def main() -> None:
     """Runs the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -114,9 +119,9 @@ def judge(work: Work) -> Tally:
     tally.inexact = sum(bits(a) != bits(b) for a, b in zip(plain, again, strict=True))
     for way, results in ways.items():
         for (X_OG, mu), one, other in zip(tries, plain, results, strict=True):
-            if one.outcome.held is not other.outcome.held:
+            if succeeded(one) is not succeeded(other):
                 marginal = list(judged_with_other_friction(work, X_OG, mu))
-                tally.flips.append((way, len({o.held for o in marginal}) > 1))
+                tally.flips.append((way, len({o is burg.Outcome.LIFTED for o in marginal}) > 1))
                 tally.lines += told(work, way, one, other, marginal)
             elif one.outcome is not other.outcome:
                 tally.renamed[way] += 1
@@ -140,7 +145,7 @@ def told(
     work: Work, way: str, one: TrialResult, other: TrialResult, reference: list[burg.Outcome]
 ) -> list[str]:
     """Lines about a flip."""
-    kind = "marginal" if len({o.held for o in reference}) > 1 else "NOT marginal"
+    kind = "marginal" if len({o is burg.Outcome.LIFTED for o in reference}) > 1 else "NOT marginal"
     lines = [f"  {work.instance} {way}, {kind}: reference with friction 98, 100, 102 %:"
              f" {', '.join(reference)}"]  # fmt: skip
     for result in (one, other):

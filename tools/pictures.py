@@ -64,6 +64,8 @@ def main() -> None:
     overview = station.document.cameras["overview"]
     portrait = dataclasses.replace(overview, width=960, height=720, focal=(1000.0, 1000.0))
     render(load_scene("tabletop_six"), station, portrait, "arm", "station.png")
+    nearer = dataclasses.replace(portrait, focal=(1350.0, 1350.0))
+    render(load_scene("tabletop_six"), load_station("panda_wsg"), nearer, "arm", "wsg.png")
     # seen from the front of the board, 40 degrees from above
     X_WC = Pose((-0.31, 0.0, 0.82), rpy_deg=(-134.0, 0.0, -90.0))
     close = Camera(X_WC=X_WC, width=960, height=720, focal=(1150.0, 1150.0))

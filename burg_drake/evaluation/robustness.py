@@ -28,7 +28,7 @@ from burg_drake.evaluation.probes import (
 from burg_drake.evaluation.progress import Listener, Progress, Reporter
 from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_columns
 from burg_drake.evaluation.run_document import origin_of, software_versions
-from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.run_store import JOURNAL_FILE, Run, load_run
 from burg_drake.evaluation.table_file import require_writer, write_table
 
 TABLE_FILE = "robustness.csv"
@@ -83,6 +83,8 @@ def assess_robustness(
     settings = RobustnessSettings() if settings is None else settings
     table = run.path / TABLE_FILE if out is None else Path(out)
     require_writer(table.suffix.removeprefix("."))
+    journal_path = table.with_suffix(".jsonl")
+    _require_other_files(run, table, journal_path)
     chosen = _choose(run, grasps, best)
     factory = ProbeJudgeFactory(
         run.scene(),
@@ -95,7 +97,6 @@ def assess_robustness(
     context = [*factory.content(), versions["burg_drake"], versions["drake"]]
     probes = [p for grasp in chosen for p in make_probes(grasp, factory.scene, settings, context)]
     writable_folder(table.parent)
-    journal_path = table.with_suffix(".jsonl")
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
         _answer(probes, factory, journal, read_journal(journal_path), workers, reporter)
     answers = read_journal(journal_path)
@@ -109,6 +110,14 @@ def assess_robustness(
     return Robustness(found, table, failures)
 
 
+def _require_other_files(run: Run, *written: Path) -> None:
+    """Refuses to write over the run's own results or journal."""
+    own = [path.resolve() for path in (run.table_path, run.path / JOURNAL_FILE)]
+    for path in written:
+        if path.resolve() in own:
+            raise InvalidInputError(f"{path} belongs to the run itself; choose another -o")
+
+
 def _choose(run: Run, ids: Sequence[str] | None, best: int) -> list[Candidate]:
     if ids is None:
         ids = run.best(best)
@@ -119,7 +128,7 @@ def _choose(run: Run, ids: Sequence[str] | None, best: int) -> list[Candidate]:
         verdict = run.verdicts.get(id)
         if verdict is None:
             raise InvalidInputError(f"{run.path}: grasp {id!r} is not judged yet")
-        if verdict.outcome is not Outcome.LIFTED:
+        if not verdict.outcome.held:
             raise InvalidInputError(
                 f"{run.path}: grasp {id!r} was not lifted ({verdict.outcome}); robustness is tested"
                 " of lifted grasps"

@@ -66,6 +66,7 @@ class Execution:
         self._X_GO_grip: Array | None = None
         self._touched = False
         self._blocker = ""
+        self._looks = 0
         self._creep: list[float] = []
         self._in_free_air = 0.0
         self._way_blocked = False
@@ -87,7 +88,8 @@ class Execution:
         """Closes until the fingers rest; None if both hold the target then."""
         settings = self._settings
         slow_since = math.inf
-        while self._context.get_time() < settings.close_timeout:
+        timeout = max(settings.close_timeout, 2.0 * self._trial.hand.document.closing_time)
+        while self._context.get_time() < timeout:
             now = self.advance()
             if self._trial.hand.finger_speed(self._plant_context) > settings.settled_speed:
                 slow_since = math.inf
@@ -190,8 +192,8 @@ class Execution:
         Raises:
             RuntimeError: the simulation failed.
         """
-        before = self._context.get_time()
-        time = before + self._settings.poll
+        before, time = self._look_time(self._looks), self._look_time(self._looks + 1)
+        self._looks += 1
         while True:
             state = self._context.get_discrete_state().Clone() if self._still else None
             self._trial.simulator.AdvanceTo(time)
@@ -209,6 +211,11 @@ class Execution:
             self._trial.release(found, self._still)
         self._look(contacts)
         return time
+
+    def _look_time(self, look: int) -> float:
+        """Time of a look [s]: a whole number of steps, with the rounding that Drake's steps have."""
+        step = self._trial.diagram.engine.time_step
+        return look * max(1, round(self._settings.poll / step)) * step
 
     def _look(self, contacts: list[Contact]) -> None:
         """Takes down what the contacts and poses say."""

@@ -102,7 +102,7 @@ class Grip:
             for look in range(looks):
                 for k in range(look * steps_a_look, (look + 1) * steps_a_look):
                     self._apply(self.weight * (R_WG @ load((k + 0.5) * self._step)))
-                    self._trial.simulator.AdvanceTo(self._time + (k + 1) * self._step)
+                    self._advance_by(1)
                 before, X_GO = X_GO, self._current_X_GO()
                 if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
@@ -152,7 +152,12 @@ class Grip:
                 return
 
     def _advance(self) -> None:
-        self._trial.simulator.AdvanceTo(self._context.get_time() + self._trial.settings.poll)
+        self._advance_by(max(1, round(self._trial.settings.poll / self._step)))
+
+    def _advance_by(self, steps: int) -> None:
+        """To a whole number of steps since 0, with the rounding that Drake's own steps have."""
+        done = round(self._context.get_time() / self._step)
+        self._trial.simulator.AdvanceTo((done + steps) * self._step)
 
     def _current_X_GO(self) -> Array:
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)

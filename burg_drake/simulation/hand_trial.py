@@ -58,7 +58,8 @@ class TrialSettings:
         poll: interval at which contacts are looked at [s].
         settled_speed: the fingers have closed when they are slower than this [m/s] ...
         settled_time: ... for this long [s].
-        close_timeout: closing ends after this time in any case [s].
+        close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
+            the time that it takes to close.
         disturbance: others that are moved by more than this count as disturbed [m].
     """
 
@@ -73,6 +74,13 @@ class TrialSettings:
     settled_time: float = 0.03
     close_timeout: float = 2.0
     disturbance: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if name in ("lift_height", "lift_time", "poll") and not 0.0 < value < np.inf:
+                raise InvalidInputError(f"{name} of a trial is {value:g}; give more than 0")
+            if not 0.0 <= value < np.inf:
+                raise InvalidInputError(f"{name} of a trial is {value:g}; give 0 or more")
 
     @property
     def steady_polls(self) -> int:

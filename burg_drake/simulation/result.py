@@ -42,10 +42,11 @@ class TrialResult:
     Attributes:
         outcome: why it ended.
         margins: continuous slack.
-        blocker: what the hand collided with at the start, if anything.
+        blocker: what the hand collided with at the start or met on its way up, if anything.
         reason: the simulator's message if it failed.
         displacements: how far the centre of mass of every other free object was moved at most
-            [m], by instance; 0 where nothing touched it. Empty if the trial did not start.
+            [m], by instance; 0 of what nothing touched or stood close to. Empty if the trial did
+            not start or failed.
     """
 
     outcome: Outcome

@@ -11,8 +11,8 @@ from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.hollow import mesh_by_pieces
 
-STEP = 0.005
-"""Height between two looks [m]; hand and household objects are thicker."""
+STEP = 0.01
+"""Height between two looks [m]; a hand and what it meets are thicker, taken together."""
 GAP = 0.002
 """Boxes that come no closer than this are apart [m]."""
 
@@ -44,9 +44,8 @@ class Rise:
         for side in (self._carried, self._others):
             declaration = CollisionFilterDeclaration()
             manager.Apply(declaration.ExcludeWithin(GeometrySet([g for g, _ in side])))
-        joint = plant.get_body(target).index()
         self._heights = (
-            plant.get_body(joint).floating_positions_start() + 6,
+            plant.get_body(target).floating_positions_start() + 6,
             self._hand.lift.position_start(),
         )
 

@@ -17,8 +17,8 @@ class Engine:
         time_step: discrete step of the plant [s].
         contact_approximation: Drake's approximation of the contact problem. With `lagged`
             the pads hold up to Coulomb's limit, within a few per cent, at every step from 1 to 10
-            ms; `sap` is wrong on marginal grasps. Sliding on the table is right within 3 % at
-            1 ms and 8 % at 2 ms, and braked too much at 5 ms.
+            ms; `sap` is wrong on marginal grasps. What slides over the table is braked 2 % too
+            hard at 2 ms and 10 % at 5 ms.
         contact_model: hydroelastic where geometry allows it, else point contact.
         stiction_tolerance: speed at which friction that sticks creeps at most [m/s]. Drake's own
             1e-4 lets a box that hangs 20 mm off its centre tilt by 0.9 degrees in a trial, 1e-5 by

@@ -79,6 +79,11 @@ class Hand:
         if self.fingers[0].joint == self.fingers[1].joint:
             raise InvalidInputError(f"both fingers name the joint {self.fingers[0].joint!r}")
 
+    @property
+    def closing_time(self) -> float:
+        """Time that the open hand takes to close [s]."""
+        return (self.opening[1] - self.opening[0]) / 2.0 / self.closing_speed
+
     def X_AH(self, X_AG: Array) -> Array:
         """Hand body poses (..., 4, 4) that bring the grasp frame to `X_AG` (..., 4, 4)."""
         return X_AG @ inverse(self.X_HG.matrix())

@@ -93,7 +93,9 @@ def test_what_stands_on_the_target_is_disturbed(run: Run) -> None:
     assert lifted["moved_can"] == lifted["others_moved"] > 0.15  # it rose, whatever it did then
     assert lifted["patch_area"] > 0.0
     assert np.isnan(run.results["moved_box"]).all()
-    assert np.isnan(run.results["moved_can"][1]) and run.results["moved_can"][2] == 0.0
+    # it stands on the box, is free from the start with it, and falls for a step until it touches
+    sunk = 1.01 * 9.81 * ENGINE.time_step**2
+    assert np.isnan(run.results["moved_can"][1]) and run.results["moved_can"][2] <= sunk
     assert set(run.results["engine"].tolist()) == {"screening (custom)"}
 
 

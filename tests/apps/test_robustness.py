@@ -105,11 +105,14 @@ def test_what_is_known_is_not_asked_again(copied: Run, monkeypatch, capsys: Capt
         (["--translation-mm", "-1"], "-1 is below 0"),
         (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),
         (["-o", "table.xlsx"], "table format 'xlsx' does not exist; give csv or parquet"),
+        (["-o", "RUN/results.csv"], "results.csv belongs to the run itself; choose another -o"),
+        (["-o", "RUN/journal.csv"], "journal.jsonl belongs to the run itself; choose another -o"),
     ],
 )
 def test_bad_arguments(options: list[str], message: str, run: Run, capsys: Capture) -> None:
     colliding = run.results["id"][1]
     options = [colliding if option == "COLLIDING" else option for option in options]
+    options = [option.replace("RUN", str(run.path)) for option in options]
     try:
         code = main(["robustness", str(run.path), *options])
     except SystemExit as ended:

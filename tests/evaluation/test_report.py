@@ -17,6 +17,7 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.report.charts import Series, histogram, nice_step
 from burg_drake.evaluation.report.markup import Html, element, join
+from burg_drake.evaluation.report.outcomes import STOPPED
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import summarize
 
@@ -117,6 +118,12 @@ def test_blockers_are_listed_with_their_depth(run: Run) -> None:
     count = str(collides.sum())
     expected = [count, "·", count, f"{np.median(depth):.1f} mm", f"{depth.max():.1f} mm"]
     assert found["table"] == expected and list(found) == ["body", "table"]
+
+
+def test_the_stages_tell_what_stopped_every_grasp() -> None:
+    told = [outcome for outcomes in STOPPED.values() for outcome in outcomes]
+    assert sorted(told) == sorted(set(Outcome) - {Outcome.LIFTED})
+    assert Outcome.BLOCKED in STOPPED["held"]
 
 
 def test_what_was_disturbed_is_told(run: Run) -> None:

@@ -331,7 +331,7 @@ def test_a_package_is_not_found_from_within(tmp_path: Path) -> None:
 
 
 # The error-controlled integrator is no engine yet; these are the reasons. If they are gone,
-# it is worth another study with benchmarks/engines.py.
+# it is worth another study.
 
 
 def test_cenic_takes_the_desired_velocity_of_a_servo_with_the_wrong_sign() -> None:

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.report.charts import Part, funnel, interval_mark, legend, stacked_bar
 from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
 from burg_drake.evaluation.report.style import STYLES
 from burg_drake.evaluation.summary import Group, Summary, duration, percent, rounded
 from burg_drake.visualization.palette import GROUPS
+
+FAILED = Outcome.SIMULATION_FAILED
+LOST = {stage: tuple(o for o in Outcome if o.stage is stage and o is not FAILED) for stage in Stage}
+STOPPED = {
+    "clear": LOST[Stage.CLEAR],
+    "reachable": LOST[Stage.REACHABLE],
+    "executed": (FAILED,),
+    "held": tuple(o for o in LOST[Stage.EXECUTED] if not o.held),
+    "lifted": (Outcome.LIFTED_DISTURBED,),
+}
+"""What stops a grasp on its way to each step of the funnel."""
 
 
 def objects_section(summary: Summary) -> Html:
@@ -54,14 +65,7 @@ def funnel_section(summary: Summary) -> Html:
     total = summary.total
     names = [n for n in total.funnel if summary.reach or n != "reachable"]
     counts = {name: total.funnel[name] for name in names}
-    why = {
-        "clear": ("collision_",),
-        "reachable": ("no_ik", "arm_collision"),
-        "executed": ("simulation_failed",),
-        "held": ("no_contact", "one_finger", "closed_empty", "slipped", "dropped"),
-        "lifted": ("lifted_disturbed",),
-    }
-    losses = [_loss(total, why[name]) for name in names[1:]]
+    losses = [_loss(total, name) for name in names[1:]]
     return section(
         "Stages",
         "Grasps that pass each stage, and what stopped the others.",
@@ -69,8 +73,8 @@ def funnel_section(summary: Summary) -> Html:
     )
 
 
-def _loss(total: Group, prefixes: tuple[str, ...]) -> str:
-    lost = [(o, n) for o, n in total.outcomes.items() if o.value.startswith(prefixes)]
+def _loss(total: Group, name: str) -> str:
+    lost = [(o, total.outcomes[o]) for o in STOPPED[name] if total.outcomes[o]]
     return ", ".join(f"{n} {label(o)}" for o, n in sorted(lost, key=lambda pair: -pair[1]))
 
 
