@@ -213,7 +213,7 @@ class Execution:
         return time
 
     def _look_time(self, look: int) -> float:
-        """Time of a look [s]: a whole number of steps, with the rounding that Drake's steps have."""
+        """Time of a look [s]: a whole number of steps, rounded as Drake's own steps are."""
         step = self._trial.diagram.engine.time_step
         return look * max(1, round(self._settings.poll / step)) * step
 
