@@ -7,7 +7,9 @@ Exit codes: 0 all went well; 1 finished, with failures to report; 2 the input ca
 
 from __future__ import annotations
 
+import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -51,8 +53,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = build_parser().parse_args(argv)
     try:
-        return int(arguments.run(arguments))
+        return _run(arguments)
     except KeyboardInterrupt:
+        if argv is None:  # the process ends: further Ctrl-C, of an impatient user, change nothing
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _end("interrupted" + getattr(arguments, "after_interrupt", ""), INTERRUPTED)
     except BurgError as error:
         if os.environ.get(DEBUG_VARIABLE):
@@ -65,6 +69,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output is gone: `burg-drake ... | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again."""
+    try:
+        return int(arguments.run(arguments))
+    except Exception as error:
+        behind: BaseException | None = error
+        while behind is not None:  # modules in C++ end an interrupted import by an ImportError
+            if isinstance(behind, KeyboardInterrupt):
+                raise behind from None
+            behind = behind.__cause__ or behind.__context__
+        raise
 
 
 def _end(message: str, code: int) -> int:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
 
 DEFAULT_OUTPUT = "runs"
+DEFAULT_GRASPS = 100
+"""Sampled for each object, unless grasps are given."""
 
 
 def add_to(verbs: Any) -> None:
@@ -45,12 +47,17 @@ def add_to(verbs: Any) -> None:
         metavar="RUN",
         help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE)",
     )
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
         "--grasps-per-object",
         metavar="N",
         type=positive_int,
-        default=100,
-        help="grasps sampled for each object (default: %(default)s)",
+        help=f"grasps sampled for each object (default: {DEFAULT_GRASPS})",
+    )
+    which.add_argument(
+        "--grasps",
+        metavar="FILE",
+        help="judge these grasps (.npz of a GraspSet, or grasps.npz of a run); sample none",
     )
     parser.add_argument(
         "--approach-angle",
@@ -58,11 +65,6 @@ def add_to(verbs: Any) -> None:
         type=approach_angle,
         default=DEFAULT_APPROACH_ANGLE,
         help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
-    )
-    parser.add_argument(
-        "--grasps",
-        metavar="FILE",
-        help="judge these grasps (.npz of a GraspSet, or grasps.npz of a run); sample none",
     )
     parser.add_argument(
         "--engine",
@@ -101,7 +103,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         scene,
         station,
         arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-        grasps_per_object=arguments.grasps_per_object,
+        grasps_per_object=arguments.grasps_per_object or DEFAULT_GRASPS,
         approach_angle_deg=arguments.approach_angle,
         grasps=None if given is None else read_grasps(scene, given),
         engine=arguments.engine,

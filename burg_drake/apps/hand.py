@@ -42,8 +42,8 @@ def run_check(arguments: argparse.Namespace) -> int:
     from burg_drake.station.hand import locate_hand
     from burg_drake.station.hand_check import check_hand
 
-    hand, model = locate_hand(arguments.hand)
-    figures = check_hand(hand, model)
+    hand, model, path = locate_hand(arguments.hand)
+    figures = check_hand(hand, model, path)
     low, high = (round(1e3 * width, 1) + 0.0 for width in figures.opening)
     thickness, *face = (1e3 * extent for extent in figures.pad_size)
     x, y, z = hand.X_HG.translation

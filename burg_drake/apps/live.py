@@ -46,17 +46,19 @@ def present(
     caption: Sequence[str] = (),
     legend: Sequence[LegendEntry] = (),
 ) -> None:
-    """Saves the page if --html was given; else prints the address and waits."""
+    """Saves the page if --html was given; else prints the address and waits, unless told not to."""
     if arguments.html is not None:
         from burg_drake.visualization.page import save_html
 
         save_html(meshcat, arguments.html, title=title, caption=caption, legend=legend)
         print(f"wrote {arguments.html}")
         return
+    if arguments.no_wait:  # the address would be gone before anyone can open it
+        print(f"{title}: not kept open; give --html FILE for a page that stays")
+        return
     print(f"{title}: open {meshcat.web_url()} in a browser", flush=True)
     meshcat.Flush()
-    if not arguments.no_wait:
-        wait()
+    wait()
 
 
 def wait() -> None:

@@ -54,7 +54,10 @@ def add_to(verbs: Any) -> None:
         "--row", metavar="N", type=positive_int, help="row of the table, the first one is 1"
     )
     which.add_argument(
-        "--best", action="store_true", help="the lifted grasp that slipped and disturbed least"
+        "--best",
+        action="store_true",
+        help="the lifted grasp that slipped, tilted and pushed others least, to 0.1 mm and 0.1 deg;"
+        " of equal ones that with the largest contact patch",
     )
     parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
     parser.add_argument("--station", metavar="FILE", help="where its station is now")
@@ -74,6 +77,10 @@ def run_replay(arguments: argparse.Namespace) -> int:
 
     path = Path(arguments.results)
     is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
+    if path.is_file() and not is_table:
+        raise InvalidInputError(
+            f"{path} is neither the folder of a run nor a table of results (.csv, .parquet)"
+        )
     source = _from_table(path, arguments) if is_table else _from_run(path, arguments)
     for note in source.inputs.notes:
         print(f"burg-drake: {note}", file=sys.stderr)
@@ -162,6 +169,8 @@ def _choose(columns: Columns, path: Path, arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation.rows import best_rows, rows_of
 
     ids = columns["id"].tolist()
+    if not ids:
+        raise InvalidInputError(f"{path} has no rows")
     if arguments.row is not None:
         if arguments.row > len(ids):
             raise InvalidInputError(f"{path} has no row {arguments.row}; it has {len(ids)}")

@@ -29,7 +29,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake robustness runs/first --best 5 --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
         "",
-        "The same command goes on where an interrupted one stopped.",
+        "The same command goes on where an interrupted one stopped. The table keeps what earlier",
+        "commands found about the same grasps with the same settings.",
     )
     parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
     which = parser.add_mutually_exclusive_group()
@@ -45,7 +46,7 @@ def add_to(verbs: Any) -> None:
         metavar="N",
         type=positive_int,
         default=DEFAULT_BEST,
-        help="the N lifted grasps that slipped and disturbed least (default: %(default)s)",
+        help="the N best lifted grasps, as `replay --best` ranks them (default: %(default)s)",
     )
     parser.add_argument(
         "--tests",

@@ -19,6 +19,8 @@ from burg_drake.apps.arguments import (
 )
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from burg_drake.simulation.settle_scene import SettledScene
 
 DEFAULT_TIME_LIMIT = 10.0
@@ -62,7 +64,8 @@ def _add_settle(group: Any) -> None:
         "burg-drake scene settle heap.yaml -o settled.yaml",
         "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
         "",
-        "Exit code 1, and no file without --keep, if something still moves or fell off the table.",
+        "Exit code 1, and no file without --keep, if something still moves, fell off the table, or",
+        "came to rest where `scene validate` refuses it.",
     )
     add_scene(settle)
     add_station(settle)
@@ -79,7 +82,7 @@ def _add_settle(group: Any) -> None:
     settle.add_argument(
         "--keep",
         action="store_true",
-        help="write the scene even if something still moves, and without what fell off the table",
+        help="write the scene all the same, without what fell off the table",
     )
     settle.add_argument(
         "--engine",
@@ -132,13 +135,15 @@ def run_validate(arguments: argparse.Namespace) -> int:
 
 
 def run_settle(arguments: argparse.Namespace) -> int:
-    """Settles a scene; 1 if an object still moves or is gone."""
+    """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
     from burg_drake.scene.scene import load_scene
     from burg_drake.simulation.settle_scene import settle_scene
+    from burg_drake.station.check import check_scene
     from burg_drake.station.engine import engine_preset
     from burg_drake.station.station import load_station
 
     scene = load_scene(arguments.scene)
+    _require_another_file(scene.path, arguments.output)
     station = load_station(arguments.station)
     settled = settle_scene(
         scene,
@@ -146,16 +151,29 @@ def run_settle(arguments: argparse.Namespace) -> int:
         engine=engine_preset(arguments.engine),
         time_limit=arguments.time_limit,
     )
-    if settled.at_rest or arguments.keep:
+    faults = _faults(settled, kept=arguments.keep)
+    faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
+    written = arguments.keep or not faults
+    if written:
         _write_settled(settled, arguments.output)
     _print_displacements(settled)
     if settled.at_rest:
         print(f"at rest after {settled.duration:.2f} s")
-    if settled.at_rest or arguments.keep:
+    if written:
         print(f"wrote {arguments.output}")
-    for line in _faults(settled):
+    for line in faults:
         print(f"burg-drake: {scene.path}: {line}", file=sys.stderr)
-    return 0 if settled.at_rest else 1
+    return 1 if faults else 0
+
+
+def _require_another_file(scene: Path, output: str) -> None:
+    """Refuses to write over the scene that is read."""
+    from pathlib import Path
+
+    from burg_drake.core.errors import InvalidInputError
+
+    if Path(output).resolve() == scene.resolve():
+        raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 
 def _write_settled(settled: SettledScene, output: str) -> None:
@@ -181,7 +199,7 @@ def _print_displacements(settled: SettledScene) -> None:
         print(f"{name:<{wide}}  moved {moved.distance * 1e3:7.1f} mm, turned {angle:5.1f} deg")
 
 
-def _faults(settled: SettledScene) -> list[str]:
+def _faults(settled: SettledScene, *, kept: bool) -> list[str]:
     """What keeps a scene from being settled, a line each."""
     lines = []
     if settled.moving:
@@ -189,10 +207,8 @@ def _faults(settled: SettledScene) -> list[str]:
             f"{name!r} at {v.speed * 1e3:.1f} mm/s and {math.degrees(v.turning):.1f} deg/s"
             for name, v in settled.moving.items()
         )
-        lines.append(
-            f"after {settled.duration:g} s something still moves: {moving};"
-            " give a longer --time-limit, or --keep"
-        )
+        advice = "give a longer --time-limit" + ("" if kept else ", or --keep")
+        lines.append(f"after {settled.duration:g} s something still moves: {moving}; {advice}")
     if settled.fallen:
         lines.append(f"fell off the table: {', '.join(settled.fallen)}")
     return lines

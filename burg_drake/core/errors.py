@@ -6,7 +6,11 @@ A grasp that slips and a pose out of reach are outcomes, not errors; see `core.o
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+MANY = 24
+FEW = 8
+"""More names than `MANY` are too many for a message; it then has the first `FEW`."""
 
 
 class BurgError(Exception):
@@ -15,6 +19,18 @@ class BurgError(Exception):
 
 class InvalidInputError(BurgError, ValueError):
     """A value from outside (argument, document, mesh) that cannot be used."""
+
+
+class FieldError(InvalidInputError):
+    """A value of a dataclass that cannot be used.
+
+    Attributes:
+        place: where it is, from the dataclass inwards: names of fields and indices of lists.
+    """
+
+    def __init__(self, message: str, *place: str | int) -> None:
+        super().__init__(message)
+        self.place = place
 
 
 class DocumentError(InvalidInputError):
@@ -41,7 +57,7 @@ class SimulationError(BurgError, RuntimeError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Ends an error message about an unknown `name`: the nearest valid one and the full list.
+    """Ends an error message about an unknown `name`: the nearest valid one and all that there are.
 
     Returns:
         For example `did you mean 'mug'? Known: bowl, mug`.
@@ -49,4 +65,11 @@ def nearest(name: str, known: Iterable[str]) -> str:
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"{hint}Known: {', '.join(names) if names else '(none)'}"
+    return f"{hint}Known: {listing(names)}"
+
+
+def listing(names: Sequence[str]) -> str:
+    """Names for a message; of many the first few, and how many more there are."""
+    if len(names) <= MANY:
+        return ", ".join(names) or "(none)"
+    return f"{', '.join(names[:FEW])} and {len(names) - FEW} others"

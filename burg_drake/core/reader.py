@@ -7,22 +7,29 @@ import enum
 import math
 import types
 import typing
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import yaml
 
-from burg_drake.core.errors import DocumentError, InvalidInputError, nearest
+from burg_drake.core.errors import DocumentError, FieldError, InvalidInputError, nearest
 
 
 class Reader:
-    """Turns YAML nodes into typed values; every error names file, line and key."""
+    """Turns YAML nodes into typed values; every error names file, line and key.
+
+    `LINES` is False in classes whose text is not one that the user has written.
+    """
+
+    LINES: ClassVar[bool] = True
 
     def __init__(self, name: str) -> None:
         self.name = name
 
     def fail(self, node: yaml.Node, where: str, what: str) -> DocumentError:
+        line = f":{node.start_mark.line + 1}" if self.LINES else ""
         key = f" {where}:" if where else ""
-        return DocumentError(f"{self.name}:{node.start_mark.line + 1}:{key} {what}")
+        return DocumentError(f"{self.name}{line}:{key} {what}")
 
     def check_version(self, node: yaml.MappingNode, schema: type) -> None:
         current = next(f.default for f in dataclasses.fields(schema) if f.name == "version")
@@ -119,7 +126,11 @@ class Reader:
             return kind(**values)
         except DocumentError:
             raise
+        except FieldError as error:
+            raise self.fail(_inside(node, error.place), where, str(error)) from error
         except InvalidInputError as error:
+            if not where:  # somewhere in the document
+                raise DocumentError(f"{self.name}: {error}") from error
             raise self.fail(node, where, str(error)) from error
 
     def read_scalar(self, node: yaml.Node, kind: type, where: str) -> Any:
@@ -145,3 +156,16 @@ class Reader:
         except (ValueError, OverflowError):
             pass
         raise self.fail(node, where, f"{node.value!r} is not {expected[kind]}")
+
+
+def _inside(node: yaml.Node, place: Sequence[str | int]) -> yaml.Node:
+    """The node of a value within that of its document; one around it if it is not written."""
+    for step in place:
+        if isinstance(node, yaml.MappingNode):
+            found = {key.value: value for key, value in node.value}.get(step)
+        else:
+            found = node.value[step] if isinstance(step, int) else None
+        if not isinstance(found, yaml.Node):
+            break
+        node = found
+    return node

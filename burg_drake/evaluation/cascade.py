@@ -108,6 +108,8 @@ def evaluate(
         MissingDependencyError: Parquet without pyarrow.
         SimulationError: the simulation of the scene cannot be built.
     """
+    if grasps is None and grasps_per_object < 1:
+        raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)
     engine = engine if isinstance(engine, Engine) else engine_preset(engine)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
+from burg_drake.core.resources import resolve
 from burg_drake.evaluation.origin import Origin
 from burg_drake.evaluation.run_document import HASH_DIGITS
 from burg_drake.evaluation.run_store import RUN_FILE, load_run
@@ -56,29 +57,41 @@ def find_inputs(
     """
     scenes: list[Place[Scene]]
     stations: list[Place[Station]]
-    scenes = [(text := scene or origin.scene, lambda: load_scene(text))]
-    stations = [(word := station or origin.station, lambda: load_station(word))]
+    text, word = scene or origin.scene, station or origin.station
+    scenes = [(text, lambda: load_scene(_existing(text, "scenes")))]
+    stations = [(word, lambda: load_station(_existing(word, "stations")))]
     if origin.run and (folder / RUN_FILE).exists():
         run = load_run(folder)
         if run.document.hash == origin.run:
             scenes[:0] = [] if scene else [("the run's copy", run.scene)]
             stations[:0] = [] if station else [("the run's copy", run.station)]
-    search = _Search(origin, where, force)
-    first, note = search.find("scene", origin.scene_content, scenes)
-    second, other = search.find("station", origin.station_content, stations)
-    return Inputs(first, second, tuple(text for text in (note, other) if text))
+    search = _Search(origin, force)
+    first = search.find("scene", origin.scene_content, scenes)
+    second = search.find("station", origin.station_content, stations)
+    missing = [found for found in (first, second) if isinstance(found, str)]
+    if isinstance(first, str) or isinstance(second, str):
+        raise InvalidInputError(f"{where} needs {'; and '.join(missing)}")
+    return Inputs(first[0], second[0], tuple(note for _, note in (first, second) if note))
+
+
+def _existing(reference: str, kind: str) -> Path:
+    """The file of a document; what else there is would not help here."""
+    try:
+        return resolve(reference, kind)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{reference} does not exist") from error
 
 
 @dataclass(frozen=True)
 class _Search:
     origin: Origin
-    where: str
     force: bool
 
     def find(
         self, kind: str, content: str, places: Sequence[Place[Document]]
-    ) -> tuple[Document, str]:
-        """The first document that fits, and a note if it is taken though it does not fit."""
+    ) -> tuple[Document, str] | str:
+        """The first document that fits, and a note if it is taken though it does not fit; what is
+        needed if there is none."""
         problems: list[str] = []
         other: Document | None = None
         for place, load in places:
@@ -97,7 +110,7 @@ class _Search:
         meant = "objects and their library count" if kind == "scene" else "robot models count"
         copy = f"a copy is {kind}.yaml in the folder of run {self.origin.run}"
         go_on = f", or --force to replay on {other.path}" if other is not None else ""
-        raise InvalidInputError(
-            f"{self.where} needs the {kind} with content {content} ({meant}), but {found}; give"
-            f" --{kind} FILE ({copy}){go_on}"
+        return (
+            f"the {kind} with content {content} ({meant}), but {found}; give --{kind} FILE"
+            f" ({copy}){go_on}"
         )

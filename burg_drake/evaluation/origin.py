@@ -31,6 +31,8 @@ ORIGIN_TEXT = (
     "versions",
 )
 """Columns of texts beside `engine` and `run`."""
+CUSTOM = " (custom)"
+"""Mark behind the name of an engine that is not the preset of this name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,19 +93,14 @@ def read_origin(row: Mapping[str, Any], where: str) -> Origin:
     Raises:
         InvalidInputError: a cell cannot be read, or tells a setting that this release lacks.
     """
-    settings = {"name": row["engine"], **_pairs(row["engine_settings"], where)}
     trial = _pairs(row["trial_settings"], where)
-    try:
-        numbers = {name: float(value) for name, value in trial.items()}
-    except ValueError as error:
-        raise InvalidInputError(f"{where}: trial_settings: {error}") from error
     return Origin(
         scene=row["scene"],
         scene_content=row["scene_content"],
         station=row["station"],
         station_content=row["station_content"],
-        engine=_typed(settings, Engine, f"{where}, engine_settings"),
-        trial=numbers,
+        engine=_engine(row["engine"], row["engine_settings"], where),
+        trial={name: _number(name, value, where) for name, value in trial.items()},
         versions=_pairs(row["versions"], where),
         seed=row.get("seed", 0),
         run=row.get("run", ""),
@@ -111,10 +108,8 @@ def read_origin(row: Mapping[str, Any], where: str) -> Origin:
 
 
 def engine_label(engine: Engine) -> str:
-    """Name of an engine for tables and reports. One that has a preset's name and other settings
-    is marked as custom."""
-    preset = ENGINES.get(engine.name, engine)
-    return engine.name if preset == engine else f"{engine.name} (custom)"
+    """Name of an engine for tables and reports. One that is no preset is marked as custom."""
+    return engine.name if ENGINES.get(engine.name) == engine else engine.name + CUSTOM
 
 
 def pairs_text(values: Mapping[str, object]) -> str:
@@ -123,12 +118,49 @@ def pairs_text(values: Mapping[str, object]) -> str:
     return " ".join(f"{name}={word}" for name, word in words.items())
 
 
+def _engine(label: str, settings: str, where: str) -> Engine:
+    """The engine of a row, if its name and its settings agree; see `engine_label`."""
+    name = label.removesuffix(CUSTOM)
+    engine = _typed({"name": name, **_pairs(settings, where)}, Engine, f"{where}, engine_settings")
+    if label == name and name not in ENGINES:
+        raise InvalidInputError(
+            f"{where}: engine {name!r} is not a preset of this release ({', '.join(ENGINES)});"
+            f" one with settings of its own is called {name + CUSTOM!r}"
+        )
+    if label == name and engine != ENGINES[name]:
+        raise InvalidInputError(
+            f"{where}: engine {name!r} and engine_settings contradict each other: the preset of"
+            f" this release has {_other_settings(ENGINES[name], engine)}; an engine with settings"
+            f" of its own is called {name + CUSTOM!r}"
+        )
+    return engine
+
+
+def _other_settings(preset: Engine, engine: Engine) -> str:
+    """Settings of a preset that an engine does not share."""
+    there = vars(engine)
+    return pairs_text({k: v for k, v in vars(preset).items() if there[k] != v})
+
+
+def _number(name: str, text: str, where: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InvalidInputError(
+            f"{where}: trial_settings: {name} is {text!r}; it has to be a number"
+        ) from error
+
+
 def _pairs(text: str, where: str) -> dict[str, str]:
     pairs = [word.partition("=") for word in text.split()]
     bad = [name for name, equals, _ in pairs if not equals]
     if bad:
         raise InvalidInputError(f"{where}: {bad[0]!r} is not name=value")
     return {name: value for name, _, value in pairs}
+
+
+class _CellReader(Reader):
+    LINES = False
 
 
 def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
@@ -141,5 +173,5 @@ def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
             " that made the results"
         )
     text = "\n".join(f"{name}: {json.dumps(str(value))}" for name, value in values.items())
-    found: T = Reader(where).read(parse_nodes(text or "{}", where), schema, "")
+    found: T = _CellReader(where).read(parse_nodes(text or "{}", where), schema, "")
     return found

@@ -8,15 +8,16 @@ one, which stands for a limit beyond all that is tried, comes back from a journa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import count, takewhile
 from typing import TYPE_CHECKING
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decision, trial_decision
+from burg_drake.evaluation.judge import Decision, Verdict, trial_decision
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.friction_limit import FrictionSettings, friction_limit
 from burg_drake.simulation.grip import take_grip
@@ -84,7 +85,7 @@ class Probe(Candidate):
 def make_probes(
     grasp: Candidate, scene: Scene, settings: RobustnessSettings, context: Sequence[object]
 ) -> Iterator[Probe]:
-    """All questions about a grasp.
+    """All questions about a grasp that the settings ask.
 
     Args:
         grasp: the grasp.
@@ -93,9 +94,9 @@ def make_probes(
         context: JSON values of what decides about the answers beside the settings.
     """
     for test in settings.tests:
-        key = content_hash(test, settings.content(test), list(context))[:HASH_DIGITS]
+        key = _key(test, settings, context)
         if test != "noise":
-            id = f"{grasp.id}:{test}:{key}"
+            id = _probe_id(grasp.id, test, key)
             yield Probe(id, grasp.instance, grasp.X_OG, test=test, grasp=grasp.id)
             continue
         entry = scene.entry(grasp.instance)
@@ -110,7 +111,7 @@ def make_probes(
                 repeat=repeat,
             )
             yield Probe(
-                f"{grasp.id}:{test}:{repeat}:{key}",
+                _probe_id(grasp.id, test, key, repeat),
                 grasp.instance,
                 drawn.X_OG,
                 drawn.friction,
@@ -118,6 +119,40 @@ def make_probes(
                 test=test,
                 grasp=grasp.id,
             )
+
+
+def known_answers(
+    grasp: str,
+    answers: Mapping[str, Verdict],
+    settings: RobustnessSettings,
+    context: Sequence[object],
+) -> list[tuple[str, Verdict]]:
+    """Answers about a grasp, whichever call asked for them: all tests, and all repeats.
+
+    Args:
+        grasp: its id.
+        answers: by the id of the probe.
+        settings: only answers found with these count; tests and number of repeats do not matter.
+        context: as for `make_probes`.
+
+    Returns:
+        Pairs of a test and its answer; of the repeats those up to the first that is missing.
+    """
+    found = []
+    for test in TESTS:
+        key = _key(test, settings, context)
+        repeats: Iterable[int | None] = count() if test == "noise" else (None,)
+        ids = (_probe_id(grasp, test, key, repeat) for repeat in repeats)
+        found += [(test, answers[id]) for id in takewhile(answers.__contains__, ids)]
+    return found
+
+
+def _key(test: str, settings: RobustnessSettings, context: Sequence[object]) -> str:
+    return content_hash(test, settings.content(test), list(context))[:HASH_DIGITS]
+
+
+def _probe_id(grasp: str, test: str, key: str, repeat: int | None = None) -> str:
+    return ":".join([grasp, test, *([] if repeat is None else [str(repeat)]), key])
 
 
 class ProbeJudge:

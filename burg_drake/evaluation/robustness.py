@@ -1,7 +1,8 @@
 """Robustness of grasps that a run found to lift: probes in worker processes, journal and table.
 
 Answers are appended to a journal beside the table as they come. The same call goes on where an
-interrupted one stopped, and a call that asks for more asks only what is new.
+interrupted one stopped, and a call that asks for more asks only what is new. The table has all
+answers known about the grasps of the last call, those of earlier calls with equal settings, too.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from burg_drake.evaluation.probes import (
     Probe,
     ProbeJudgeFactory,
     RobustnessSettings,
+    known_answers,
     make_probes,
 )
 from burg_drake.evaluation.progress import Listener, Progress, Reporter
@@ -100,7 +102,7 @@ def assess_robustness(
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
         _answer(probes, factory, journal, read_journal(journal_path), workers, reporter)
     answers = read_journal(journal_path)
-    found = tuple(_gather(grasp, probes, answers, factory) for grasp in chosen)
+    found = tuple(_gather(grasp, answers, factory, context) for grasp in chosen)
     write_table(table, robustness_columns(found, settings, run.document.engine))
     failures = {
         p.id: answers[p.id].reason
@@ -165,16 +167,15 @@ def _answer(
 
 def _gather(
     grasp: Candidate,
-    probes: Sequence[Probe],
     answers: dict[str, Verdict],
     factory: ProbeJudgeFactory,
+    context: Sequence[object],
 ) -> GraspRobustness:
     instance = factory.scene.instance(grasp.instance)
-    own = [probe for probe in probes if probe.grasp == grasp.id]
     return GraspRobustness.from_verdicts(
         grasp.id,
         grasp.instance,
         instance.object,
         factory.scene.entry(grasp.instance).friction,
-        [(probe.test, answers[probe.id]) for probe in own],
+        known_answers(grasp.id, answers, factory.settings, context),
     )

@@ -13,7 +13,8 @@
     failed                    tests that could not be simulated
     engine, seed, settings    how it was tested
 
-What was not asked for is an empty cell.
+What was never asked for is an empty cell. Answers that earlier calls got with the same settings
+stay in the table, further perturbed repeats among them.
 """
 
 from __future__ import annotations
@@ -124,13 +125,13 @@ def robustness_columns(
     columns["friction_min"] = _column([g.friction_min for g in grasps], float)
     columns["friction"] = np.array([g.friction for g in grasps], dtype=float)
     rates = [g.success for g in grasps]
-    columns["repeats"] = _column(rates, lambda r: r.trials)
-    columns["lifted"] = _column(rates, lambda r: r.lifted)
+    columns["repeats"] = _counts(rates, lambda r: r.trials)
+    columns["lifted"] = _counts(rates, lambda r: r.lifted)
     columns["success"] = _column(rates, lambda r: r.probability)
     columns["success_low"] = _column(rates, lambda r: r.interval[0])
     columns["success_high"] = _column(rates, lambda r: r.interval[1])
     counts = [None if rate is None else rate.outcomes for rate in rates]
-    columns |= {f"n_{outcome}": _column(counts, itemgetter(outcome)) for outcome in Outcome}
+    columns |= {f"n_{outcome}": _counts(counts, itemgetter(outcome)) for outcome in Outcome}
     columns["failed"] = np.array([" ".join(g.failed) for g in grasps], dtype=np.str_)
     columns["engine"] = np.array([engine_label(engine)] * len(grasps), dtype=np.str_)
     columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)
@@ -213,11 +214,16 @@ def _caption(settings: RobustnessSettings) -> str:
     if "noise" in settings.tests:
         noise = settings.noise
         parts.append(
-            f"success: lifted of {settings.repeats} repeats with deviations of"
+            f"success: lifted of the repeats with deviations of"
             f" {noise.translation * 1e3:g} mm, {math.degrees(noise.rotation):g} deg,"
             f" mass {100 * noise.mass:g} %, friction {100 * noise.friction:g} %"
         )
     return "\n".join(parts)
+
+
+def _counts(values: Sequence[T | None], count: Callable[[T], int]) -> np.ndarray:
+    """A whole number of each value, None where there is none."""
+    return np.array([None if v is None else count(v) for v in values], dtype=object)
 
 
 def _column(values: Sequence[T | None], number: Callable[[T], float]) -> np.ndarray:

@@ -44,7 +44,7 @@ REPORT_FILE = "report.html"
 RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """A run on disk, complete or not.
 
@@ -55,6 +55,11 @@ class Run:
 
     path: Path
     document: RunDocument
+
+    def __repr__(self) -> str:
+        scene, count = self.document.scene.name, self.document.grasps.count
+        judged = len(read_journal(self.path / JOURNAL_FILE))  # `verdicts` would keep them
+        return f"Run({str(self.path)!r}, scene {scene!r}, {judged} of {count} grasps judged)"
 
     @cached_property
     def candidates(self) -> Candidates:
@@ -189,7 +194,7 @@ class Run:
         )
 
     def _unknown(self, id: str) -> UnknownNameError:
-        hint = f"All ids are in {self.table_path.name}"
+        hint = f"all ids are in {self.table_path.name}"
         return unknown_grasp(id, self.candidates.id, str(self.path), hint)
 
 
@@ -204,6 +209,8 @@ def load_run(path: str | Path) -> Run:
         DocumentError: its run.yaml does not fit the schema.
     """
     path = Path(path)
+    if path.is_file():
+        raise InvalidInputError(f"{path} is a file, not the folder of a run")
     if not (path / RUN_FILE).exists():
         raise InvalidInputError(
             f"{path} holds no run ({RUN_FILE} is missing); burg-drake evaluate writes runs"

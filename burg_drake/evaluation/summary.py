@@ -16,7 +16,8 @@ from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 
 if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+    from rich.segment import Segment
     from rich.table import Table
 
 
@@ -144,19 +145,18 @@ class SummaryView:
 
     summary: Summary
 
-    def __rich_console__(
-        self, console: Console, options: ConsoleOptions
-    ) -> Iterator[RenderableType]:
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         from rich.measure import Measurement
 
         matrix = _outcome_matrix(self.summary)
         wide = Measurement.get(console, options.update(max_width=1000), matrix).maximum
         fits = wide <= options.max_width
-        yield _stage_table(self.summary)
+        outcomes = matrix if fits else _outcome_list(self.summary)
+        yield from _trimmed(console, options, _stage_table(self.summary))
         yield ""
-        yield matrix if fits else _outcome_list(self.summary)
+        yield from _trimmed(console, options, outcomes)
         yield ""
-        yield _cost_table(self.summary)
+        yield from _trimmed(console, options, _cost_table(self.summary))
 
 
 def summary_view(summary: Summary) -> RenderableType:
@@ -198,17 +198,35 @@ def _stage_cost(columns: Columns, stage: Stage) -> StageCost:
     return StageCost(stage.value, len(cpu), float(cpu.sum()), median)
 
 
-def _table(title: str) -> Table:
+def _trimmed(console: Console, options: ConsoleOptions, table: Table) -> Iterator[Segment]:
+    """The lines of a table without trailing blanks."""
+    from rich.segment import Segment
+
+    for line in console.render_lines(table, options, pad=False):
+        while line and not line[-1].text.strip():
+            line.pop()
+        if line:
+            yield from line[:-1]
+            yield Segment(line[-1].text.rstrip(), line[-1].style)
+        yield Segment.line()
+
+
+def _table(title: str, *, gap: int = 2) -> Table:
+    """An empty table; `gap` characters, at least 1, are between its columns."""
     from rich import box
     from rich.table import Table
 
     return Table(
-        title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, gap - 1, 0, 0),
+        pad_edge=False,
     )
 
 
 def _stage_table(summary: Summary) -> Table:
-    table = _table("Grasps that pass each stage")
+    table = _table("Grasps that pass each stage", gap=1)  # 17 characters are left for the objects
     names = [n for n in summary.total.funnel if summary.reach or n != "reachable"]
     table.add_column("object", overflow="fold")
     for name in names:

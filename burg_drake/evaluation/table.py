@@ -10,7 +10,7 @@
     friction, mass            of the target, where the trial had others than the library's [-; kg]
     q_grasp_1 ...             arm configuration at the grasp [rad]; stations with an arm only
     q_pregrasp_1 ...          and at the pregrasp
-    seed, engine              of the run; an engine of a preset's name and other settings is marked
+    seed, engine              of the run; an engine that is no preset is marked
     run                       short hash of all that decides about the results; `hash` in run.yaml
     cpu_clear, cpu_reach, cpu_trial   CPU time of each stage [s]
 

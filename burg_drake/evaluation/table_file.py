@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
 from burg_drake.evaluation.trial import MOVED
+
+T = TypeVar("T", int, float)
 
 METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key of their metadata."""
@@ -66,13 +68,18 @@ def read_table(path: Path) -> Columns:
     try:
         if path.suffix == ".parquet":
             _, parquet = _pyarrow()
-            table = parquet.read_table(path)
+            with path.open("rb") as binary:
+                table = parquet.read_table(binary)
             cells = {name: table.column(name).to_pylist() for name in table.column_names}
         else:
             with path.open(newline="", encoding="utf-8-sig") as file:
                 cells = _csv_cells([row for row in csv.reader(file) if row])
         return {name: _typed(name, values) for name, values in cells.items()}
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InvalidInputError(f"{path} is not a results table (it is not a text file)") from error
+    except ValueError as error:
         raise InvalidInputError(f"{path} is not a results table ({error})") from error
 
 
@@ -80,6 +87,9 @@ def _csv_cells(rows: list[list[str]]) -> dict[str, list[str]]:
     if not rows:
         raise ValueError("it is empty")
     header, *rows = rows
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise ValueError(f"its cells are separated by {name}; save it with commas")
     for number, row in enumerate(rows, 1):
         if len(row) != len(header):
             raise ValueError(f"row {number} has {len(row)} cells, the header has {len(header)}")
@@ -95,15 +105,19 @@ def _csv_text(columns: Columns) -> str:
 
 
 def _cells(values: NDArray[Any]) -> list[Any]:
-    """Python values of a column, an empty text for NaN; csv writes floats by repr: lossless."""
+    """Python values of a column, an empty text for NaN; csv writes floats by repr: lossless.
+
+    Whole numbers with gaps are objects, None in the gaps, which csv leaves empty.
+    """
     return ["" if value != value else value for value in values.tolist()]
 
 
 def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
     arrow, parquet = _pyarrow()
+    kinds = {"U": arrow.string(), "O": arrow.int64()}
     arrays = {
-        name: arrow.array(values.tolist(), arrow.string())
-        if values.dtype.kind == "U"
+        name: arrow.array(values.tolist(), kinds[values.dtype.kind])
+        if values.dtype.kind in kinds
         else arrow.array(values, from_pandas=True)  # NaN becomes null
         for name, values in columns.items()
     }
@@ -129,10 +143,23 @@ def _typed(name: str, values: Sequence[Any]) -> NDArray[Any]:
     if name in TEXT:
         return np.array(texts, dtype=np.str_)
     if name in INTEGER:
-        return np.array([int(text) for text in texts], dtype=np.int64)
+        whole = [_read(int, name, row, text, "a whole number") for row, text in enumerate(texts, 1)]
+        return np.array(whole, dtype=np.int64)
     try:
-        return np.array([math.nan if text == "" else float(text) for text in texts])
+        return np.array(
+            [
+                math.nan if text == "" else _read(float, name, row, text, "a number, or empty")
+                for row, text in enumerate(texts, 1)
+            ]
+        )
     except ValueError:
         if name in (*MARGINS, "friction", "mass") or name.startswith(MOVED):
             raise
         return np.array(texts, dtype=np.str_)
+
+
+def _read(kind: type[T], name: str, row: int, text: str, expected: str) -> T:
+    try:
+        return kind(text)
+    except ValueError as error:
+        raise ValueError(f"row {row}: {name} is {text!r}; it has to be {expected}") from error

@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from enum import StrEnum
+from typing import Any, TypeVar
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, nearest
 from burg_drake.core.frames import Array, check_pose
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import MARGINS, Verdict
 from burg_drake.evaluation.origin import ORIGIN_TEXT
+
+Name = TypeVar("Name", bound=StrEnum)
 
 MOVED = "moved_"
 """Columns of displacements begin with this; the instance's name follows."""
@@ -65,12 +68,16 @@ def pose_from_text(text: str, where: str) -> Array:
     Raises:
         InvalidInputError: the text is something else.
     """
-    try:
-        upper = np.array([float(word) for word in text.split()]).reshape(3, 4)
-    except ValueError as error:
-        raise InvalidInputError(
-            f"{where}: X_OG has to be the 12 numbers of the upper three rows ({error})"
-        ) from error
+    words, numbers = text.split(), []
+    expected = "it has to be the 12 numbers of the upper three rows of the pose"
+    for word in words:
+        try:
+            numbers.append(float(word))
+        except ValueError as error:
+            raise InvalidInputError(f"{where}: X_OG has {word!r} in it; {expected}") from error
+    if len(words) != 12:
+        raise InvalidInputError(f"{where}: X_OG has {len(words)} numbers; {expected}")
+    upper = np.array(numbers).reshape(3, 4)
     return check_pose(np.vstack([upper, (0.0, 0.0, 0.0, 1.0)]), f"{where}: X_OG")
 
 
@@ -90,10 +97,14 @@ def read_trial(row: Mapping[str, Any], where: str) -> Trial:
             f"{where}: column {', '.join(missing)} is missing, without which a row alone cannot be"
             " replayed (older releases did not write it); give the folder of its run"
         )
-    try:
-        outcome, stage = Outcome(row["outcome"]), Stage(row["stage"])
-    except ValueError as error:
-        raise InvalidInputError(f"{where}: {error}; was it made by a newer release?") from error
+    empty = [name for name in NEEDED if row[name] == ""]
+    if empty:
+        raise InvalidInputError(
+            f"{where}: {', '.join(empty)} is empty, without which a row alone cannot be replayed;"
+            " give the folder of its run"
+        )
+    outcome = _member(Outcome, row["outcome"], f"{where}: outcome")
+    stage = _member(Stage, row["stage"], f"{where}: stage")
     moved = {name.removeprefix(MOVED): v for name, v in row.items() if name.startswith(MOVED)}
     verdict = Verdict(
         outcome,
@@ -112,6 +123,15 @@ def read_trial(row: Mapping[str, Any], where: str) -> Trial:
         mass=_given(row, "mass"),
         verdict=verdict,
     )
+
+
+def _member(kind: type[Name], text: str, where: str) -> Name:
+    known = [member.value for member in kind]
+    if text not in known:
+        raise InvalidInputError(
+            f"{where} {text!r} is not known to this release; {nearest(text, known)}"
+        )
+    return kind(text)
 
 
 def _given(row: Mapping[str, Any], name: str) -> float | None:

@@ -108,12 +108,14 @@ def settle_scene(
         rounded to a micrometre and a ten thousandth of a degree.
 
     Raises:
-        InvalidInputError: objects overlap at the start, or the time limit is not above 0.
+        InvalidInputError: objects overlap or are below the table's top at the start, or the time
+            limit is not above 0.
         SimulationError: Drake cannot step the scene.
     """
     if not 0.0 < time_limit < np.inf:
         raise InvalidInputError(f"time limit is {time_limit:g} s; give more than 0")
     built = build_station_diagram(scene, station, robot="none", engine=engine)
+    _require_above(built)
     _require_apart(built)
     simulator = Simulator(built.diagram)
     _soften(built, simulator.get_mutable_context())
@@ -210,6 +212,17 @@ def _soften(built: StationDiagram, context: Context) -> None:
             )
             graph.AssignRole(
                 graph_context, plant.get_source_id(), geometry, properties, RoleAssign.kReplace
+            )
+
+
+def _require_above(built: StationDiagram) -> None:
+    for name in built.free:
+        center_of_mass = (*built.scene.entry(name).mass_properties.center_of_mass, 1.0)
+        height = float((built.X_WO(name) @ center_of_mass)[2])
+        if height < 0.0:
+            raise InvalidInputError(
+                f"{built.scene.path}: {name!r} starts {-height * 1e3:.0f} mm below the table's top;"
+                " move it up"
             )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import FieldError, UnknownNameError
 from burg_drake.core.frames import Array, inverse
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document
@@ -68,16 +68,22 @@ class Hand:
     def __post_init__(self) -> None:
         low, high = self.opening
         if not 0.0 <= low < high:
-            raise InvalidInputError(f"opening {list(self.opening)} must rise from 0 or above [m]")
-        if self.force <= 0.0 or self.closing_speed <= 0.0:
-            raise InvalidInputError("force and closing_speed must be above 0")
-        for finger in self.fingers:
+            raise FieldError(
+                f"opening {list(self.opening)} must rise from 0 or above [m]", "opening"
+            )
+        for name, unit in (("force", "N"), ("closing_speed", "m/s")):
+            if not (value := getattr(self, name)) > 0.0:
+                raise FieldError(f"{name} is {value:g} {unit}; it has to be above 0", name)
+        for i, finger in enumerate(self.fingers):
             if finger.closed == finger.open:
-                raise InvalidInputError(
-                    f"finger {finger.body!r}: closed and open are both {finger.open:g} m"
+                raise FieldError(
+                    f"finger {finger.body!r}: closed and open are both {finger.open:g} m",
+                    *("fingers", i, "closed"),
                 )
-        if self.fingers[0].joint == self.fingers[1].joint:
-            raise InvalidInputError(f"both fingers name the joint {self.fingers[0].joint!r}")
+        one, other = self.fingers
+        for name in ("body", "joint"):
+            if (shared := getattr(other, name)) == getattr(one, name):
+                raise FieldError(f"both fingers name the {name} {shared!r}", "fingers", 1, name)
 
     @property
     def closing_time(self) -> float:
@@ -99,8 +105,11 @@ def load_hand(reference: str, base: Path | None = None) -> Hand:
     return load_document(resolve(reference, "models/hands", base), Hand)
 
 
-def locate_hand(reference: str, base: Path | None = None) -> tuple[Hand, Path]:
+def locate_hand(reference: str, base: Path | None = None) -> tuple[Hand, Path, Path]:
     """Loads a hand document and finds the model file that it names.
+
+    Returns:
+        The hand, its model file, and the document's file.
 
     Raises:
         UnknownNameError: no such hand or model.
@@ -108,4 +117,7 @@ def locate_hand(reference: str, base: Path | None = None) -> tuple[Hand, Path]:
     """
     path = resolve(reference, "models/hands", base)
     hand = load_document(path, Hand)
-    return hand, resolve(hand.model, base=path.parent)
+    try:
+        return hand, resolve(hand.model, base=path.parent), path
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path}: model: {error}") from error

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -45,17 +48,23 @@ class HandFigures:
     pad_size: tuple[float, float, float]
 
 
-def check_hand(hand: Hand, path: Path) -> HandFigures:
+def check_hand(hand: Hand, path: Path, document: Path | None = None) -> HandFigures:
     """Holds a hand document against its model file; a pair that was found right is remembered.
 
     Args:
         hand: the document.
         path: the model file.
+        document: the document's file, for messages.
 
     Raises:
         InvalidInputError: they do not fit; one line says where.
     """
-    return _check(hand, path, content_hash(path))
+    try:
+        return _check(hand, path, content_hash(path))
+    except InvalidInputError as error:
+        if document is None:
+            raise
+        raise InvalidInputError(f"{document}: {error}") from error
 
 
 @lru_cache(maxsize=16)
@@ -63,6 +72,7 @@ def _check(hand: Hand, path: Path, content: str) -> HandFigures:
     bench = _Bench(hand, path)
     bench.check_limits()
     bench.check_pads()
+    bench.check_closing_direction()
     largest, smallest = bench.check_opening("open"), bench.check_opening("closed")
     bench.check_approach()
     bench.check_coupling()
@@ -79,7 +89,8 @@ class _Bench:
         builder.parser().package_map().Remove("drake_models")
         builder.parser().package_map().Add("burg_drake", str(data_root()))
         self._plant = plant = builder.plant()
-        instance = add_hand(builder, hand, path).instance
+        with _silence():  # what the parser warns of is said when the hand is added to a scene
+            instance = add_hand(builder, hand, path).instance
         body = plant.GetBodyByName(hand.body, instance)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform())
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
@@ -115,6 +126,21 @@ class _Bench:
                     " drake:compliant_hydroelastic and a drake:hydroelastic_modulus (1e7 for"
                     " rubber) in its drake:proximity_properties"
                 )
+
+    def check_closing_direction(self) -> None:
+        """The fingers move apart along x of G, in either order."""
+        gaps = []
+        for closed in (0.0, 1.0):
+            self._put(self._at(closed))
+            one, other = (self.bounds(i).mean(axis=0) for i in (0, 1))
+            gaps.append(one - other)
+        way = gaps[0] - gaps[1]
+        if np.hypot(way[1], way[2]) > TOLERANCE:
+            x, y, z = np.round(way / np.linalg.norm(way), 2) + 0.0
+            raise self._error(
+                "x of G is not the closing direction: the fingers open along"
+                f" ({x:.2f}, {y:.2f}, {z:.2f}) of G; turn X_HG"
+            )
 
     def check_opening(self, end: Literal["open", "closed"]) -> float:
         """With the fingers at one end of their ways the pads are to both sides of G, as far apart
@@ -219,6 +245,18 @@ class _Bench:
 
     def _error(self, message: str) -> InvalidInputError:
         return InvalidInputError(f"hand {self._hand.name!r}: {message} ({self._hand.model})")
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keeps Drake's warnings off the screen."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _mm(length: float) -> str:

@@ -51,7 +51,7 @@ def add_robot(
     """
     if robot == "none":
         return {}
-    check_hand(station.hand, station.hand_model)
+    check_hand(station.hand, station.hand_model, station.hand_path)
     plant = builder.plant()
     added = add_hand(builder, station.hand, station.hand_model)
     plant.RenameModelInstance(added.instance, "hand")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document
 from burg_drake.station.hand import Hand, locate_hand
@@ -135,9 +135,10 @@ class StationDocument:
         x, y, z = self.arm.X_WA.translation
         (cx, cy), (sx, sy, _) = self.table.center, self.table.size
         if z < 0.0 and abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2:
-            raise InvalidInputError(
+            raise FieldError(
                 f"arm.X_WA puts the arm's base {-z:g} m below the table top; z has to be at least"
-                " 0 over the table"
+                " 0 over the table",
+                *("arm", "X_WA"),
             )
 
 
@@ -151,6 +152,7 @@ class Station:
         hand_model: the hand's model file.
         arm_model: the arm's model file, if there is an arm.
         path: the station file.
+        hand_path: the hand's document, for messages; None if it is not from a file.
     """
 
     document: StationDocument
@@ -158,6 +160,7 @@ class Station:
     hand_model: Path
     arm_model: Path | None
     path: Path
+    hand_path: Path | None = None
 
     @property
     def name(self) -> str:
@@ -198,8 +201,8 @@ def load_station(reference: str | Path) -> Station:
     """
     path = resolve(reference, "stations")
     document = load_document(path, StationDocument)
-    hand, hand_model = locate_hand(document.hand, path.parent)
+    hand, hand_model, hand_path = locate_hand(document.hand, path.parent)
     arm_model = None
     if document.arm is not None:
         arm_model = resolve(document.arm.model, base=path.parent)
-    return Station(document, hand, hand_model, arm_model, path)
+    return Station(document, hand, hand_model, arm_model, path, hand_path)

@@ -132,6 +132,32 @@ def test_how_it_ends(
     assert capsys.readouterr().err == f"{line}\n"
 
 
+def test_an_interrupt_behind_another_error_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As when Ctrl-C comes while a module in C++ is imported."""
+    monkeypatch.delenv("BURG_DEBUG", raising=False)
+    failed = ImportError("initialization failed")
+    failed.__cause__ = KeyboardInterrupt()
+    late = InvalidInputError("too late")
+    late.__context__ = failed
+    for error in (failed, late):
+        assert run_with(monkeypatch, error) == 130
+        assert capsys.readouterr().err == "burg-drake: interrupted\n"
+
+
+def test_further_interrupts_change_nothing() -> None:
+    code = (
+        "import os, signal, sys\nfrom burg_drake.apps import cli, report\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "def interrupt(*_): os.kill(os.getpid(), signal.SIGINT)\n"
+        "report.run_report = interrupt\nsys.argv[1:] = ['report', 'somewhere']\n"
+        "code = cli.main()\ninterrupt()\ninterrupt()\nsys.exit(code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "burg-drake: interrupted\n")
+
+
 def test_debug_shows_where_an_error_came_from(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BURG_DEBUG", "1")
     with pytest.raises(InvalidInputError):

@@ -190,7 +190,45 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
 
 def test_what_is_no_table_is_said(tmp_path: Path, capsys: Capture) -> None:
     assert replay(tmp_path / "none.csv") == 2
-    assert "none.csv is not a results table" in capsys.readouterr().err
+    assert "none.csv: No such file or directory\n" in capsys.readouterr().err
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     assert replay(tmp_path / "other.csv") == 2
     assert "other.csv is not a results table (it has no column id)" in capsys.readouterr().err
+    (tmp_path / "README.md").write_text("# Results\n")
+    assert replay(tmp_path / "README.md", "--row", "1") == 2
+    assert capsys.readouterr().err == (
+        f"burg-drake: error: {tmp_path}/README.md is neither the folder of a run nor a table of"
+        " results (.csv, .parquet)\n"
+    )
+
+
+def test_a_header_alone_has_no_rows(row_file: Path, capsys: Capture) -> None:
+    row_file.write_text(row_file.read_text().splitlines()[0] + "\n")
+    for choice in ([], ["--row", "1"], ["--best"], ["--grasp", "box-1"]):
+        assert replay(row_file, *choice) == 2
+        assert capsys.readouterr().err == f"burg-drake: error: {row_file} has no rows\n"
+
+
+TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
+
+
+@pytest.mark.parametrize(
+    ("cells", "message"),
+    [
+        ({"trial_settings": ""}, "trial_settings is empty, without which a row alone cannot be"),
+        ({"scene_content": ""}, "scene_content is empty, without which a row alone cannot be"),
+        ({"engine": "warp (custum)"}, "engine 'warp (custum)' is not a preset of this release"),
+        ({"engine": "screening"}, "engine 'screening' and engine_settings contradict each other"),
+        ({"X_OG": "1 0 0 0.1"}, f"X_OG has 4 numbers; {TWELVE}"),
+        ({"X_OG": "1 0 0 x"}, f"X_OG has 'x' in it; {TWELVE}"),
+        ({"outcome": "liftd"}, "outcome 'liftd' is not known to this release; did you mean 'lif"),
+        ({"stage": "dreamt"}, "stage 'dreamt' is not known to this release; Known: clear, exec"),
+    ],
+)
+def test_a_damaged_row_is_refused(
+    row_file: Path, capsys: Capture, cells: dict[str, str], message: str
+) -> None:
+    rewrite(row_file, **cells)
+    assert replay(row_file) == 2
+    expected = f"burg-drake: error: {row_file}, row 1: {message}"
+    assert capsys.readouterr().err.startswith(expected)

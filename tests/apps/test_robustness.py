@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import shutil
 from pathlib import Path
 
@@ -93,6 +94,24 @@ def test_what_is_known_is_not_asked_again(copied: Run, monkeypatch, capsys: Capt
     )
     assert [probe.test for probe in asked] == ["noise"]
     assert found.grasps[0].success is not None and found.grasps[0].success.trials == 4
+
+
+def test_a_narrower_call_keeps_what_is_known(copied: Run, tmp_path: Path) -> None:
+    shutil.copy(copied.path / "robustness.jsonl", tmp_path / "r.jsonl")
+    command = ["robustness", str(copied.path), "--quiet", "-o", str(tmp_path / "r.csv")]
+    assert main([*command, *OPTIONS]) == 0
+    full = (tmp_path / "r.csv").read_bytes()
+    for options in (["--tests", "tug"], ["--tests", "noise", "--repeats", "1"]):
+        assert main([*command, *options]) == 0
+        assert (tmp_path / "r.csv").read_bytes() == full
+    with (tmp_path / "r.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["repeats"].isdigit() and row["lifted"].isdigit() and row["n_lifted"].isdigit()
+    assert main([*command, "--tests", "tug", "--translation-mm", "2"]) == 0
+    with (tmp_path / "r.csv").open(newline="") as file:
+        (other,) = csv.DictReader(file)
+    assert other["repeats"] == other["n_lifted"] == other["success"] == ""  # of other deviations
+    assert other["tug_+x_g"] == row["tug_+x_g"] and other["friction_min"] == row["friction_min"]
 
 
 @pytest.mark.parametrize(

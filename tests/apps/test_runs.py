@@ -69,6 +69,7 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
         (["--engine", "fast"], "invalid choice: 'fast'"),
         (["--station", "nowhere"], "nowhere does not exist"),
         (["--grasps", "nowhere.npz"], "nowhere.npz: No such file"),
+        (["--grasps", "a.npz", "--grasps-per-object", "100"], "not allowed with argument --grasps"),
         (["-o", "/dev/null"], "cannot write to folder /dev/null"),
     ],
 )
@@ -175,7 +176,12 @@ def test_replay_compares_with_the_engine_of_the_row(
     header, row, *_ = run.table_path.read_text().splitlines()
     assert "whole_trial=False" in row
     path = tmp_path / "row.csv"
-    path.write_text(f"{header}\n{row}\n".replace("whole_trial=False", "whole_trial=True"))
+    changed = row.replace("whole_trial=False", "whole_trial=True")
+    path.write_text(f"{header}\n{changed}\n")
+    assert main(["replay", str(path), "--no-wait"]) == 2
+    assert "engine 'standard' and engine_settings contradict" in capsys.readouterr().err
+    changed = changed.replace(",standard,", ",standard (custom),")
+    path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 1
     out = capsys.readouterr().out.splitlines()
     (end,) = (line for line in out if line.startswith("end_time: recorded"))

@@ -70,6 +70,7 @@ def test_what_still_moves_is_named_and_nothing_is_written(
     )
     code, out = settle(scene_file, "--time-limit", "0.32", "--keep")
     assert code == 1
+    assert capsys.readouterr().err.endswith("; give a longer --time-limit\n")
     assert 0.4 < load_scene(out).X_SO("mug")[2, 3] < 0.6
 
 
@@ -82,6 +83,41 @@ def test_what_falls_off_the_table_is_named(scene_file: Path, capsys: Capture) ->
     code, out = settle(scene_file, "--keep")
     assert code == 1
     assert list(load_scene(out).instances) == ["bottle"]
+
+
+def test_what_validate_refuses_is_not_settled(scene_file: Path, capsys: Capture) -> None:
+    """The mug reaches over the edge of the board, not of the table."""
+    edited(scene_file, ("[0.12, 0.11, 0.0]", "[0.01, 0.11, 0.02]"))
+    code, out = settle(scene_file)
+    printed = capsys.readouterr()
+    assert code == 1 and not out.exists() and "wrote" not in printed.out
+    (line,) = printed.err.splitlines()
+    assert line.startswith(f"burg-drake: {scene_file}: 'mug' is out of bounds: ")
+    code, out = settle(scene_file, "--keep")
+    assert code == 1 and f"wrote {out}" in capsys.readouterr().out
+    assert main(["scene", "validate", str(out)]) == 1
+
+
+def test_the_scene_itself_is_not_written_over(scene_file: Path, capsys: Capture) -> None:
+    before = scene_file.read_bytes()
+    there = scene_file.parent / "." / "out" / ".." / scene_file.name
+    assert main(["scene", "settle", str(scene_file), "-o", str(there)]) == 2
+    error = capsys.readouterr().err
+    assert error == f"burg-drake: error: -o {there} is the scene itself; choose another file\n"
+    assert scene_file.read_bytes() == before
+
+
+@pytest.mark.parametrize("x", [0.12, 9.0], ids=["under the table", "beside it"])
+def test_what_starts_below_the_table_did_not_fall_off(
+    x: float, scene_file: Path, capsys: Capture
+) -> None:
+    edited(scene_file, ("[0.12, 0.11, 0.0]", f"[{x}, 0.11, -2.0]"))
+    code, out = settle(scene_file)
+    assert code == 2 and not out.exists()
+    (line,) = capsys.readouterr().err.splitlines()
+    start = f"burg-drake: error: {scene_file}: 'mug' starts "
+    assert line.startswith(start)
+    assert re.fullmatch(r"19\d\d mm below the table's top; move it up", line[len(start) :])
 
 
 def test_overlapping_objects(scene_file: Path, capsys: Capture) -> None:

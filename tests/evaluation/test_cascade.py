@@ -269,8 +269,10 @@ def test_bad_input_is_said_before_any_work(
         evaluate_in("run", table="xlsx")
     with pytest.raises(UnknownNameError, match="engine 'standart' does not exist; did you mean"):
         evaluate_in("run", engine="standart")
-    with pytest.raises(InvalidInputError, match="grasps per object is 0"):
+    with pytest.raises(InvalidInputError, match=r"^grasps_per_object is 0; give 1 or more$"):
         evaluate_in("run", grasps_per_object=0)
+    with pytest.raises(InvalidInputError, match=r"^grasps_per_object is -1; give 1 or more$"):
+        evaluate("no such scene", "no such station", "", grasps_per_object=-1)
     with pytest.raises(InvalidInputError, match=r"^approach angle is 181 degrees; give"):
         evaluate_in("run", approach_angle_deg=181.0)
     assert not (tmp_path / "run" / "run.yaml").exists()

@@ -47,6 +47,21 @@ def test_rows_and_candidates_go_by_id(run: Run) -> None:
             look_up(id[:-1] + "x")
 
 
+def test_an_id_that_is_like_no_other_gets_no_suggestion(run: Run) -> None:
+    first = ", ".join(run.candidates.id[:8])
+    for id in ("nope-1", f"{run.candidates.instance[0]}-xxx"):
+        with pytest.raises(UnknownNameError) as caught:
+            run.row(id)
+        assert str(caught.value) == (
+            f"{run.path} has no judged grasp {id!r}; known: {first} and 22 others (all ids are in"
+            " results.csv)"
+        )
+
+
+def test_a_run_shows_itself_in_a_line(run: Run) -> None:
+    assert repr(run) == f"Run('{run.path}', scene 'three', 30 of 30 grasps judged)"
+
+
 def test_the_best_grasp_is_lifted_and_disturbs_least(run: Run) -> None:
     best = run.best(3)
     lifted = [id for id in run.candidates.id if run.row(id)["outcome"] == Outcome.LIFTED]
@@ -107,6 +122,9 @@ def test_a_changed_copy_is_noticed(run: Run) -> None:
 def test_what_is_no_run_is_said(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="nowhere holds no run"):
         load_run(tmp_path / "nowhere")
+    (tmp_path / "results.csv").write_text("")
+    with pytest.raises(InvalidInputError, match=r"results.csv is a file, not the folder of a run"):
+        load_run(tmp_path / "results.csv")
     (tmp_path / "run.yaml").write_text("version: 1\nsceen: {}\n")
     with pytest.raises(DocumentError, match=r"run.yaml:2: sceen: unknown key|unknown key 'sceen'"):
         load_run(tmp_path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,12 @@ import pytest
 from known_judge import CrashingJudge, Make, expected
 from rich.console import Console
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import (
+    Group,
     duration,
     rounded,
     summarize,
@@ -85,6 +87,22 @@ def test_the_terminal_shows_everything_in_whole_words(run: Run, width: int) -> N
         assert word in text, word
     row = next(line.split() for line in text.splitlines() if line.split()[:1] == ["cube"])
     assert row[1:7] == [str(n) for n in summarize(run).objects[0].funnel.values()]
+
+
+def test_names_of_objects_are_whole_at_80_columns(run: Run) -> None:
+    """With counts as wide as their heads, and the widest share and interval."""
+    summary = summarize(run)
+    lifted = Counter({Outcome.LIFTED: 99_000, Outcome.DROPPED: 999})
+    name = "screwdriver_14"
+    group = Group(name, 99_999, lifted, Counter({Stage.EXECUTED: 99_999}), Counter())
+    objects = (*summary.objects, group)
+    stream = io.StringIO()
+    view = summary_view(dataclasses.replace(summary, objects=objects))
+    Console(file=stream, width=80).print(view)
+    lines = stream.getvalue().splitlines()
+    assert any(line.split()[:2] == [name, "99999"] for line in lines)
+    assert max(map(len, lines)) <= 80
+    assert all(line == line.rstrip() for line in lines)
 
 
 def test_many_objects_become_a_list(run: Run) -> None:

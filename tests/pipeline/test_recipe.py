@@ -146,7 +146,7 @@ KNOWN = (
         ("objects: {}\n", "FILE:1: version: missing; add 'version: 1'"),
         ("version: 2\n", "FILE:1: version: 2 cannot be read; this release reads version 1"),
         ("version: 1\n",
-         "FILE:1: objects is empty; add lines such as 'mug: {mesh: mug.obj}'"),
+         "FILE: objects is empty; add lines such as 'mug: {mesh: mug.obj}'"),
         ("version: 1\nobject: {}\n",
          "FILE:2: unknown key 'object'; did you mean 'objects'? Known: defaults, name, objects,"
          " version"),

@@ -10,13 +10,15 @@ import pytest
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.resources import builtin_names, resolve
 from burg_drake.core.schema import Pose
-from burg_drake.station.hand import Finger, Hand, load_hand
+from burg_drake.station.hand import Finger, Hand, load_hand, locate_hand
 from burg_drake.station.hand_check import check_hand
 from burg_drake.station.hand_model import add_hand
+from burg_drake.station.robot import add_robot
+from burg_drake.station.station import load_station
 
 STUCK = Finger(body="a", joint="j", pad="pad", closed=0.02, open=0.02)
 MOVING = replace(STUCK, open=0.03)
@@ -51,10 +53,11 @@ def test_hand_poses_bring_the_grasp_frame_to_the_goal(panda: Hand) -> None:
     [
         ({"opening": (0.08, 0.0)}, r"opening \[0.08, 0.0\] must rise from 0"),
         ({"opening": (-0.01, 0.08)}, r"opening \[-0.01, 0.08\] must rise from 0"),
-        ({"force": 0.0}, "force and closing_speed must be above 0"),
-        ({"closing_speed": -0.05}, "force and closing_speed must be above 0"),
+        ({"force": 0.0}, "force is 0 N; it has to be above 0"),
+        ({"closing_speed": -0.05}, "closing_speed is -0.05 m/s; it has to be above 0"),
         ({"fingers": (STUCK, STUCK)}, "finger 'a': closed and open are both 0.02 m"),
-        ({"fingers": (MOVING, MOVING)}, "both fingers name the joint 'j'"),
+        ({"fingers": (MOVING, MOVING)}, "both fingers name the body 'a'"),
+        ({"fingers": (MOVING, replace(MOVING, body="b"))}, "both fingers name the joint 'j'"),
     ],
 )
 def test_bad_figures(panda: Hand, wrong: dict[str, object], message: str) -> None:
@@ -127,7 +130,8 @@ WRONG_DOCUMENTS = {
     ),
     "turned": (
         lambda h: replace(h, X_HG=Pose((0.0, 0.0, 0.1034))),
-        "with both fingers open the pads are -17.5 mm apart along x of G; opening says 80.0 mm",
+        "x of G is not the closing direction: the fingers open along (0.00, 1.00, 0.00) of G; turn"
+        " X_HG",
     ),
     "aside": (
         lambda h: replace(h, X_HG=Pose((0.0, 0.003, 0.1034), rpy_deg=(0.0, 0.0, 90.0))),
@@ -165,6 +169,46 @@ def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
     assert str(error.value).startswith("hand 'panda_hand': " + message)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("force: 30.0", "force: -30", "14: force is -30 N; it has to be above 0"),
+        ("[0.0, 0.11]", "[0.11, 0.0]", "13: opening [0.11, 0.0] must rise from 0 or above [m]"),
+        ("wsg_right_joint", "wsg_left_joint", "20: both fingers name the joint 'wsg_left_joint'"),
+        ("wsg_right_finger", "wsg_left_finger", "20: both fingers name the body 'wsg_left_finger'"),
+        ("open: 0.055", "open: 0.0", "19: finger 'wsg_left_finger': closed and open are both 0 m"),
+        ("/wsg_50.sdf", "/wsg.sdf", " model: package://burg_drake/models/wsg/wsg.sdf does not"),
+        (
+            "{translation: [0.0, 0.0, 0.1455]}",
+            "{translation: [0.0, 0.0, 0.1455], rpy_deg: [0, 0, 90]}",
+            " hand 'wsg_50': x of G is not the closing direction: the fingers open along"
+            " (0.00, -1.00, 0.00) of G; turn X_HG (package://burg_drake/models/wsg/wsg_50.sdf)",
+        ),
+        (
+            "[0.0, 0.11]",
+            "[0.0, 0.1]",
+            " hand 'wsg_50': with both fingers open the pads are 110.0 mm apart along x of G;",
+        ),
+    ],
+)
+def test_the_file_is_named_through_a_station_too(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    text = resolve("wsg_50", "models/hands").read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    file = tmp_path / "mine.yaml"
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    (tmp_path / "station.yaml").write_text("version: 1\nname: bare\nhand: mine.yaml\n")
+    with pytest.raises(BurgError) as error:
+        hand, model, path = locate_hand(str(file))
+        check_hand(hand, model, path)
+    assert str(error.value).startswith(f"{file}:{message}")
+    with pytest.raises(BurgError) as other:
+        station = load_station(tmp_path / "station.yaml")
+        add_robot(RobotDiagramBuilder(time_step=0.001), station, "hand")
+    assert str(other.value) == str(error.value)
+
+
 MIMIC = '<drake:mimic joint="panda_finger_joint1" multiplier="1" offset="0"/>'
 COMPLIANT = "<drake:compliant_hydroelastic/>"
 LOOSE_LINK = """
@@ -200,10 +244,17 @@ def changed_model(folder: Path, old: str, new: str) -> Path:
     ],
 )
 def test_model_that_does_not_fit(
-    panda: Hand, tmp_path: Path, old: str, new: str, message: str
+    panda: Hand,
+    tmp_path: Path,
+    old: str,
+    new: str,
+    message: str,
+    capfd: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     with pytest.raises(InvalidInputError, match=message):
         check_hand(panda, changed_model(tmp_path, old, new))
+    assert capfd.readouterr().err == "" and caplog.text == ""
 
 
 @pytest.mark.parametrize("coupled", [True, False])

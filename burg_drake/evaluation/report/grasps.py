@@ -90,9 +90,10 @@ def best_section(run: Run) -> Html | None:
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
     return section(
         "Best grasps",
-        "Lifted grasps whose object moved least in the hand, and that pushed others least, with the"
-        " contact patch of the weaker pad and the sampler's score. Any grasp can be watched by its"
-        " id, from here or from its row of the table alone:",
+        "Lifted grasps whose object slipped and tilted least in the hand, and that pushed others"
+        " least, rounded to 0.1 mm and 0.1°; equal ones by the larger contact patch of the weaker"
+        " pad, then by the sampler's score. Any grasp can be watched by its id, from here or from"
+        " its row of the table alone:",
         command(line),
         table(head, rows, numbers=(2, 3, 4, 5, 6, 7)),
     )
