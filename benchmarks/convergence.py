@@ -35,7 +35,7 @@ from burg_drake.core.schema import Pose
 from burg_drake.objects.entry import ContactKind
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument, save_scene
-from burg_drake.simulation.hand_trial import TrialSettings
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Station, StationDocument, Table

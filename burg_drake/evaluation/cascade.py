@@ -156,7 +156,7 @@ def _document(
 ) -> RunDocument:
     """What this call asks for; what comes of the grasps is filled in later."""
     from burg_drake.motion.reach import ReachSettings
-    from burg_drake.simulation.hand_trial import TrialSettings
+    from burg_drake.simulation.trial_settings import TrialSettings
 
     instances = [*scene.instances.values(), *scene.background.values()]
     library = portable_reference(scene.library.root, folder)

@@ -20,8 +20,8 @@ from burg_drake.station.engine import Engine
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.hand_trial import TrialSettings
     from burg_drake.simulation.result import TrialResult
+    from burg_drake.simulation.trial_settings import TrialSettings
 
 MARGINS = (
     *("overlap", "slip", "tilt", "pad_force", "patch_area"),
@@ -221,7 +221,8 @@ class StationJudge:
             reach: ask whether the arm reaches; the station needs an arm then.
             settings: phases of the trial, if not the usual ones.
         """
-        from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+        from burg_drake.simulation.hand_trial import HandTrial
+        from burg_drake.simulation.trial_settings import TrialSettings
 
         settings = TrialSettings() if settings is None else settings
         self._trial = HandTrial(scene, station, engine=engine, settings=settings)

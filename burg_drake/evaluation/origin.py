@@ -17,7 +17,7 @@ from burg_drake.core.yaml_nodes import parse_nodes
 from burg_drake.station.engine import ENGINES, Engine
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.hand_trial import TrialSettings
+    from burg_drake.simulation.trial_settings import TrialSettings
 
 T = TypeVar("T")
 
@@ -43,7 +43,7 @@ class Origin:
         scene, station: where the documents were, or names of built-in ones.
         scene_content, station_content: first digits of their content hashes.
         engine: how time was stepped.
-        trial: settings of the trial's phases; see `simulation.hand_trial.TrialSettings`.
+        trial: settings of the trial's phases; see `simulation.trial_settings.TrialSettings`.
         versions: of the software and the machine.
         seed: of the run.
         run: hash of the run.
@@ -65,7 +65,7 @@ class Origin:
         Raises:
             InvalidInputError: one of them is unknown or cannot be used.
         """
-        from burg_drake.simulation.hand_trial import TrialSettings
+        from burg_drake.simulation.trial_settings import TrialSettings
 
         return _typed(self.trial, TrialSettings, "trial settings")
 

@@ -28,7 +28,7 @@ from burg_drake.station.engine import Engine
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.hand_trial import TrialSettings
+    from burg_drake.simulation.trial_settings import TrialSettings
 
 TESTS = ("tug", "shake", "friction", "noise")
 HASH_DIGITS = 8

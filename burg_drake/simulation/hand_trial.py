@@ -10,8 +10,6 @@ returns does not depend on the trials before it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from pydrake.geometry import (
     CollisionFilterDeclaration,
@@ -36,56 +34,11 @@ from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.neighbours import Neighbours
 from burg_drake.simulation.result import Margins, TrialResult
 from burg_drake.simulation.rise import Rise
+from burg_drake.simulation.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.station import Station
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrialSettings:
-    """Phases of a trial.
-
-    Attributes:
-        lift_height: how far the hand rises [m].
-        lift_time: duration of the rise [s]; half of it accelerates and half of it brakes, both by
-            4 height / time^2.
-        hold_time: how long the target must be held after the rise [s].
-        creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
-        creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
-            trials early, see `Engine.whole_trial`.
-        steady_time: how long that, and free air, and the rest of all others, must last [s].
-        poll: interval at which contacts are looked at [s].
-        settled_speed: the fingers have closed when they are slower than this [m/s] ...
-        settled_time: ... for this long [s].
-        close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
-            the time that it takes to close.
-        disturbance: others that are moved by more than this count as disturbed [m].
-    """
-
-    lift_height: float = 0.30
-    lift_time: float = 1.25
-    hold_time: float = 0.5
-    creep_speed: float = 0.0003
-    creep_distance: float = 0.002
-    steady_time: float = 0.05
-    poll: float = 0.01
-    settled_speed: float = 0.002
-    settled_time: float = 0.03
-    close_timeout: float = 2.0
-    disturbance: float = 0.01
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if name in ("lift_height", "lift_time", "poll") and not 0.0 < value < np.inf:
-                raise InvalidInputError(f"{name} of a trial is {value:g}; give more than 0")
-            if not 0.0 <= value < np.inf:
-                raise InvalidInputError(f"{name} of a trial is {value:g}; give 0 or more")
-
-    @property
-    def steady_polls(self) -> int:
-        """Looks in `steady_time`."""
-        return max(1, round(self.steady_time / self.poll))
 
 
 class HandTrial:
@@ -117,7 +70,7 @@ class HandTrial:
         station: Station,
         *,
         engine: Engine = ENGINES["standard"],
-        settings: TrialSettings = TrialSettings(),
+        settings: TrialSettings = DEFAULT_TRIAL,
         lock: bool = True,
         meshcat: Meshcat | None = None,
     ) -> None:

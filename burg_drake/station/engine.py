@@ -21,8 +21,8 @@ class Engine:
             hard at 2 ms and 10 % at 5 ms.
         contact_model: hydroelastic where geometry allows it, else point contact.
         stiction_tolerance: speed at which friction that sticks creeps at most [m/s]. Drake's own
-            1e-4 lets a box that hangs 20 mm off its centre tilt by 0.9 degrees in a trial, 1e-5 by
-            0.2, at the same cost.
+            1e-4 lets a box that hangs 20 mm off its centre tilt by 0.9 degrees in a trial at 1 ms,
+            1e-5 by 0.2, at about the same cost.
         contact_surface: polygons are faster than triangles and as accurate here.
         whole_trial: simulate every trial to its end. Otherwise it ends as soon as its outcome is
             decided: the target is held without moving, touched by nothing but the hand, and there

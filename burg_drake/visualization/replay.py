@@ -11,8 +11,9 @@ from pydrake.geometry import Meshcat, MeshcatAnimation
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, check_pose
 from burg_drake.scene.scene import Scene
-from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import TrialResult
+from burg_drake.simulation.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.station import Station
@@ -20,7 +21,6 @@ from burg_drake.visualization.scene_view import draw_board
 
 FRAMES_PER_SECOND = 32.0
 LOOPS = 10_000
-DEFAULT_SETTINGS = TrialSettings()
 VIEW = (0.73, -0.68)
 """Heading from the grasp to the camera that is preferred, in the world: across from an arm."""
 DISTANCE, CAMERA_HEIGHT = 0.80, 0.42
@@ -39,7 +39,7 @@ def record_trial(
     meshcat: Meshcat,
     *,
     engine: Engine = ENGINES["standard"],
-    settings: TrialSettings = DEFAULT_SETTINGS,
+    settings: TrialSettings = DEFAULT_TRIAL,
     friction: float | None = None,
     mass: float | None = None,
 ) -> TrialResult:

@@ -8,7 +8,7 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.origin import Origin, engine_label, read_origin
-from burg_drake.simulation.hand_trial import TrialSettings
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
 
 CUSTOM = Engine(

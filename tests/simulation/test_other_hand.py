@@ -17,7 +17,8 @@ from burg_drake.grasping.antipodal import sample_antipodal
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Board, Instance, SceneDocument, load_scene, save_scene
-from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Station, StationDocument, Table
 

@@ -25,7 +25,8 @@ from trial_world import (
 
 from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene
-from burg_drake.simulation.hand_trial import HandTrial, TrialSettings
+from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES
 
 STIFFNESS = 1e7 / 0.0076

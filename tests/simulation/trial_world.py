@@ -10,7 +10,7 @@ import trimesh
 from burg_drake.core.frames import Array, grasp_from_axes
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
-from burg_drake.simulation.hand_trial import TrialSettings
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Obstacle, Station, StationDocument, Table
 

@@ -1,0 +1,58 @@
+"""Phases of a trial in numbers: how far and how fast the hand rises, and what counts as rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from burg_drake.core.errors import InvalidInputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialSettings:
+    """Phases of a trial.
+
+    Attributes:
+        lift_height: how far the hand rises [m].
+        lift_time: duration of the rise [s]; half of it accelerates and half of it brakes, both by
+            4 height / time^2.
+        hold_time: how long the target must be held after the rise [s].
+        creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
+        creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
+            trials early, see `Engine.whole_trial`.
+        steady_time: how long that, and free air, and the rest of all others, must last [s].
+        poll: interval at which contacts are looked at [s].
+        settled_speed: the fingers have closed when they are slower than this [m/s] ...
+        settled_time: ... for this long [s].
+        close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
+            the time that it takes to close.
+        disturbance: others that are moved by more than this count as disturbed [m].
+    """
+
+    lift_height: float = 0.30
+    lift_time: float = 1.25
+    hold_time: float = 0.5
+    creep_speed: float = 0.0003
+    creep_distance: float = 0.002
+    steady_time: float = 0.05
+    poll: float = 0.01
+    settled_speed: float = 0.002
+    settled_time: float = 0.03
+    close_timeout: float = 2.0
+    disturbance: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if name in ("lift_height", "lift_time", "poll") and not 0.0 < value < math.inf:
+                raise InvalidInputError(f"{name} of a trial is {value:g}; give more than 0")
+            if not 0.0 <= value < math.inf:
+                raise InvalidInputError(f"{name} of a trial is {value:g}; give 0 or more")
+
+    @property
+    def steady_polls(self) -> int:
+        """Looks in `steady_time`."""
+        return max(1, round(self.steady_time / self.poll))
+
+
+DEFAULT_TRIAL = TrialSettings()
+"""The phases that `evaluate` and `replay` use."""
