@@ -21,6 +21,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, quaternion_from_rotation
 from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene
@@ -57,10 +58,17 @@ class Peer:
 
     Raises:
         ImportError: PyBullet is not installed.
+        InvalidInputError: the hand is not the Panda's, whose pads are written down here.
     """
 
     def __init__(self, scene: Scene, station: Station) -> None:
         import pybullet
+
+        if station.hand.name != HAND:
+            raise InvalidInputError(
+                f"station {station.name!r} has the hand {station.hand.name!r}; PyBullet runs beside"
+                f" {HAND!r} alone (without PyBullet installed, every hand is measured)"
+            )
         from pybullet_utils.bullet_client import BulletClient
 
         self._p: Any = BulletClient(pybullet.DIRECT)
@@ -273,6 +281,7 @@ def link_urdf(link: ElementTree.Element) -> str:
     return "".join([*lines, "</link>"])
 
 
+HAND = "panda_hand"
 PAD_SIZE = "0.0175 0.0152 0.0185"
 """Extents of the Panda hand's pads [m], which are meshes in Drake."""
 
