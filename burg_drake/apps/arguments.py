@@ -11,7 +11,7 @@ DEFAULT_STATION = "panda_tabletop"
 # Kept in step with station.engine, which imports too much for a help text; a test compares them.
 ENGINE_NAMES = ("reference", "standard", "screening")
 DEFAULT_ENGINE = "standard"
-# Likewise in step with evaluation.candidates.
+# Likewise in step with evaluation.candidate_sampling.
 DEFAULT_APPROACH_ANGLE = 75.0
 
 

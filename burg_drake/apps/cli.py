@@ -14,7 +14,17 @@ import sys
 from collections.abc import Sequence
 
 from burg_drake import __version__
-from burg_drake.apps import evaluate, grasps, hand, library, replay, report, robustness, scene
+from burg_drake.apps import (
+    evaluate,
+    frames,
+    grasps,
+    hand,
+    library,
+    replay,
+    report,
+    robustness,
+    scene,
+)
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError
 
@@ -22,7 +32,7 @@ INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
 
-VERBS = (library, scene, evaluate, robustness, replay, grasps, report, hand)
+VERBS = (library, scene, grasps, evaluate, robustness, replay, report, hand, frames)
 
 
 def build_parser() -> Parser:

@@ -91,7 +91,7 @@ def add_to(verbs: Any) -> None:
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
-    from burg_drake.evaluation.candidates import read_grasps
+    from burg_drake.evaluation.candidate_files import read_grasps
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station

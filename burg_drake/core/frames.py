@@ -139,6 +139,16 @@ def swap_fingers(X_AG: ArrayLike) -> Array:
     return np.asarray(X_AG, dtype=float) @ make_pose(np.diag([-1.0, -1.0, 1.0]))
 
 
+def canonical_fingers(X_AG: ArrayLike) -> Array:
+    """Grasps (..., 4, 4) with fingers named alike: the closing axis has a positive component of
+    largest magnitude (the first one, of equals), so that a grasp and its `swap_fingers` are one."""
+    X = np.asarray(X_AG, dtype=float)
+    x = X[..., :3, 0]
+    largest = np.abs(x).argmax(axis=-1)[..., None]
+    turned = np.take_along_axis(x, largest, axis=-1) < 0.0
+    return np.where(turned[..., None], swap_fingers(X), X) + 0.0
+
+
 def pregrasp(X_AG: ArrayLike, standoff: float) -> Array:
     """Pregrasps `X_AP` (..., 4, 4): back along the approach axis by `standoff` [m]."""
     return np.asarray(X_AG, dtype=float) @ make_pose(p_AB=(0.0, 0.0, -standoff))

@@ -6,28 +6,19 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.content import content_hash, rng_from
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.approach import ApproachCone
-from burg_drake.objects.entry import ObjectEntry
 from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
 
-DEFAULT_APPROACH_ANGLE_DEG = 75.0
-"""Keeps the hand above the horizontal, and leaves out pairs of an object's bottom and top for
-friction up to tan(15 deg) = 0.27: one of the two fingers would be below the table."""
-
-DOWN_DIGITS = 6
-"""Straight down in an object's frame is rounded, so that instances of one object that differ by a
-turn about the vertical share their grasps."""
+INSTANCE = "instance"
+"""Column of a grasp file: the placed object that each grasp belongs to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +71,7 @@ class Candidates:
 
     def save(self, path: Path) -> None:
         """Writes a grasp file that `load`, and `GraspSet.load`, read back bit for bit."""
-        runs = [[name, len(list(group))] for name, group in groupby(self.instance.tolist())]
-        provenance = {**self.grasps.provenance, "instances": runs}
-        dataclasses.replace(self.grasps, provenance=provenance).save(path)
+        self.grasps.with_columns(instance=self.instance).save(path)
 
     @classmethod
     def load(cls, path: Path) -> Candidates:
@@ -92,53 +81,10 @@ class Candidates:
             InvalidInputError: the file is something else.
         """
         grasps = GraspSet.load(path)
-        provenance = dict(grasps.provenance)
-        runs = provenance.pop("instances", None)
-        if runs is None or sum(count for _, count in runs) != len(grasps):
+        if INSTANCE not in grasps.columns:
             raise InvalidInputError(f"{path} does not say which instance each grasp belongs to")
-        names = [name for name, count in runs for _ in range(count)]
-        return cls(dataclasses.replace(grasps, provenance=provenance), np.array(names, dtype=str))
-
-
-def sample_candidates(
-    scene: Scene,
-    station: Station,
-    n: int,
-    seed: int,
-    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
-) -> Candidates:
-    """Samples antipodal grasps on every free instance.
-
-    The random stream follows from the seed and the object's content alone. All instances of an
-    object that lie on the same side get the same grasps, whatever else stands in the scene.
-
-    Args:
-        scene: the scene; its background objects get no grasps.
-        station: gives the opening of the hand.
-        n: grasps for each instance; there are fewer where the object has no more.
-        seed: of the run.
-        approach_angle_deg: largest angle between the approach and straight down, above 0 to
-            180; with 180 the hand comes from anywhere.
-
-    Raises:
-        InvalidInputError: n is below 1, or the angle out of its range.
-        UnknownNameError: the mesh file of an object is missing.
-    """
-    if n < 1:
-        raise InvalidInputError(f"grasps per object is {n}; give 1 or more")
-    if not 0.0 < approach_angle_deg <= 180.0:
-        raise InvalidInputError(
-            f"approach angle is {approach_angle_deg:g} degrees; give more than 0, at most 180"
-        )
-    wanted: dict[str, tuple[str, ApproachCone | None]] = {}
-    for name, instance in scene.instances.items():
-        cone = _approach_cone(scene, station, name, approach_angle_deg)
-        wanted[name] = instance.object, cone
-    sampled = {
-        (object, cone): _sample_object(scene, station, object, n, seed, cone)
-        for object, cone in dict.fromkeys(wanted.values())
-    }
-    return _join({name: sampled[key] for name, key in wanted.items()})
+        columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
+        return cls(dataclasses.replace(grasps, columns=columns), grasps.columns[INSTANCE])
 
 
 def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates:
@@ -166,46 +112,12 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
                 f"grasps given for {name!r} belong to object {min(others)!r}; the scene has"
                 f" object {expected!r} there"
             )
-    return _join({name: _distinct(grasps[name]) for name in scene.instances if name in grasps})
+    return join_candidates(
+        {name: distinct(grasps[name]) for name in scene.instances if name in grasps}
+    )
 
 
-def read_grasps(scene: Scene, path: str | Path) -> dict[str, GraspSet]:
-    """Reads a grasp file for `given_candidates`.
-
-    Args:
-        scene: the scene.
-        path: grasps.npz of a run, whose grasps stay on their instances; or any other file of a
-            `GraspSet`, whose grasps go to every instance of their object.
-
-    Raises:
-        InvalidInputError: the file is something else.
-        UnknownNameError: grasps of an object or on an instance that the scene does not have.
-    """
-    grasps = GraspSet.load(path)
-    if "instances" in grasps.provenance:
-        return _of_run(Candidates.load(Path(path)))
-    objects = {name: scene.instance(name).object for name in scene.instances}
-    unknown = sorted(set(grasps.object.tolist()) - set(objects.values()))
-    if unknown:
-        raise UnknownNameError(
-            f"{path} has grasps of object {unknown[0]!r}, which is not in scene {scene.name!r};"
-            f" {nearest(unknown[0], set(objects.values()))}"
-        )
-    members = {name: grasps.object == object for name, object in objects.items()}
-    return {name: grasps.select(mask) for name, mask in members.items() if mask.any()}
-
-
-def _of_run(candidates: Candidates) -> dict[str, GraspSet]:
-    """The grasps by instance, each set with its own provenance."""
-    parts = candidates.grasps.provenance.get("parts", {})
-    sets = {}
-    for name in dict.fromkeys(candidates.instance.tolist()):
-        chosen = candidates.grasps.select(candidates.instance == name)
-        sets[name] = dataclasses.replace(chosen, provenance=parts.get(name, {}))
-    return sets
-
-
-def _join(by_instance: dict[str, GraspSet]) -> Candidates:
+def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
     if not by_instance:
         return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
     names = [name for name, grasps in by_instance.items() for _ in range(len(grasps))]
@@ -216,36 +128,6 @@ def _join(by_instance: dict[str, GraspSet]) -> Candidates:
     )
 
 
-def _distinct(grasps: GraspSet) -> GraspSet:
+def distinct(grasps: GraspSet) -> GraspSet:
     _, first = np.unique(grasps.id, return_index=True)
     return grasps.select(np.sort(first))
-
-
-def _approach_cone(
-    scene: Scene, station: Station, instance: str, angle_deg: float
-) -> ApproachCone | None:
-    """The cone about straight down, seen from an instance; None if it holds every direction."""
-    if angle_deg == 180.0:
-        return None
-    X_WO = station.document.X_WS.matrix() @ scene.X_SO(instance)
-    x, y, z = np.round(-X_WO[2, :3], DOWN_DIGITS) + 0.0  # no negative zeros
-    return ApproachCone((x, y, z), np.deg2rad(angle_deg))
-
-
-def _sample_object(
-    scene: Scene, station: Station, name: str, n: int, seed: int, cone: ApproachCone | None
-) -> GraspSet:
-    from burg_drake.grasping.antipodal import sample_antipodal
-
-    entry: ObjectEntry = scene.library.entry(name)
-    return _distinct(
-        sample_antipodal(
-            scene.library.surface(name),
-            n,
-            rng_from("antipodal", seed, entry.build),
-            friction=entry.friction,
-            opening=station.hand.opening,
-            approach_cone=cone,
-            object=name,
-        )
-    )

@@ -21,12 +21,8 @@ from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
 from burg_drake.core.resources import PACKAGE_URI
-from burg_drake.evaluation.candidates import (
-    DEFAULT_APPROACH_ANGLE_DEG,
-    Candidates,
-    given_candidates,
-    sample_candidates,
-)
+from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
+from burg_drake.evaluation.candidates import Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.judge import StationJudgeFactory

@@ -19,7 +19,7 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import builtin_names
-from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.station.engine import ENGINES
 
 HELP = (

@@ -3,12 +3,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps import GraspSet
 
 COLUMNS = ("X_OG", "width", "id", "object", "score")
@@ -21,36 +22,78 @@ def poses(n: int, seed: int = 0) -> np.ndarray:
 
 def grasps(n: int = 20, seed: int = 0) -> GraspSet:
     rng = np.random.default_rng(seed)
+    columns = {
+        "clearance": rng.normal(size=n),
+        "rank": rng.integers(-5, 5, n),
+        "closed": rng.random(n) < 0.5,
+        "instance": rng.choice(["left mug", "größer", ""], n),
+    }
     return GraspSet.create(
         poses(n, seed),
         object=rng.choice(["mug", "screwdriver", "größe"], n),
         width=rng.uniform(0, 0.08, n),
         score=np.where(rng.random(n) < 0.3, np.nan, rng.random(n)),
         provenance={"sampler": "test", "opening": (0.0, 0.08), "state": {"inc": 2**127 + 1}},
+        columns=columns,
     )
 
 
 def assert_identical(a: GraspSet, b: GraspSet) -> None:
-    for name in COLUMNS:
-        one, two = getattr(a, name), getattr(b, name)
-        assert one.dtype == two.dtype
-        assert one.shape == two.shape
-        assert one.tobytes() == two.tobytes(), name
+    assert a.column_names == b.column_names
+    for name in ("X_OG", *a.column_names):
+        one, two = (g.X_OG if name == "X_OG" else g.column(name) for g in (a, b))
+        assert one.dtype.kind == two.dtype.kind and one.shape == two.shape
+        if one.dtype.kind == "U":
+            assert one.tolist() == two.tolist()
+        else:
+            assert one.dtype == two.dtype and one.tobytes() == two.tobytes(), name
     assert a.provenance == b.provenance
 
 
-def test_storage_restores_every_bit(tmp_path: Path):
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+def test_storage_restores_every_bit(tmp_path: Path, suffix: str):
     extreme = grasps(3)
     extreme.width[:] = [5e-324, np.nan, 0.1 + 0.2]
-    for i, original in enumerate((grasps(), extreme, grasps().select([]))):
-        original.save(tmp_path / f"{i}.npz")
-        assert_identical(GraspSet.load(tmp_path / f"{i}.npz"), original)
+    for i, original in enumerate((grasps(), extreme)):
+        original.save(tmp_path / f"{i}{suffix}")
+        assert_identical(GraspSet.load(tmp_path / f"{i}{suffix}"), original)
+    grasps().select([]).save(tmp_path / f"empty{suffix}")
+    empty = GraspSet.load(tmp_path / f"empty{suffix}")
+    assert len(empty) == 0 and empty.column_names == grasps().column_names
 
 
-def test_same_content_same_bytes_on_disk(tmp_path: Path):
-    for name in ("a.npz", "b.npz"):
-        grasps().save(tmp_path / name)
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+def test_same_content_same_bytes_on_disk(tmp_path: Path, suffix: str):
+    for name in ("a", "b"):
+        grasps().save(tmp_path / f"{name}{suffix}")
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+def test_any_reader_of_hdf5_finds_poses_names_and_columns(tmp_path: Path):
+    original = grasps(5)
+    original.save(tmp_path / "grasps.h5")
+    with h5py.File(tmp_path / "grasps.h5") as file:
+        assert file.attrs["format"] == "burg_drake.grasps"
+        np.testing.assert_array_equal(file["X_OG"], original.X_OG)
+        assert [name.decode() for name in file["object"]] == original.object.tolist()
+        assert list(file["columns"]) == ["clearance", "rank", "closed", "instance"]
+        assert json.loads(file.attrs["provenance"])["sampler"] == "test"
+
+
+def test_a_file_of_the_first_version_is_read(tmp_path: Path):
+    old = grasps(4)
+    header = {"format": "burg_drake.grasps", "version": 1, "provenance": {"n": 4}}
+    columns = {name: getattr(old, name) for name in COLUMNS}
+    np.savez(tmp_path / "old.npz", header=np.array(json.dumps(header)), **columns)
+    read = GraspSet.load(tmp_path / "old.npz")
+    np.testing.assert_array_equal(read.X_OG, old.X_OG)
+    assert read.provenance == {"n": 4} and not read.columns
+
+
+def test_another_suffix_is_refused(tmp_path: Path):
+    with pytest.raises(InvalidInputError, match=r"ends in '.json'; give .* \.npz or \.h5"):
+        grasps().save(tmp_path / "grasps.json")
+    assert not list(tmp_path.iterdir())
 
 
 def test_identifiers_follow_from_object_pose_and_width_only():
@@ -108,8 +151,50 @@ def test_concatenate_undoes_select():
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(joined, name), getattr(whole, name))
     assert joined.provenance == {"parts": [whole.provenance] * 3}
+    for name, values in whole.columns.items():
+        np.testing.assert_array_equal(joined.columns[name], values)
     with pytest.raises(InvalidInputError, match="at least one"):
         GraspSet.concatenate([])
+
+
+def test_what_a_set_lacks_is_missing_in_the_whole():
+    some = grasps(2)
+    joined = GraspSet.concatenate([GraspSet.create(poses(1), object="mug"), some])
+    np.testing.assert_array_equal(joined.columns["rank"], [np.nan, *some.columns["rank"]])
+    assert joined.columns["instance"].tolist() == ["", *some.columns["instance"].tolist()]
+    other = some.with_columns(instance=1.0)
+    with pytest.raises(InvalidInputError, match="'instance' is text in one set"):
+        GraspSet.concatenate([some, other])
+
+
+def test_columns_are_added_replaced_and_found():
+    g = grasps(3)
+    more = g.with_columns(epsilon=[0.1, 0.2, 0.3], rank=0, score=[3, 2, 1])
+    assert more.column_names[:4] == ("width", "id", "object", "score")
+    assert more.column("epsilon").tolist() == [0.1, 0.2, 0.3]
+    assert more.column("rank").tolist() == [0, 0, 0]
+    assert more.score.tolist() == [3.0, 2.0, 1.0] and "score" not in more.columns
+    assert "epsilon" not in g.columns and g.columns["rank"].tolist() != [0, 0, 0]
+    np.testing.assert_array_equal(more.id, g.id)
+    with pytest.raises(UnknownNameError, match=r"no column 'epsilom'; did you mean 'epsilon'\?"):
+        more.column("epsilom")
+    with pytest.raises(InvalidInputError, match=r"epsilon has shape \(2,\); expected \(3,\)"):
+        g.with_columns(epsilon=[1, 2])
+    with pytest.raises(InvalidInputError, match="'width' is part of what a grasp is"):
+        g.with_columns(width=[1, 2, 3])
+    with pytest.raises(InvalidInputError, match="values of type object"):
+        g.with_columns(rank=[1, None, "x"])
+
+
+def test_the_canonical_form_is_the_same_for_both_places_of_the_fingers():
+    g = grasps()
+    swapped = GraspSet.create(swap_fingers(g.X_OG), object=g.object, width=g.width)
+    one, two = g.canonical(), swapped.canonical()
+    np.testing.assert_array_equal(one.X_OG, two.X_OG)
+    np.testing.assert_array_equal(one.id, two.id)
+    assert len(set(one.id.tolist()) & set(g.id.tolist())) not in (0, len(g))
+    np.testing.assert_array_equal(one.columns["rank"], g.columns["rank"])
+    np.testing.assert_array_equal(one.canonical().id, one.id)
 
 
 def test_names_of_different_length_are_not_cut_when_joined():
@@ -152,6 +237,13 @@ def test_files_that_are_no_grasp_set(tmp_path: Path):
 
     grasps().save(tmp_path / "good.npz")
     good = (tmp_path / "good.npz").read_bytes()
+    grasps().save(tmp_path / "good.h5")
+    tree = (tmp_path / "good.h5").read_bytes()
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["grasps/transforms"] = poses(3)
+    with h5py.File(tmp_path / "torn.h5", "w") as file:
+        file.attrs.update(format="burg_drake.grasps", version=2, provenance="{}")
+        file["X_OG"] = poses(3)
     strange = {
         "empty": b"",
         "text": b"x,y,z\n",
@@ -165,14 +257,16 @@ def test_files_that_are_no_grasp_set(tmp_path: Path):
         )
     np.save(tmp_path / "burg.npy", poses(3))
     np.savez(tmp_path / "other.npz", grasps=poses(3))
-    for name in ("burg.npy", "other.npz"):
+    for name in ("burg.npy", "other.npz", "other.h5", "torn.h5"):
         assert "is not a grasp set" in message(tmp_path / name)
+    (tmp_path / "cut.h5").write_bytes(tree[: len(tree) // 2])
+    assert "truncated" in message(tmp_path / "cut.h5")
     missing = tmp_path / "missing.npz"
     assert message(missing) == f"cannot read {missing}: No such file or directory"
 
 
 def test_a_newer_version_is_named(tmp_path: Path):
-    header = {"format": "burg_drake.grasps", "version": 2, "provenance": {}}
+    header = {"format": "burg_drake.grasps", "version": 3, "provenance": {}}
     np.savez(tmp_path / "new.npz", header=np.array(json.dumps(header)), poses=poses(2))
-    with pytest.raises(InvalidInputError, match=r"version 2; this release reads .* version 1$"):
+    with pytest.raises(InvalidInputError, match=r"version 3; this release .* version 1 and 2$"):
         GraspSet.load(tmp_path / "new.npz")

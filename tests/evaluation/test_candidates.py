@@ -12,12 +12,9 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidates import (
-    Candidates,
-    given_candidates,
-    read_grasps,
-    sample_candidates,
-)
+from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.evaluation.candidate_sampling import sample_candidates
+from burg_drake.evaluation.candidates import Candidates, given_candidates
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 

@@ -16,7 +16,7 @@ from known_judge import KnownJudge, Make, expected, install
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidates import read_grasps
+from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.progress import Progress

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates import Candidate, sample_candidates
+from burg_drake.evaluation.candidate_sampling import sample_candidates
+from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import MARGINS, Decision, Screened, judge_grasp, screen_grasps
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.engine import ENGINES

@@ -1,0 +1,7 @@
+from __future__ import annotations
+
+from typing import Any
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
