@@ -66,9 +66,9 @@ def test_the_best_grasp_is_lifted_and_disturbs_least(run: Run) -> None:
     best = run.best(3)
     lifted = [id for id in run.candidates.id if run.row(id)["outcome"] == Outcome.LIFTED]
     assert set(best) <= set(lifted)
-    slips = [run.row(id)["slip"] for id in best]
+    slips = [round(run.row(id)["slip"], 4) for id in best]  # a tenth of a millimetre counts
     assert slips == sorted(slips)
-    assert slips[0] == min(run.row(id)["slip"] for id in lifted)
+    assert slips[0] == min(round(run.row(id)["slip"], 4) for id in lifted)
     assert len(run.best(10_000)) == len(lifted)
 
 
