@@ -17,6 +17,7 @@ from burg_drake.apps.arguments import (
     positive_int,
     seed,
 )
+from burg_drake.apps.given_grasps import add_given, read_given, require_file
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
@@ -36,6 +37,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --no-reach",
+        "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
+        "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "",
         "The same command goes on where an interrupted one stopped.",
     )
@@ -54,11 +57,7 @@ def add_to(verbs: Any) -> None:
         type=positive_int,
         help=f"grasps sampled for each object (default: {DEFAULT_GRASPS})",
     )
-    which.add_argument(
-        "--grasps",
-        metavar="FILE",
-        help="judge these grasps (.npz of a GraspSet, or grasps.npz of a run); sample none",
-    )
+    add_given(parser, which)
     parser.add_argument(
         "--approach-angle",
         metavar="DEG",
@@ -91,21 +90,23 @@ def add_to(verbs: Any) -> None:
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
-    from burg_drake.evaluation.candidate_files import read_grasps
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station
 
+    require_file(arguments)
     scene = load_scene(arguments.scene)
     station = load_station(arguments.station)
-    given = arguments.grasps
+    given = None if arguments.grasps is None else read_given(arguments, scene, station)
+    for note in given.notes if given else ():
+        print(f"note: {note}")
     run = evaluate(
         scene,
         station,
         arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
         grasps_per_object=arguments.grasps_per_object or DEFAULT_GRASPS,
         approach_angle_deg=arguments.approach_angle,
-        grasps=None if given is None else read_grasps(scene, given),
+        grasps=given.by_instance if given else None,
         engine=arguments.engine,
         seed=arguments.seed,
         workers=arguments.workers,

@@ -1,4 +1,4 @@
-"""`burg-drake scene`: show, validate and settle scenes."""
+"""`burg-drake scene`: show, validate and settle scenes; `scene_import` has imports."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps import scene_import
 from burg_drake.apps.arguments import (
     DEFAULT_ENGINE,
     ENGINE_NAMES,
@@ -19,8 +20,6 @@ from burg_drake.apps.arguments import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from burg_drake.simulation.settle_scene import SettledScene
 
 DEFAULT_TIME_LIMIT = 10.0
@@ -29,7 +28,7 @@ DEFAULT_TIME_LIMIT = 10.0
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "scene", "show, validate and settle scenes")
+    group = add_group(verbs, "scene", "show, validate, settle and import scenes")
     show = add_verb(
         group,
         "show",
@@ -53,6 +52,7 @@ def add_to(verbs: Any) -> None:
     add_scene(validate)
     add_station(validate)
     _add_settle(group)
+    scene_import.add_to(group)
 
 
 def _add_settle(group: Any) -> None:
@@ -136,6 +136,7 @@ def run_validate(arguments: argparse.Namespace) -> int:
 
 def run_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
+    from burg_drake.apps.scene_file import require_another_file
     from burg_drake.scene.scene import load_scene
     from burg_drake.simulation.settle_scene import settle_scene
     from burg_drake.station.check import check_scene
@@ -143,7 +144,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     from burg_drake.station.station import load_station
 
     scene = load_scene(arguments.scene)
-    _require_another_file(scene.path, arguments.output)
+    require_another_file(scene.path, arguments.output)
     station = load_station(arguments.station)
     settled = settle_scene(
         scene,
@@ -166,30 +167,17 @@ def run_settle(arguments: argparse.Namespace) -> int:
     return 1 if faults else 0
 
 
-def _require_another_file(scene: Path, output: str) -> None:
-    """Refuses to write over the scene that is read."""
-    from pathlib import Path
-
-    from burg_drake.core.errors import InvalidInputError
-
-    if Path(output).resolve() == scene.resolve():
-        raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
-
-
 def _write_settled(settled: SettledScene, output: str) -> None:
     """Writes a scene so that its library is found from there, too."""
     import dataclasses
     from pathlib import Path
 
-    from burg_drake.core.resources import builtin_names
-    from burg_drake.evaluation.run_document import portable_reference
+    from burg_drake.apps.scene_file import library_reference
     from burg_drake.scene.scene import save_scene
 
-    path, document = Path(output), settled.scene.document
-    if document.library not in builtin_names("models"):
-        library = portable_reference(settled.scene.library.root, path.parent)
-        document = dataclasses.replace(document, library=library)
-    save_scene(document, path)
+    path, scene = Path(output), settled.scene
+    library = library_reference(scene.document.library, scene.library, path.parent)
+    save_scene(dataclasses.replace(scene.document, library=library), path)
 
 
 def _print_displacements(settled: SettledScene) -> None:

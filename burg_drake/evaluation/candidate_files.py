@@ -1,47 +1,210 @@
-"""Reads the grasps that a run judges from files."""
+"""Reads the grasps that a run judges from files, ours and those of other projects."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core.errors import UnknownNameError, nearest
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidates import INSTANCE, Candidates
+from burg_drake.evaluation.candidates import INSTANCE
+from burg_drake.evaluation.instance_names import InstanceNames
+from burg_drake.evaluation.placement import Names, by_instance, held_instances
+from burg_drake.formats.conversion import with_objects_renamed
+from burg_drake.formats.grasp_files import read_grasp_file
+from burg_drake.formats.grasp_format import PANDA, Frame, Gripper
 from burg_drake.scene.scene import Scene
 
+OBJECT_ID, SCENE_ID = "object_id", "scene_id"
+"""Columns by which files of several objects, or of several scenes, tell theirs apart."""
+NO_OBJECT = -1
+"""Object id of grasps of which it is not known."""
 
-def read_grasps(scene: Scene, path: str | Path) -> dict[str, GraspSet]:
-    """Reads a grasp file for `given_candidates`.
+
+@dataclass(frozen=True)
+class GivenGrasps:
+    """What was read of a file.
+
+    Attributes:
+        by_instance: grasps in the object frame by name of an instance, for `given_candidates`.
+        notes: what of the file was left behind or changed, one sentence each.
+    """
+
+    by_instance: dict[str, GraspSet]
+    notes: tuple[str, ...] = ()
+
+
+def read_grasps(
+    scene: Scene,
+    path: str | Path,
+    gripper: Gripper = PANDA,
+    *,
+    format: str | None = None,
+    objects: Mapping[str, str] | None = None,
+    frame: Frame | None = None,
+    X_SF: Array | None = None,
+    object_ids: Mapping[int, str] | None = None,
+    scene_id: str | None = None,
+) -> GivenGrasps:
+    """Reads a grasp file and gives each grasp to an instance of the scene.
+
+    Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
+    are measured in the frame of their object go to every instance of it. Those that are measured
+    in one frame for all, a camera's or a world's, go to the instance that they hold; see
+    `placement.held_instances`.
 
     Args:
         scene: the scene.
-        path: grasps.npz of a run, whose grasps stay on their instances; or any other file of a
-            `GraspSet`, whose grasps go to every instance of their object.
+        path: a file of any format in `formats.grasp_files`.
+        gripper: the hand that the grasps are for.
+        format: of the file; None to tell by the content.
+        objects: names of the scene's objects, or of its instances, by the names that the file has;
+            a name by the empty text is for all grasps.
+        frame: what the poses are measured in, in place of what the format says.
+        X_SF: (4, 4) pose of the file's camera, or of its world, in the scene frame; a world is the
+            scene frame if None.
+        object_ids: names of instances by the file's object ids.
+        scene_id: the one to take of a file of several scenes.
 
     Raises:
-        InvalidInputError: the file is something else.
-        UnknownNameError: grasps of an object or on an instance that the scene does not have.
+        InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
+        UnknownNameError: an object, instance or scene that is not there.
     """
-    grasps = GraspSet.load(path)
-    if INSTANCE in grasps.columns:
-        return _of_run(Candidates.load(Path(path)))
-    objects = {name: scene.instance(name).object for name in scene.instances}
-    unknown = sorted(set(grasps.object.tolist()) - set(objects.values()))
-    if unknown:
-        raise UnknownNameError(
-            f"{path} has grasps of object {unknown[0]!r}, which is not in scene {scene.name!r};"
-            f" {nearest(unknown[0], set(objects.values()))}"
+    imported = read_grasp_file(path, format, gripper)
+    names = InstanceNames(scene, str(path), dict(objects or {}))
+    grasps = _of_one_scene(imported.grasps, scene_id, names.path)
+    frame = frame or imported.frame
+    if frame == "object":
+        if X_SF is not None or object_ids:
+            raise InvalidInputError(
+                f"{path} has grasps in the frames of their objects, to which neither a pose nor"
+                " object ids apply"
+            )
+        if INSTANCE in grasps.columns and not objects:
+            return GivenGrasps(_of_instances(grasps), imported.notes)
+        return GivenGrasps(_of_objects(grasps, names), imported.notes)
+    if frame == "camera" and X_SF is None:
+        raise InvalidInputError(
+            f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
+            " (--camera-pose)"
         )
-    members = {name: grasps.object == object for name, object in objects.items()}
-    return {name: grasps.select(mask) for name, mask in members.items() if mask.any()}
+    X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
+    owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
+    placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
+    return GivenGrasps(placed, (*imported.notes, *notes))
 
 
-def _of_run(candidates: Candidates) -> dict[str, GraspSet]:
-    """The grasps by instance, each set with its own provenance."""
-    parts = candidates.grasps.provenance.get("parts", {})
-    sets = {}
-    for name in dict.fromkeys(candidates.instance.tolist()):
-        chosen = candidates.grasps.select(candidates.instance == name)
-        sets[name] = dataclasses.replace(chosen, provenance=parts.get(name, {}))
-    return sets
+def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet:
+    """The grasps of one scene of the file."""
+    if SCENE_ID not in grasps.columns:
+        if scene_id is not None:
+            raise InvalidInputError(f"{path} has no scene ids; leave out --scene-id")
+        return grasps
+    ids = grasps.columns[SCENE_ID].astype(str)
+    known = sorted(set(ids.tolist()))
+    if scene_id is None:
+        if len(known) > 1:
+            raise InvalidInputError(
+                f"{path} has grasps of {len(known)} scenes; choose one of them (--scene-id):"
+                f" {listing(known)}"
+            )
+        return grasps
+    if scene_id not in known:
+        raise UnknownNameError(f"{path} has no scene {scene_id!r}; {nearest(scene_id, known)}")
+    return grasps.select(ids == scene_id)
+
+
+def _of_instances(grasps: GraspSet) -> dict[str, GraspSet]:
+    """Grasps of a file that names instances, each set with its own provenance."""
+    owner = grasps.columns[INSTANCE]
+    parts = grasps.provenance.get("parts", {})
+    parts = parts if isinstance(parts, Mapping) else {}
+    rest = _without_instance(grasps)
+    return {
+        name: dataclasses.replace(rest.select(owner == name), provenance=parts.get(name, {}))
+        for name in dict.fromkeys(owner.tolist())
+    }
+
+
+def _of_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
+    """Grasps in object frames by instance, in the scene's order."""
+    foreign = sorted(set(grasps.object.tolist()))
+    names.require_used(foreign)
+    sets: dict[str, list[GraspSet]] = {name: [] for name in names.scene.instances}
+    for name in foreign:
+        chosen = _without_instance(grasps.select(grasps.object == name))
+        for instance in names.of_object(name):
+            object = names.scene.instance(instance).object
+            sets[instance].append(with_objects_renamed(chosen, {name: object}))
+    return {
+        name: parts[0] if len(parts) == 1 else GraspSet.concatenate(parts)
+        for name, parts in sets.items()
+        if parts
+    }
+
+
+def _owners(
+    grasps: GraspSet,
+    X_SG: Array,
+    names: InstanceNames,
+    object_ids: Mapping[int, str],
+    gripper: Gripper,
+) -> tuple[Names, tuple[str, ...]]:
+    """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and notes about it."""
+    names.require_used([""])
+    among = names.of_object("") if names.given else None
+    owner = _told(grasps, names, object_ids)
+    open_ = owner == ""
+    owner[open_], held = held_instances(names.scene, X_SG[open_], gripper, among)
+    missed = int((~held).sum())
+    if not missed:
+        return owner.astype(str), ()
+    if missed == len(X_SG):
+        raise InvalidInputError(
+            f"none of the {missed} grasps of {names.path} has an object of scene"
+            f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
+            " of the camera or workspace (--camera-pose)?"
+        )
+    return owner.astype(str), (
+        f"{missed} of {len(X_SG)} grasps have no object between their fingers; they are given to"
+        " the one with the nearest surface.",
+    )
+
+
+def _told(
+    grasps: GraspSet, names: InstanceNames, object_ids: Mapping[int, str]
+) -> NDArray[np.object_]:
+    """(N,) instances that object ids tell; empty texts where they do not."""
+    told = np.full(len(grasps), "", dtype=object)
+    if not object_ids:
+        return told
+    if OBJECT_ID not in grasps.columns:
+        raise InvalidInputError(f"{names.path} has no object ids; leave out --object-ids")
+    ids = grasps.columns[OBJECT_ID]
+    unknown = sorted(set(ids.tolist()) - {*object_ids, NO_OBJECT})
+    if unknown:
+        raise InvalidInputError(
+            f"{names.path} has grasps of object id {unknown[0]}, which --object-ids does not name;"
+            f" it has {', '.join(f'{number}={name}' for number, name in object_ids.items())}"
+        )
+    for number, name in object_ids.items():
+        instance, *others = names.called(name)
+        if others:
+            raise InvalidInputError(
+                f"object id {number} is given as {name!r}, of which scene {names.scene.name!r}"
+                f" has several: {', '.join((instance, *others))}; name one of them"
+            )
+        told[ids == number] = instance
+    return told
+
+
+def _without_instance(grasps: GraspSet) -> GraspSet:
+    """The same grasps without the column that candidates have in their own way."""
+    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
+    return dataclasses.replace(grasps, columns=columns)

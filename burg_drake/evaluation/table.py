@@ -22,6 +22,10 @@ and what makes any row, wherever it is copied to, a trial that can be executed a
     X_OG                      grasp frame in the object frame: the upper three rows of the matrix,
                               bit for bit, which a quaternion is not
 
+and, for grasps that were given, whatever else came with them:
+
+    given_NAME                column NAME of their file, such as the label or confidence of others
+
 The column `run` leads from a results file on its own to the run.yaml with the same `hash`, which
 has the hashes of objects and grasps, too. Parquet files carry it along.
 
@@ -52,6 +56,8 @@ CPU_COLUMNS = {
     Stage.REACHABLE: "cpu_reach",
     Stage.EXECUTED: "cpu_trial",
 }
+GIVEN = "given_"
+"""Columns that came with the grasps begin with this."""
 TEXT = (
     *("id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine", "run"),
     *ORIGIN_TEXT,
@@ -78,6 +84,7 @@ def make_columns(
         joints: number of the arm's joints, 0 without an arm.
     """
     grasps = candidates.grasps
+    judged = [i for i, id in enumerate(candidates.id) if id in verdicts]
     trials = [
         Trial(
             id=candidates.id[i],
@@ -88,10 +95,10 @@ def make_columns(
             score=float(grasps.score[i]),
             verdict=verdicts[candidates.id[i]],
         )
-        for i in range(len(candidates))
-        if candidates.id[i] in verdicts
+        for i in judged
     ]
-    return trial_columns(trials, origin, instances=instances, joints=joints)
+    columns = trial_columns(trials, origin, instances=instances, joints=joints)
+    return columns | {GIVEN + name: _plain(v[judged]) for name, v in grasps.columns.items()}
 
 
 def trial_columns(
@@ -138,6 +145,11 @@ def trial_columns(
 def table_row(columns: Columns, index: int) -> dict[str, Any]:
     """One row as Python values by column."""
     return {name: values[index].item() for name, values in columns.items()}
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    """Truth values as 1 and 0, which every reader takes for numbers."""
+    return values.astype(np.int64) if values.dtype.kind == "b" else values
 
 
 def _texts(values: Sequence[str]) -> NDArray[Any]:

@@ -22,23 +22,20 @@ of github.com/mrudorfer/jogramop-framework:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
-import yaml
-
-from burg_drake.core.errors import DocumentError, InvalidInputError, nearest
+from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import check_pose
-from burg_drake.core.reader import Reader
 from burg_drake.core.schema import Pose
 from burg_drake.core.yaml_nodes import load_nodes
+from burg_drake.formats.burg_document import BurgReader, Matrix, relocated
 
 FILE_TYPE = "ObjectLibrary"
 FILE_VERSION = "1.0"
-
-Row = tuple[float, float, float, float]
-Matrix = tuple[Row, Row, Row, Row]
+HINTS = {"Scene": "give the object library that the scene names as object_library_fn"}
+"""What to do about other files of BURG-Toolkit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,33 +166,6 @@ class _Document:
     description: str | None = None
 
 
-@dataclass
-class _BurgReader(Reader):
-    """Leaves aside keys that the schema lacks, and remembers where objects begin."""
-
-    name: str
-    notes: list[str] = field(default_factory=list)
-    lines: list[int] = field(default_factory=list)
-
-    def read_dataclass(self, node: yaml.Node, kind: type, where: str) -> Any:
-        known = kind.__dataclass_fields__  # type: ignore[attr-defined]
-        if isinstance(node, yaml.MappingNode):
-            pairs = []
-            for key, (key_node, value) in self.entries(node, where).items():
-                if key in known:
-                    pairs.append((key_node, value))
-                    continue
-                place = f" {where}:" if where else ""
-                self.notes.append(
-                    f"{self.name}:{key_node.start_mark.line + 1}:{place} key {key!r} was left"
-                    f" aside; {nearest(key, known)}"
-                )
-            node = yaml.MappingNode(node.tag, pairs, node.start_mark, node.end_mark)
-        if kind is _Object:
-            self.lines.append(node.start_mark.line + 1)
-        return super().read_dataclass(node, kind, where)
-
-
 def read_burg_library(path: str | Path) -> BurgLibrary:
     """Reads an object library of BURG-Toolkit.
 
@@ -213,11 +183,12 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
     if path.is_dir():
         path = path / "object_library.yaml"
     node = load_nodes(path)
-    reader = _BurgReader(str(path))
-    _check_kind(reader, node)
+    reader = BurgReader(str(path))
+    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "an object library", HINTS)
     document = cast(_Document, reader.read(node, _Document, ""))
+    lines = reader.item_lines(node, "objects")
     first: dict[str, int] = {}
-    for i, (item, line) in enumerate(zip(document.objects, reader.lines, strict=True)):
+    for i, (item, line) in enumerate(zip(document.objects, lines, strict=True)):
         if item.identifier in first:
             raise DocumentError(
                 f"{path}:{line}: objects[{i}].identifier: {item.identifier!r} is taken by the"
@@ -230,30 +201,10 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
         description=document.description or "",
         objects=tuple(
             _burg_object(item, path.parent, line)
-            for item, line in zip(document.objects, reader.lines, strict=True)
+            for item, line in zip(document.objects, lines, strict=True)
         ),
         notes=tuple(reader.notes),
     )
-
-
-def _check_kind(reader: _BurgReader, node: yaml.Node) -> None:
-    entries = reader.entries(node, "")
-    for key, expected in (("yaml_file_type", FILE_TYPE), ("yaml_file_version", FILE_VERSION)):
-        if key not in entries:
-            raise reader.fail(
-                node,
-                key,
-                "missing; if this is an object library of an early BURG-Toolkit, which did not"
-                f" write it, add the lines 'yaml_file_type: {FILE_TYPE}' and"
-                f" 'yaml_file_version: \"{FILE_VERSION}\"'",
-            )
-        value = entries[key][1]
-        given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
-        if given != expected:
-            hint = ""
-            if given == "Scene":
-                hint = "; give the object library that the scene names as object_library_fn"
-            raise reader.fail(value, key, f"{given!r} cannot be read; expected {expected!r}{hint}")
 
 
 def _burg_object(item: _Object, folder: Path, line: int) -> BurgObject:
@@ -262,7 +213,7 @@ def _burg_object(item: _Object, folder: Path, line: int) -> BurgObject:
     return BurgObject(
         identifier=item.identifier,
         name=item.name or item.identifier,
-        mesh=cast(Path, _path(item.mesh_fn, folder)),
+        mesh=cast(Path, relocated(item.mesh_fn, folder)),
         scale=1.0 if item.scale is None else item.scale,
         mass=item.mass or None,
         friction=item.friction_coeff or None,
@@ -270,25 +221,8 @@ def _burg_object(item: _Object, folder: Path, line: int) -> BurgObject:
             BurgStablePose(probability=p, X_SO=Pose.from_matrix(X_SO, quaternion=True))
             for p, X_SO in sorted(recorded, key=lambda pair: -pair[0])
         ),
-        thumbnail=_path(item.thumbnail_fn, folder),
-        urdf=_path(item.urdf_fn, folder),
-        vhacd=_path(item.vhacd_fn, folder),
+        thumbnail=relocated(item.thumbnail_fn, folder),
+        urdf=relocated(item.urdf_fn, folder),
+        vhacd=relocated(item.vhacd_fn, folder),
         line=line,
     )
-
-
-def _path(given: str | None, folder: Path) -> Path | None:
-    """A file of the library; where it is not, the longest end of its path that there is.
-
-    A library that was moved without what lay outside of its folder, or that names files of another
-    machine, still finds `/home/someone/library/meshes/mug.obj` as `meshes/mug.obj`.
-    """
-    if not given:
-        return None
-    parts = given.replace("\\", "/")
-    named = folder / parts
-    if named.exists():
-        return named
-    names = [name for name in parts.split("/") if name not in ("", ".", "..")]
-    ends = (folder.joinpath(*names[i:]) for i in range(len(names)))
-    return next((end for end in ends if end.is_file()), named)

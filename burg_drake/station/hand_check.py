@@ -41,11 +41,20 @@ class HandFigures:
 
     Attributes:
         opening: smallest and largest distance between the pads [m].
-        pad_size: extents of the first pad in the grasp frame G [m].
+        pad_bounds: smallest and largest coordinates of the first pad of the closed hand in the
+            grasp frame G [m].
+        pad_modulus: hydroelastic modulus of the first pad [Pa].
     """
 
     opening: tuple[float, float]
-    pad_size: tuple[float, float, float]
+    pad_bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    pad_modulus: float
+
+    @property
+    def pad_size(self) -> tuple[float, float, float]:
+        """Extents of the first pad in G [m]."""
+        (x0, y0, z0), (x1, y1, z1) = self.pad_bounds
+        return x1 - x0, y1 - y0, z1 - z0
 
 
 def check_hand(hand: Hand, path: Path, document: Path | None = None) -> HandFigures:
@@ -76,8 +85,16 @@ def _check(hand: Hand, path: Path, content: str) -> HandFigures:
     largest, smallest = bench.check_opening("open"), bench.check_opening("closed")
     bench.check_approach()
     bench.check_coupling()
-    size = np.ptp(bench.bounds(0), axis=0)
-    return HandFigures((smallest, largest), (float(size[0]), float(size[1]), float(size[2])))
+    low, high = bench.bounds(0)
+    bounds = (
+        (float(low[0]), float(low[1]), float(low[2])),
+        (
+            float(high[0]),
+            float(high[1]),
+            float(high[2]),
+        ),
+    )
+    return HandFigures((smallest, largest), bounds, bench.pad_modulus())
 
 
 class _Bench:
@@ -210,6 +227,11 @@ class _Bench:
         X_GB = inverse(self._hand.X_HG.matrix()) @ X_HB.GetAsMatrix4()
         p_GV = self._points(X_GB, self._model.pads[index])
         return np.stack([p_GV.min(axis=0), p_GV.max(axis=0)])
+
+    def pad_modulus(self) -> float:
+        """Hydroelastic modulus of the first pad [Pa]."""
+        properties = self._inspector.GetProximityProperties(self._model.pads[0])
+        return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
 
     def _points(self, X_GB: Array, geometry: GeometryId) -> Array:
         """(N, 3) corners of a geometry of body B in G [m]; those of the smallest box about it if it

@@ -133,19 +133,20 @@ def test_grasps_of_a_run_stay_on_their_instances(
 ) -> None:
     sampled = sample_candidates(posed(scene, right=(90, 0, 0)), station, 5, seed=0)
     sampled.save(tmp_path / "grasps.npz")
-    back = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.npz"))
+    back = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.npz").by_instance)
     assert back.id == sampled.id and back.content == sampled.content
     assert back.grasps.provenance == sampled.grasps.provenance
     given_candidates(scene, {}).save(tmp_path / "none.npz")
-    assert read_grasps(scene, tmp_path / "none.npz") == {}
+    assert read_grasps(scene, tmp_path / "none.npz").by_instance == {}
     with pytest.raises(UnknownNameError, match="'left', which is not a free instance"):
-        given_candidates(only(scene, "bar"), read_grasps(scene, tmp_path / "grasps.npz"))
+        back = read_grasps(scene, tmp_path / "grasps.npz").by_instance
+        given_candidates(only(scene, "bar"), back)
 
 
 def test_other_grasps_go_to_all_instances_of_their_object(tmp_path: Path, scene: Scene) -> None:
     X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]])
     GraspSet.create(X_OG, object="cube").save(tmp_path / "cube.npz")
-    given = given_candidates(scene, read_grasps(scene, tmp_path / "cube.npz"))
+    given = given_candidates(scene, read_grasps(scene, tmp_path / "cube.npz").by_instance)
     assert given.instance.tolist() == ["left", "left", "right", "right"]
     GraspSet.create(X_OG, object="cub").save(tmp_path / "cub.npz")
     with pytest.raises(UnknownNameError, match=r"cub.npz has grasps of object 'cub', .* 'cube'"):

@@ -188,7 +188,7 @@ def test_given_grasps_are_reproduced_from_the_run(
     cubes = GraspSet.create(poses, object="cube")
     given = {"right": cubes.select([1]), "left": cubes.select([0])}
     run = evaluate(scene, station, tmp_path / "run", grasps=given, workers=1, progress=False)
-    back = read_grasps(scene, run.path / "grasps.npz")
+    back = read_grasps(scene, run.path / "grasps.npz").by_instance
     again = evaluate(scene, station, tmp_path / "again", grasps=back, workers=1, progress=False)
     assert same_results(run, again) and len(again.candidates) == 2
     assert evaluate(scene, station, run.path, grasps=back, progress=False).complete  # the same run

@@ -1,0 +1,30 @@
+"""What verbs share that write scene files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from burg_drake.core.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.objects.library import ObjectLibrary
+
+
+def require_another_file(scene: Path, output: str) -> None:
+    """Refuses to write over the scene that is read.
+
+    Raises:
+        InvalidInputError: the files are one.
+    """
+    if Path(output).resolve() == scene.resolve():
+        raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
+
+
+def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
+    """How a scene file in `folder` refers to a library so that it is found from there: the name of
+    a built-in one, else package:// or the relative path."""
+    from burg_drake.core.resources import builtin_names
+    from burg_drake.evaluation.run_document import portable_reference
+
+    return given if given in builtin_names("models") else portable_reference(library.root, folder)

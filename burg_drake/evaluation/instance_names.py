@@ -1,0 +1,86 @@
+"""Which instances of a scene the names in a grasp file stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class InstanceNames:
+    """Names of a grasp file and the instances that are meant.
+
+    Attributes:
+        scene: has the instances.
+        path: the file, for messages.
+        given: names of the scene's objects or instances by the file's names; by the empty text for
+            whatever the file has.
+    """
+
+    scene: Scene
+    path: str
+    given: Mapping[str, str]
+
+    def require_used(self, foreign: Collection[str]) -> None:
+        """Refuses names for what the file does not have.
+
+        Args:
+            foreign: names in the file.
+
+        Raises:
+            UnknownNameError: one of `given` is not among them.
+            InvalidInputError: one name is given for several.
+        """
+        names = [name for name in foreign if name]
+        for name in self.given:
+            if name and name not in names:
+                known = nearest(name, names) if names else "it names no objects"
+                raise UnknownNameError(f"{self.path} has no grasps of object {name!r}; {known}")
+        if "" in self.given and len(foreign) > 1:
+            raise InvalidInputError(
+                f"{self.path} has grasps of {len(foreign)} objects ({listing(names)}); say which"
+                " is which (--grasps-object THEIRS=OURS)"
+            )
+
+    def of_object(self, foreign: str) -> list[str]:
+        """The free instances that grasps of an object of the file are for.
+
+        Raises:
+            InvalidInputError: the file does not name the object, and nobody else does.
+            UnknownNameError: the scene has no such object.
+        """
+        meant = self.given.get(foreign, self.given.get(""))
+        if meant is not None:
+            return self.called(meant)
+        known = {instance.object for instance in self.scene.instances.values()}
+        if not foreign:
+            raise InvalidInputError(
+                f"{self.path} does not say which object its grasps are of; name it"
+                f" (--grasps-object); scene {self.scene.name!r} has {listing(sorted(known))}"
+            )
+        if foreign not in known:
+            raise UnknownNameError(
+                f"{self.path} has grasps of object {foreign!r}, which is not in scene"
+                f" {self.scene.name!r}; say which one it is (--grasps-object {foreign}=NAME);"
+                f" {nearest(foreign, known)}"
+            )
+        return self.called(foreign)
+
+    def called(self, name: str) -> list[str]:
+        """All free instances of an object, or else the one of that name.
+
+        Raises:
+            UnknownNameError: there are none.
+        """
+        instances = self.scene.instances
+        found = [key for key, instance in instances.items() if instance.object == name]
+        found = found or [key for key in instances if key == name]
+        if not found:
+            known = {*instances, *(instance.object for instance in instances.values())}
+            raise UnknownNameError(
+                f"scene {self.scene.name!r} has no free object {name!r}; {nearest(name, known)}"
+            )
+        return found

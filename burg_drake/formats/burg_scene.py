@@ -1,0 +1,140 @@
+"""Reads the scenes of BURG-Toolkit: `yaml_file_type: Scene`, version 1.0.
+
+What such a file looks like was taken from what writes it, `Scene.to_yaml` in burg_toolkit/core.py
+(github.com/mrudorfer/burg-toolkit), and from those that it wrote, scenarios/*/scene.yaml of
+github.com/mrudorfer/jogramop-framework:
+
+- The ground area extends from the origin to (ground_area_x, ground_area_y) in the plane z = 0, z
+  up. That is our scene frame S on a board of that size.
+- `objects` are free, `bg_objects` are fixed. Each has the identifier of its type in the object
+  library, and the pose (4, 4) of the type's mesh after scaling. There are no names of instances.
+- `object_library_fn` leads to the library, relative to the scene; null if it was not told.
+- `printout` has the size and the markers of the printed board, or null. Ours are other ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import yaml
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.core.yaml_nodes import load_nodes
+from burg_drake.formats.burg_document import BurgReader, Matrix, relocated
+from burg_drake.formats.rigid import nearest_rigid
+
+FILE_TYPE = "Scene"
+FILE_VERSION = "1.0"
+HINTS = {"ObjectLibrary": "give the scene; for a library there is `burg-drake library import-burg`"}
+"""What to do about other files of BURG-Toolkit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BurgInstance:
+    """An object in a scene of BURG-Toolkit.
+
+    Attributes:
+        object_type: identifier in the object library.
+        X_SO: pose of its scaled mesh in the scene.
+        line: where it begins in the document.
+    """
+
+    object_type: str
+    X_SO: Pose
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class BurgScene:
+    """A scene of BURG-Toolkit.
+
+    Attributes:
+        path: the document.
+        ground_area: extents along x and y [m].
+        objects: free objects, in the document's order.
+        bg_objects: fixed objects.
+        library: the object library's document; it need not exist. None if the scene names none.
+        notes: what in the document was left aside or changed, one sentence each.
+    """
+
+    path: Path
+    ground_area: tuple[float, float]
+    objects: tuple[BurgInstance, ...]
+    bg_objects: tuple[BurgInstance, ...]
+    library: Path | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Instance:
+    """Schema of an instance."""
+
+    object_type: str
+    pose: Matrix
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Document:
+    """Schema of the file, without the printout."""
+
+    yaml_file_type: str
+    yaml_file_version: str
+    ground_area_x: float
+    ground_area_y: float
+    objects: tuple[_Instance, ...]
+    bg_objects: tuple[_Instance, ...] = ()
+    object_library_fn: str | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.ground_area_x, self.ground_area_y) <= 0.0:
+            raise InvalidInputError(
+                f"the ground area is {self.ground_area_x:g} x {self.ground_area_y:g} m;"
+                " both sides must be above 0"
+            )
+
+
+def read_burg_scene(path: str | Path) -> BurgScene:
+    """Reads a scene of BURG-Toolkit.
+
+    Returns:
+        Its contents. Keys that version 1.0 does not have are left aside, with a note.
+
+    Raises:
+        DocumentError: it is no such file or of another version, or a value cannot be used; the
+            message names file, line and key.
+        InvalidInputError: a pose is no rigid transform; the message names file and line.
+    """
+    path = Path(path)
+    node = load_nodes(path)
+    reader = BurgReader(str(path), skipped=("printout",))
+    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "a scene", HINTS)
+    document = cast(_Document, reader.read(node, _Document, ""))
+    notes = reader.notes
+    printout = reader.entries(node, "").get("printout")
+    if printout is not None and isinstance(printout[1], yaml.MappingNode):
+        notes.append(
+            f"{path}:{printout[0].start_mark.line + 1}: the printout was left aside; markers of"
+            " BURG-Toolkit's boards are not ours"
+        )
+    placed = {}
+    for key in ("objects", "bg_objects"):
+        items = zip(getattr(document, key), reader.item_lines(node, key), strict=True)
+        placed[key] = tuple(_instance(item, str(path), line, notes) for item, line in items)
+    return BurgScene(
+        path=path,
+        ground_area=(document.ground_area_x, document.ground_area_y),
+        objects=placed["objects"],
+        bg_objects=placed["bg_objects"],
+        library=relocated(document.object_library_fn, path.parent),
+        notes=tuple(notes),
+    )
+
+
+def _instance(item: _Instance, path: str, line: int, notes: list[str]) -> BurgInstance:
+    (X_SO,), rounded = nearest_rigid([item.pose], f"{path}:{line}: pose of {item.object_type!r}")
+    notes += rounded
+    pose = Pose.from_matrix(X_SO, quaternion=True)
+    return BurgInstance(object_type=item.object_type, X_SO=pose, line=line)

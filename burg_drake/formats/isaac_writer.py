@@ -1,0 +1,87 @@
+"""Writes documents in `isaac_grasp` YAML; see `isaac_reader`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core.files import atomic_write
+from burg_drake.core.frames import Array, quaternion_from_rotation
+from burg_drake.core.grasps import GraspSet
+from burg_drake.formats.grasp_format import Gripper
+from burg_drake.formats.isaac_reader import CLOSED, NAME, OPEN, PREGRASP_WIDTH, Frame
+from burg_drake.formats.left_behind import left_behind
+
+
+def write_yaml(
+    grasps: GraspSet, path: Path, gripper: Gripper, frame: Frame, header: Sequence[str]
+) -> tuple[str, ...]:
+    """Writes a file; returns what it cannot carry.
+
+    Args:
+        grasps: of one object.
+        path: the file.
+        gripper: the hand of the grasps.
+        frame: the pose in G of what the file's poses are those of.
+        header: lines above the grasps; without any, joints are not written either.
+    """
+    X_OF = grasps.X_OG @ frame(gripper)
+    q = quaternion_from_rotation(X_OF[:, :3, :3])
+    closed = gripper.positions(grasps.width)
+    opening = grasps.columns.get(PREGRASP_WIDTH, np.full(len(grasps), gripper.opening[1]))
+    opened = gripper.positions(opening)
+    joints = bool(header)
+    lines = ["format: isaac_grasp", "format_version: 1.0", *header, "grasps:"]
+    for i, name in enumerate(_names(grasps)):
+        score = grasps.score[i]
+        confidence = ".nan" if np.isnan(score) else _text(score)
+        lines += [
+            f"  {json.dumps(name)}:",
+            f"    confidence: {confidence}",
+            f"    position: {_list(X_OF[i, :3, 3])}",
+            f"    orientation: {{w: {_text(q[i, 0])}, xyz: {_list(q[i, 1:])}}}",
+        ]
+        if joints and not np.isnan(grasps.width[i]):
+            lines += [f"    {CLOSED}:"]
+            lines += [f"      {joint}: {_text(p[i])}" for joint, p in closed.items()]
+        if joints and not np.isnan(opening[i]):
+            lines += [f"    {OPEN}:"]
+            lines += [f"      {joint}: {_text(p[i])}" for joint, p in opened.items()]
+    atomic_write(path, "\n".join(lines) + "\n")
+    return _notes(grasps, joints)
+
+
+def _notes(grasps: GraspSet, joints: bool) -> tuple[str, ...]:
+    notes = []
+    known = grasps.score[~np.isnan(grasps.score)]
+    if len(known) < len(grasps):
+        notes.append(f"confidence is .nan for {len(grasps) - len(known)} grasps without a score.")
+    if len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
+        notes.append(
+            f"confidence is meant to be from 0 to 1; the scores reach from {known.min():.3g} to"
+            f" {known.max():.3g}."
+        )
+    carried = ["score", NAME, *(("object", "width", PREGRASP_WIDTH) if joints else ())]
+    return (*notes, *left_behind(grasps, carried, "isaac_grasp"))
+
+
+def _names(grasps: GraspSet) -> list[str]:
+    """Those that the grasps have, if they differ; else numbers."""
+    given = grasps.columns.get(NAME, np.array([], dtype=str))
+    names = [str(name) for name in given.tolist()]
+    if all(names) and len(set(names)) == len(grasps):
+        return names
+    return [f"grasp_{i}" for i in range(len(grasps))]
+
+
+def _list(values: Array) -> str:
+    return f"[{', '.join(map(_text, values))}]"
+
+
+def _text(value: float) -> str:
+    """A number that YAML 1.1 takes for one: `1e-05` would be text, `1.0e-05` is not."""
+    text = repr(float(value))
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text

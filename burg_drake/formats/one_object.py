@@ -1,0 +1,102 @@
+"""What formats share that hold the grasps of one object in one file, under its mesh's name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError, listing
+from burg_drake.core.frames import Array
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.formats.grasp_format import Gripper
+
+SUCCESS_COLUMN = "object_in_gripper"
+"""1 where the grasp holds its object, 0 where it does not, NaN if unknown."""
+
+HANDS = {"panda": "panda_hand", "franka_panda": "panda_hand"}
+"""Our hands by the names that other projects give them."""
+
+MESH_SUFFIXES = ("obj", "stl", "ply", "off", "dae", "glb", "gltf", "usd", "usda", "usdc", "usdz")
+
+
+def only_object(grasps: GraspSet, kind: str) -> str:
+    """The object that all grasps are of.
+
+    Raises:
+        InvalidInputError: there are none, or of several objects.
+    """
+    names = sorted(set(grasps.object.tolist()))
+    if not names:
+        raise InvalidInputError(f"there are no grasps to write; {kind} needs one at least")
+    if len(names) > 1:
+        raise InvalidInputError(
+            f"the grasps are of {len(names)} objects ({listing(names)}) and {kind} holds those of"
+            " one; choose one of them (--object), or name a folder, which gets one file an object"
+        )
+    return names[0]
+
+
+def object_name(file: str) -> str:
+    """What an object is called whose mesh or prim has this path, such as `meshes/Mug/1a2b.obj`."""
+    last = file.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+    stem, _, suffix = last.rpartition(".")
+    return stem if stem and suffix.lower() in MESH_SUFFIXES else last
+
+
+def description_of(grasps: GraspSet, name: str) -> dict[str, Any]:
+    """What a file that was read said of an object: `file`, `scale` and more; empty if unknown."""
+    return _find(grasps.provenance, name) or {}
+
+
+def _find(provenance: Mapping[str, Any], name: str) -> dict[str, Any] | None:
+    files = provenance.get("object_files")
+    if isinstance(files, Mapping) and isinstance(files.get(name), Mapping):
+        return dict(files[name])
+    for part in provenance.get("parts", ()):
+        if isinstance(part, Mapping) and (found := _find(part, name)):
+            return found
+    return None
+
+
+def success_of(grasps: GraspSet) -> Array:
+    """(N,) 1 for success, 0 for failure, NaN if unknown.
+
+    From the column `object_in_gripper`, or else from `outcome`, or else from scores if they are
+    nothing but 0 and 1.
+    """
+    if SUCCESS_COLUMN in grasps.columns:
+        return grasps.columns[SUCCESS_COLUMN].astype(float)
+    if "outcome" in grasps.columns:
+        outcome = grasps.columns["outcome"]
+        return np.where(outcome == "", np.nan, (outcome == Outcome.LIFTED.value).astype(float))
+    if np.isin(grasps.score[~np.isnan(grasps.score)], (0.0, 1.0)).all():
+        return grasps.score.copy()
+    return np.full(len(grasps), np.nan)
+
+
+def check_hand(given: str, gripper: Gripper, where: str) -> tuple[str, ...]:
+    """Compares what a file says of its hand; a note if the name tells nothing.
+
+    Raises:
+        InvalidInputError: the name is that of another hand.
+    """
+    known = HANDS.get(given, given)
+    if known == gripper.name:
+        return ()
+    if given in HANDS:
+        raise InvalidInputError(
+            f"{where}: the grasps are of hand {known!r} and were to be read as those of"
+            f" {gripper.name!r}; read them with the hand that they were made for"
+        )
+    return (f"{where}: {given!r} was taken for hand {gripper.name!r}.",)
+
+
+def scale_note(name: str, file: str, scale: float) -> str:
+    """What the scale of an object means for its grasps."""
+    return (
+        f"The grasps are those of {name!r} as {file!r} scaled by {scale:g}, in metres; they fit"
+        " an object of a library only if it was built at that size."
+    )

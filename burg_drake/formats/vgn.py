@@ -1,0 +1,202 @@
+"""VGN and GIGA: `grasps.csv`, a grasp with its simulated outcome in each line.
+
+From the sources of github.com/ethz-asl/vgn and github.com/UT-Austin-RPL/GIGA:
+
+- Columns scene_id, qx, qy, qz, qw, x, y, z, width, label (`write_grasp` in src/vgn/io.py). A data
+  set has one file for all of its scenes; `label` is 1 for a grasp that lifted something, else 0.
+- Poses are in the frame of the workspace, a cube of 6 finger depths, 0.3 m, with its origin in a
+  lower corner; the table is at z = 0.05 m (`ClutterRemovalSim` in src/vgn/simulation.py).
+- z is the approach and y the closing direction, as in Franka's hand frame. The fingers begin at
+  the origin and end `finger_depth`, 0.05 m, along z (`_gripper_lines` in src/vgn/vis.py;
+  `sample_grasp_point` in GIGA's scripts/generate_data_parallel.py puts the origin up to that far
+  above the surface). On the hand that is, on the robot, 0.065 m from the flange
+  (`ee_grasp_offset` in config/panda_grasp.yaml, marked there as to be checked), which would leave
+  0.048 m to our finger tips, and in simulation 0.022 m from the hand's centre of mass, which is
+  in a URDF outside of the repository. We take the 0.05 m that the grasps were sampled with.
+- `width` is the distance of the fingers after closing where the grasp lifted something, else
+  the hand's largest opening (`execute_grasp`).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import atomic_write
+from burg_drake.core.frames import (
+    Array,
+    inverse,
+    make_pose,
+    quaternion_from_rotation,
+    rot_z,
+    rotation_from_quaternion,
+)
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
+from burg_drake.formats.left_behind import left_behind
+
+QUATERNION, POSITION = ("qx", "qy", "qz", "qw"), ("x", "y", "z")
+COLUMNS = ("scene_id", *QUATERNION, *POSITION, "width", "label")
+NEEDED = (*QUATERNION, *POSITION)
+"""Of the columns; files of predictions may do without the others."""
+FINGER_DEPTH = 0.05
+"""From the origin of a grasp to the finger tips [m]."""
+UNIT = 1e-3
+"""A quaternion whose length is off by more is none."""
+
+
+def _X_GF(gripper: Gripper) -> Array:
+    return make_pose(rot_z(-np.pi / 2), (0.0, 0.0, gripper.tip - FINGER_DEPTH))
+
+
+def _recognises(path: Path) -> bool:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            header = next(csv.reader(stream), [])
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return False
+    return set(NEEDED) <= {name.strip() for name in header}
+
+
+def _read(path: Path, gripper: Gripper) -> Imported:
+    cells = _cells(path)
+    missing = [name for name in NEEDED if name not in cells]
+    if missing:
+        raise InvalidInputError(
+            f"{path} has no column {', '.join(missing)}; grasps of VGN have {','.join(COLUMNS)}"
+        )
+    xyzw = np.stack([_numbers(path, name, cells[name]) for name in QUATERNION], axis=-1)
+    length = np.linalg.norm(xyzw, axis=-1)
+    bad = ~(np.abs(length - 1.0) < UNIT)
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise InvalidInputError(
+            f"{path}:{i + 2}: qx, qy, qz, qw have length {length[i]:g}; a rotation has length 1"
+        )
+    p_VF = np.stack([_numbers(path, name, cells[name]) for name in POSITION], axis=-1)
+    X_VF = make_pose(rotation_from_quaternion(np.roll(xyzw, 1, axis=-1)), p_VF)
+    columns: dict[str, NDArray[Any]] = {
+        name: np.array(texts) if name == "scene_id" else _typed(texts)
+        for name, texts in cells.items()
+        if name not in (*NEEDED, "width")
+    }
+    width = _numbers(path, "width", cells["width"]) if "width" in cells else None
+    grasps = GraspSet.create(
+        X_VF @ inverse(_X_GF(gripper)),
+        object="",
+        width=width,
+        provenance={"format": FORMAT.name, "file": str(path)},
+        columns=columns,
+    )
+    return Imported(grasps, FORMAT.frame)
+
+
+def _cells(path: Path) -> dict[str, list[str]]:
+    """The texts of a CSV file by column."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            rows = [row for row in csv.reader(stream) if row]
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InvalidInputError(f"{path} is not a CSV file: {error}") from error
+    if not rows:
+        raise InvalidInputError(f"{path} is empty; grasps of VGN have {','.join(COLUMNS)}")
+    header = [name.strip() for name in rows[0]]
+    if len(set(header)) < len(header):
+        twice = next(name for name in header if header.count(name) > 1)
+        raise InvalidInputError(f"{path}:1: column {twice!r} is there twice")
+    for line, row in enumerate(rows[1:], 2):
+        if len(row) != len(header):
+            raise InvalidInputError(
+                f"{path}:{line}: has {len(row)} cells, the first line has {len(header)}"
+            )
+    return {name: [row[k].strip() for row in rows[1:]] for k, name in enumerate(header)}
+
+
+def _numbers(path: Path, name: str, texts: Sequence[str]) -> Array:
+    """A column of finite numbers; NaN is fine for a width."""
+    values = np.empty(len(texts))
+    for i, text in enumerate(texts):
+        try:
+            values[i] = float(text) if text or name != "width" else np.nan
+        except ValueError as error:
+            raise InvalidInputError(f"{path}:{i + 2}: {name} is {text!r}, not a number") from error
+    bad = np.isinf(values) | (np.isnan(values) & (name != "width"))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise InvalidInputError(f"{path}:{i + 2}: {name} is {texts[i]}; give a finite number")
+    return values
+
+
+def _typed(texts: Sequence[str]) -> NDArray[Any]:
+    """Numbers if all of the cells are, NaN for empty ones; else texts."""
+    try:
+        return np.array([float(text) if text else np.nan for text in texts])
+    except ValueError:
+        return np.array(texts)
+
+
+def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    notes = left_behind(grasps, ("width", "label", "outcome", "scene_id"), FORMAT.title)
+    X_VF = grasps.X_OG @ _X_GF(gripper)
+    xyzw = np.roll(quaternion_from_rotation(X_VF[:, :3, :3]), -1, axis=-1)
+    scene_id = grasps.columns.get("scene_id", np.full(len(grasps), path.stem))
+    label = _labels(grasps)
+    if label is None:
+        notes += ("No grasp has a label; these cells are empty.",)
+        label = [""] * len(grasps)
+    if np.isnan(grasps.width).any():
+        notes += (f"{int(np.isnan(grasps.width).sum())} grasps have no width; empty cells.",)
+    width = ["" if np.isnan(w) else w for w in grasps.width.tolist()]
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    numbers = np.column_stack([xyzw, X_VF[:, :3, 3]]).tolist()
+    for id, row, w, mark in zip(scene_id.tolist(), numbers, width, label, strict=True):
+        writer.writerow([id, *row, w, mark])
+    atomic_write(path, stream.getvalue())
+    return notes
+
+
+def _labels(grasps: GraspSet) -> list[Any] | None:
+    """1 for a success, 0 for a failure, an empty text where that is not known; None without any:
+    the label that came with the grasps, else the outcome of their trials."""
+    if "label" in grasps.columns:
+        return [_label(value) for value in grasps.columns["label"].tolist()]
+    if "outcome" in grasps.columns:
+        return [int(text == Outcome.LIFTED) if text else "" for text in grasps.columns["outcome"]]
+    return None
+
+
+def _label(value: Any) -> Any:
+    """Whole numbers without a decimal point, as VGN writes them; an empty text for NaN."""
+    if isinstance(value, str):
+        return value
+    if value != value:
+        return ""
+    return int(value) if float(value).is_integer() else value
+
+
+FORMAT = GraspFormat(
+    name="vgn",
+    title="VGN and GIGA",
+    suffixes=(".csv",),
+    frame="world",
+    source="github.com/ethz-asl/vgn, src/vgn/io.py",
+    carries=("width", "label", "scene_id"),
+    cannot_carry=("score", "names of objects", "further columns", "provenance"),
+    X_GF=_X_GF,
+    recognises=_recognises,
+    read=_read,
+    write=_write,
+)
+"""The format; see the module."""

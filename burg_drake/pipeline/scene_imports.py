@@ -1,0 +1,69 @@
+"""Scenes of other collections as scene documents: those of BURG-Toolkit."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from burg_drake.core.errors import UnknownNameError, nearest
+from burg_drake.formats.burg_scene import BurgInstance, BurgScene
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.pipeline.source import object_name
+from burg_drake.scene.scene import Board, Instance, SceneDocument
+
+
+def burg_scene_document(
+    scene: BurgScene, library: ObjectLibrary, name: str = "", reference: str = ""
+) -> SceneDocument:
+    """The scene document of a scene of BURG-Toolkit.
+
+    Objects are those that `pipeline.imports.burg_sources` makes of the scene's object library, by
+    `object_name(identifier)`. Instances have no names in BURG-Toolkit; they get those of their
+    objects, the second one of an object `NAME_2` and so on.
+
+    Args:
+        scene: from `formats.burg_scene.read_burg_scene`.
+        library: has the objects.
+        name: of the document; that of the scene's file if empty.
+        reference: how the document refers to the library; its folder if empty.
+
+    Raises:
+        UnknownNameError: the library lacks an object; the message names file and line.
+        InvalidInputError: an identifier makes no object name.
+    """
+    names = _Names(scene, library)
+    return SceneDocument(
+        name=name or scene.path.stem,
+        description=f"Imported from BURG-Toolkit's {scene.path.name}",
+        library=reference or str(library.root),
+        board=Board(size=scene.ground_area),
+        instances=tuple(names.instance(item) for item in scene.objects),
+        background=tuple(names.instance(item) for item in scene.bg_objects),
+    )
+
+
+class _Names:
+    """Finds objects, and gives names to their instances."""
+
+    def __init__(self, scene: BurgScene, library: ObjectLibrary) -> None:
+        self.scene = scene
+        self.library = library
+        self.count: Counter[str] = Counter()
+        self.taken = {self.object(item) for item in (*scene.objects, *scene.bg_objects)}
+
+    def object(self, item: BurgInstance) -> str:
+        name = object_name(item.object_type)
+        if name not in self.library.objects:
+            raise UnknownNameError(
+                f"{self.scene.path}:{item.line}: object {name!r} ({item.object_type!r}) is not in"
+                f" library {self.library.root}; {nearest(name, self.library.objects)}"
+            )
+        return name
+
+    def instance(self, item: BurgInstance) -> Instance:
+        object = self.object(item)
+        self.count[object] += 1
+        if self.count[object] == 1:
+            return Instance(object=object, X_SO=item.X_SO)
+        while f"{object}_{self.count[object]}" in self.taken:  # an object may be called mug_2
+            self.count[object] += 1
+        return Instance(name=f"{object}_{self.count[object]}", object=object, X_SO=item.X_SO)

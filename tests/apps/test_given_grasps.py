@@ -1,0 +1,123 @@
+"""`burg-drake evaluate --grasps` on files of other projects: from the file to the verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
+from burg_drake.evaluation.table_file import read_table
+from burg_drake.scene.scene import load_scene
+
+Capture = pytest.CaptureFixture[str]
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above: it lifts the box."""
+X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0.0, 0.0, -0.1))])
+"""And one 100 mm higher, in thin air."""
+OUTCOMES = ["lifted", "no_contact"]
+QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
+
+
+def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
+    """The results of evaluating on the built-in scene."""
+    options = ["-o", str(folder / "run"), *QUICK]
+    assert main(["evaluate", "tabletop_six", *arguments, *options]) == 0
+    return read_table(folder / "run" / "results.csv")
+
+
+def test_a_network_s_grasps_seen_by_a_camera(tmp_path: Path, capsys: Capture) -> None:
+    # the camera looks down on the board from 0.7 m; rows are written as graspnetAPI has them
+    p_SC = (0.3, 0.2, 0.7)
+    (tmp_path / "camera.yaml").write_text(f"translation: {list(p_SC)}\nrpy_deg: [180, 0, 30]\n")
+    X_SC = make_pose(rotation_from_rpy(np.deg2rad([180.0, 0.0, 30.0])), p_SC)
+    X_CG = np.linalg.inv(X_SC) @ load_scene("tabletop_six").X_SO("box") @ X_OG
+    rows = np.zeros((2, 17), dtype=np.float32)
+    rows[:, 0] = [0.9, 0.4]
+    rows[:, 1:4] = [0.07, 0.02, 0.03]
+    # x: approach, y: closing, z = x cross y; origin 30 mm before the tips, which are 9.5 mm past G
+    rows[:, 4:13] = X_CG[:, :3, [2, 0, 1]].reshape(2, 9)
+    rows[:, 13:16] = X_CG[:, :3, 3] + (0.0095 - 0.03) * X_CG[:, :3, 2]
+    rows[:, 16] = -1
+    np.save(tmp_path / "0000.npy", rows)
+    file, camera = str(tmp_path / "0000.npy"), str(tmp_path / "camera.yaml")
+    results = judged(tmp_path, "--grasps", file, "--camera-pose", camera, "--no-reach")
+    assert results["instance"].tolist() == ["box", "box"]
+    assert results["outcome"].tolist() == OUTCOMES
+    np.testing.assert_allclose(results["score"], [0.9, 0.4], rtol=1e-6)
+    np.testing.assert_allclose(results["given_depth"], 0.03, rtol=1e-6)
+    printed = capsys.readouterr().out
+    assert printed.startswith(
+        "note: 1 of 2 grasps have no object between their fingers; they are given to the one with"
+        " the nearest surface.\n"
+    )
+
+
+def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> None:
+    # as ACRONYM has them: the hand's base, 103.4 mm before G, x along the closing direction
+    path = tmp_path / "Box_3f2a_1.0.h5"
+    with h5py.File(path, "w") as file:
+        file["object/file"], file["object/scale"] = "meshes/Box/3f2a.obj", 1.0
+        file["gripper/type"] = "panda"
+        file["grasps/transforms"] = X_OG @ make_pose(p_AB=(0.0, 0.0, -0.1034))
+        file["grasps/qualities/flex/object_in_gripper"] = np.array([0, 1])
+    assert main(["evaluate", "tabletop_six", "--grasps", str(path)]) == 2
+    assert "say which one it is (--grasps-object 3f2a=NAME)" in capsys.readouterr().err
+    results = judged(tmp_path, "--grasps", str(path), "--grasps-object", "box")
+    assert results["outcome"].tolist() == OUTCOMES
+    assert np.isfinite(results["q_grasp_7"]).all()  # the whole arm was asked
+    assert results["score"].tolist() == [0.0, 1.0]  # the data set's labels, both of them wrong here
+    np.testing.assert_allclose(
+        [[float(n) for n in text.split()] for text in results["X_OG"]],
+        X_OG[:, :3].reshape(2, 12),
+        atol=1e-12,
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--camera-pose", "a.npy"], "--camera-pose is about a file; add --grasps FILE"),
+        (["--grasps-object", "mug"], "--grasps-object is about a file; add --grasps FILE"),
+        (["--object-ids", "5=mug"], "--object-ids is about a file; add --grasps FILE"),
+        (["--scene-id", "a"], "--scene-id is about a file; add --grasps FILE"),
+        (["--grasps", "missing.npy"], "missing.npy does not exist"),
+        (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
+        (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),
+        (["--grasps", "a.npy"], "is not a file of grasps in a format that is known"),
+        (["--grasps", "a.npy", "--grasps-format", "graspnet"], "has shape (2, 3); GraspNet's"),
+    ],
+)
+def test_mistakes(
+    options: list[str],
+    message: str,
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.save("a.npy", np.zeros((2, 3)))
+    assert main(["evaluate", "tabletop_six", *options, "-o", "run"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
+    assert not Path("run").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--grasps-object", "mug="], "'mug=' is not THEIRS=OURS, such as Mug_3f2a=mug"),
+        (["--object-ids", "mug=5"], "'mug=5' is not ID=NAME, such as 5=mug"),
+        (["--object-ids", "5=mug,6"], "'6' is not ID=NAME, such as 5=mug"),
+        (["--grasps-frame", "world"], "invalid choice: 'world'"),
+    ],
+)
+def test_options_that_cannot_be_read(options: list[str], message: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", "tabletop_six", "--grasps", "a.npy", *options])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,87 @@
+"""`burg-drake scene import-burg`: a scene of BURG-Toolkit made of household objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from burg_drake.apps.cli import main
+from burg_drake.scene.scene import load_scene
+
+Capture = pytest.CaptureFixture[str]
+
+TURNED = [[0, -1, 0, 0.12], [1, 0, 0, 0.11], [0, 0, 1, 0], [0, 0, 0, 1]]
+UPRIGHT = [[1, 0, 0, 0.29], [0, 1, 0, 0.11], [0, 0, 1, 0], [0, 0, 0, 1]]
+
+
+@pytest.fixture
+def burg_scene(tmp_path: Path) -> Path:
+    """As `Scene.to_yaml` writes it."""
+    data = {
+        "object_library_fn": "../object_library.yaml",
+        "ground_area_x": 0.594,
+        "ground_area_y": 0.42,
+        "objects": [
+            {"object_type": "Mug", "pose": np.array(TURNED, float).tolist()},
+            {"object_type": "bottle", "pose": np.array(UPRIGHT, float).tolist()},
+        ],
+        "bg_objects": [],
+        "printout": {"size": [0.594, 0.42]},
+        "yaml_file_version": "1.0",
+        "yaml_file_type": "Scene",
+    }
+    path = tmp_path / "burg.yaml"
+    path.write_text(yaml.dump(data))
+    return path
+
+
+def test_it_becomes_a_sound_scene(burg_scene: Path, tmp_path: Path, capsys: Capture) -> None:
+    output = tmp_path / "kitchen.yaml"
+    options = ["--library", "household", "-o", str(output)]
+    assert main(["scene", "import-burg", str(burg_scene), *options]) == 0
+    note, wrote = capsys.readouterr().out.splitlines()
+    assert "the printout was left aside" in note
+    assert wrote == f"wrote {output}: 2 objects"
+    scene = load_scene(output)
+    assert (scene.name, scene.document.library) == ("kitchen", "household")
+    assert scene.board.size == (0.594, 0.42)
+    np.testing.assert_allclose(scene.X_SO("mug"), TURNED, atol=1e-15)
+    np.testing.assert_allclose(scene.X_SO("bottle"), UPRIGHT, atol=1e-15)
+    assert main(["scene", "validate", str(output)]) == 0
+
+
+def test_a_library_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("mine").mkdir()
+    Path("mine/library.yaml").write_text("version: 1\nname: mine\n")
+    Path("burg.yaml").write_text(
+        "ground_area_x: 2\nground_area_y: 1\nobjects: []\n"
+        "yaml_file_type: Scene\nyaml_file_version: '1.0'\n"
+    )
+    options = ["--library", "mine", "-o", "out/scene.yaml", "--name", "empty"]
+    assert main(["scene", "import-burg", "burg.yaml", *options]) == 0
+    scene = load_scene("out/scene.yaml")
+    assert (scene.name, scene.document.library, scene.library.name) == ("empty", "../mine", "mine")
+
+
+def test_mistakes(burg_scene: Path, tmp_path: Path, capsys: Capture) -> None:
+    def error(*options: str) -> str:
+        assert main(["scene", "import-burg", *options]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    scene, output = str(burg_scene), str(tmp_path / "out.yaml")
+    assert "choose another file" in error(scene, "--library", "household", "-o", scene)
+    assert "houshold does not exist; did you mean 'household'" in error(
+        scene, "--library", "houshold", "-o", output
+    )
+    burg_scene.write_text(burg_scene.read_text().replace("Mug", "Mugg"))
+    assert "object 'mugg' ('Mugg') is not in library" in error(
+        scene, "--library", "household", "-o", output
+    )
+    burg_scene.write_text("version: 1\n")
+    assert "yaml_file_type: missing" in error(scene, "--library", "household", "-o", output)
+    assert not Path(output).exists()

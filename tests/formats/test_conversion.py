@@ -1,0 +1,85 @@
+"""Steps between reading and writing: names, selection, success, a file for each object."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.grasps import GraspSet
+from burg_drake.formats.conversion import (
+    of_object,
+    with_objects_renamed,
+    with_success,
+    write_each_object,
+)
+from burg_drake.formats.grasp_files import FORMATS
+from burg_drake.formats.grasp_format import PANDA
+
+
+@pytest.fixture
+def both(random_grasps: Callable[..., GraspSet]) -> GraspSet:
+    return GraspSet.concatenate(
+        [random_grasps(3, 1, success=True), random_grasps(2, 2, object="1a/2b", success=True)]
+    )
+
+
+def test_objects_are_renamed_with_what_files_said_of_them() -> None:
+    grasps = GraspSet.create(
+        np.eye(4),
+        object="10f6",
+        score=0.5,
+        width=0.02,
+        columns={"epsilon": [0.1]},
+        provenance={"object_files": {"10f6": {"file": "10f6.obj", "scale": 0.5}}, "seed": 1},
+    )
+    renamed = with_objects_renamed(grasps, {"10f6": "mug"})
+    expected = GraspSet.create(np.eye(4), object="mug", width=0.02)
+    assert renamed.object.tolist() == ["mug"] and renamed.id[0] == expected.id[0]
+    assert (renamed.score[0], renamed.width[0], renamed.columns["epsilon"][0]) == (0.5, 0.02, 0.1)
+    assert renamed.provenance == {
+        "object_files": {"mug": {"file": "10f6.obj", "scale": 0.5}},
+        "seed": 1,
+    }
+    assert with_objects_renamed(grasps, {"": "mug"}).object.tolist() == ["mug"]
+
+
+def test_names_that_do_not_fit_are_refused(both: GraspSet) -> None:
+    with pytest.raises(UnknownNameError, match=r"object 'mag'; did you mean 'mug'"):
+        with_objects_renamed(both, {"mag": "cup"})
+    with pytest.raises(InvalidInputError, match=r"of 2 objects \(1a/2b, mug\); say which is 'cup'"):
+        with_objects_renamed(both, {"": "cup"})
+
+
+def test_one_object_is_chosen(both: GraspSet) -> None:
+    np.testing.assert_array_equal(of_object(both, "mug").id, both.id[:3])
+    with pytest.raises(UnknownNameError, match="no grasps are of object 'bowl'"):
+        of_object(both, "bowl")
+
+
+def test_success_is_what_scores_above_the_limit() -> None:
+    grasps = GraspSet.create(np.repeat(np.eye(4)[None], 3, 0), object="a", score=[0.4, 0.5, np.nan])
+    success = with_success(grasps, 0.4).columns["object_in_gripper"]
+    np.testing.assert_array_equal(success, [0.0, 1.0, np.nan])
+
+
+def test_a_folder_gets_one_file_an_object(tmp_path: Path, both: GraspSet) -> None:
+    notes = write_each_object(both, tmp_path / "new", FORMATS["graspgen"], PANDA)
+    assert sorted(path.name for path in notes) == ["1a_2b.json", "mug.json"]
+    counts = {
+        path.name: len(json.loads(path.read_text())["grasps"]["transforms"]) for path in notes
+    }
+    assert counts == {"1a_2b.json": 2, "mug.json": 3}
+
+
+def test_two_objects_never_share_a_file(
+    tmp_path: Path, both: GraspSet, random_grasps: Callable[..., GraspSet]
+) -> None:
+    clash = GraspSet.concatenate([both, random_grasps(1, 3, object="1a_2b", success=True)])
+    with pytest.raises(InvalidInputError, match=r"'1a/2b' and of '1a_2b' would both go to"):
+        write_each_object(clash, tmp_path, FORMATS["graspgen"], PANDA)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,68 @@
+"""What the formats of one object share: names, descriptions, success, hands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.formats.grasp_format import PANDA
+from burg_drake.formats.one_object import check_hand, description_of, object_name, success_of
+
+THREE = np.repeat(np.eye(4)[None], 3, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("meshes/Mug/10f6e09.obj", "10f6e09"),
+        ("C:\\meshes\\mug.STL", "mug"),
+        ("/World/mug", "mug"),
+        ("/World/mug/", "mug"),
+        ("objects/banana.1.0.obj", "banana.1.0"),
+        ("v1.0", "v1.0"),
+        ("000074a334c541878360457c672b6c2e", "000074a334c541878360457c672b6c2e"),
+        (".obj", ".obj"),
+    ],
+)
+def test_objects_are_called_after_their_files(file: str, name: str) -> None:
+    assert object_name(file) == name
+
+
+def test_descriptions_are_found_in_joined_sets() -> None:
+    mug = {"file": "mug.obj", "scale": 0.5}
+    one = GraspSet.create(THREE, object="mug", provenance={"object_files": {"mug": mug}})
+    joined = GraspSet.concatenate([GraspSet.create(THREE, object="bowl"), one])
+    assert description_of(one, "mug") == description_of(joined, "mug") == mug
+    assert description_of(joined, "bowl") == {}
+
+
+def test_success_comes_from_the_column_then_outcomes_then_scores() -> None:
+    grasps = GraspSet.create(THREE, object="mug", score=[1.0, 0.0, np.nan])
+    np.testing.assert_array_equal(success_of(grasps), [1, 0, np.nan])
+    judged = grasps.with_columns(outcome=[Outcome.SLIPPED.value, Outcome.LIFTED.value, ""])
+    np.testing.assert_array_equal(success_of(judged), [0, 1, np.nan])
+    told = judged.with_columns(object_in_gripper=[True, True, False])
+    np.testing.assert_array_equal(success_of(told), [1, 1, 0])
+    scored = GraspSet.create(THREE, object="mug", score=[1.0, 0.5, 0.0])
+    assert np.isnan(success_of(scored)).all()
+
+
+def test_lifted_alone_is_success() -> None:
+    for outcome in Outcome:
+        grasps = GraspSet.create(THREE[:1], object="a", columns={"outcome": [outcome.value]})
+        assert success_of(grasps)[0] == (outcome is Outcome.LIFTED)
+
+
+def test_names_of_hands() -> None:
+    assert check_hand("panda", PANDA, "a.h5") == ()
+    assert check_hand("franka_panda", PANDA, "a.h5") == ()
+    assert check_hand("panda_hand", PANDA, "a.h5") == ()
+    assert check_hand("mine", replace(PANDA, name="mine"), "a.h5") == ()
+    assert len(check_hand("robotiq", PANDA, "a.h5")) == 1
+    with pytest.raises(InvalidInputError, match=r"a\.h5: the grasps are of hand 'panda_hand'"):
+        check_hand("panda", replace(PANDA, name="wsg_50"), "a.h5")

@@ -1,0 +1,153 @@
+"""Files in the layout of `write_grasp` in src/vgn/io.py, read back as `read_grasp` does."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.formats.grasp_format import PANDA
+from burg_drake.formats.vgn import FORMAT
+
+HEADER = "scene_id,qx,qy,qz,qw,x,y,z,width,label"
+DOWN = "0.0,1.0,0.0,0.0"
+"""Half a turn about y: z, the approach, points down, and the fingers close along y."""
+
+
+def grasps_csv(path: Path, *lines: str, header: str = HEADER) -> Path:
+    path.write_text("\n".join([header, *lines]) + "\n")
+    return path
+
+
+def finger_tip(row: dict[str, str]) -> Array:
+    """(3,) the middle of the tips, at the end of the lines that src/vgn/vis.py draws."""
+    R = Rotation.from_quat([float(row[q]) for q in ("qx", "qy", "qz", "qw")]).as_matrix()
+    return R @ [0.0, 0.0, 0.05] + [float(row[c]) for c in "xyz"]
+
+
+def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Array], None]) -> None:
+    # tips 9.5 mm below the cube's centre, where the Panda's tips are with G in the centre
+    path = grasps_csv(
+        tmp_path / "grasps.csv",
+        f"7f1c,{DOWN},0.0,0.0,0.0405,0.04,1",
+        f"7f1c,{DOWN},0.1,0.2,0.3,0.08,0",
+    )
+    imported = FORMAT.read(path, PANDA)
+    assert (imported.frame, imported.notes) == ("world", ())
+    grasps = imported.grasps
+    assert_grips_the_cube(grasps.X_OG[0])
+    np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.2595], atol=1e-15)
+    assert grasps.width.tolist() == [0.04, 0.08]
+    assert grasps.column("label").tolist() == [1.0, 0.0]
+    assert grasps.column("scene_id").tolist() == ["7f1c", "7f1c"]
+    assert np.isnan(grasps.score).all()
+
+
+def test_the_closing_axis_is_theirs(tmp_path: Path) -> None:
+    # a quarter turn about z: their y is -x, and the approach stays +z
+    s = 2**-0.5
+    path = grasps_csv(tmp_path / "a.csv", f"0,0.0,0.0,{s!r},{s!r},0.0,0.0,0.0,0.08,0")
+    X_VG = FORMAT.read(path, PANDA).grasps.X_OG[0]
+    np.testing.assert_allclose(X_VG[:3, 0], [-1.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(X_VG[:3, 2], [0.0, 0.0, 1.0], atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    grasps = random_grasps(100, seed).with_columns(
+        label=rng.integers(0, 2, 100), scene_id=rng.choice(["a1", "b2"], 100)
+    )
+    path = tmp_path / "grasps.csv"
+    assert FORMAT.write(grasps, path, PANDA) == ("VGN and GIGA has no place for object, score.",)
+    assert FORMAT.recognises(path)
+    back = FORMAT.read(path, PANDA).grasps
+    np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-14)
+    for name in ("width", "label", "scene_id"):
+        np.testing.assert_array_equal(back.column(name), grasps.column(name))
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    tips = grasps.X_OG[:, :3, 3] + 0.0095 * grasps.X_OG[:, :3, 2]
+    np.testing.assert_allclose([finger_tip(row) for row in rows], tips, atol=1e-14)
+    assert path.read_text().splitlines()[0] == HEADER
+    assert {row["label"] for row in rows} == {"0", "1"}
+
+
+def test_each_grasp_is_read_alike_alone(
+    random_grasps: Callable[..., GraspSet], tmp_path: Path
+) -> None:
+    FORMAT.write(random_grasps(20, 1), tmp_path / "all.csv", PANDA)
+    together = FORMAT.read(tmp_path / "all.csv", PANDA).grasps
+    for i, line in enumerate((tmp_path / "all.csv").read_text().splitlines()[1:]):
+        alone = FORMAT.read(grasps_csv(tmp_path / "one.csv", line), PANDA).grasps
+        assert alone.id[0] == together.id[i]
+
+
+def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
+    X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2], [0, 0, 0.3]])
+    grasps = GraspSet.create(X_OG, object="").with_columns(outcome=["lifted", "no_contact", ""])
+    notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
+    assert notes == ("3 grasps have no width; empty cells.",)
+    back = FORMAT.read(tmp_path / "scene_7.csv", PANDA).grasps
+    np.testing.assert_array_equal(back.column("label"), [1.0, 0.0, np.nan])
+    assert np.isnan(back.width).all()
+    assert set(back.column("scene_id").tolist()) == {"scene_7"}
+    plain = GraspSet.create(X_OG, object="", width=0.05)
+    assert FORMAT.write(plain, tmp_path / "b.csv", PANDA) == (
+        "No grasp has a label; these cells are empty.",
+    )
+
+
+def test_further_columns_come_along(tmp_path: Path) -> None:
+    header = "x,y,z,qx,qy,qz,qw,quality,planner"  # predictions, in another order
+    path = grasps_csv(tmp_path / "a.csv", f"0.1,0.2,0.3,{DOWN},0.93,giga", header=header)
+    assert FORMAT.recognises(path)
+    grasps = FORMAT.read(path, PANDA).grasps
+    assert grasps.column("quality").tolist() == [0.93]
+    assert grasps.column("planner").tolist() == ["giga"]
+    assert np.isnan(grasps.width).all()
+
+
+def test_no_grasps(tmp_path: Path) -> None:
+    FORMAT.write(GraspSet.create(np.empty((0, 4, 4)), object=""), tmp_path / "a.csv", PANDA)
+    assert len(FORMAT.read(tmp_path / "a.csv", PANDA).grasps) == 0
+
+
+@pytest.mark.parametrize(
+    ("header", "line", "message"),
+    [
+        (HEADER, f"a,{DOWN},0,0,0.1,0.08", ":2: has 9 cells, the first line has 10"),
+        (HEADER, f"a,{DOWN},0,zero,0.1,0.08,1", ":2: y is 'zero', not a number"),
+        (HEADER, f"a,{DOWN},0,nan,0.1,0.08,1", ":2: y is nan; give a finite number"),
+        (HEADER, f"a,{DOWN},0,0,0.1,inf,1", ":2: width is inf; give a finite number"),
+        (HEADER, "a,0,0,0,0,0,0,0.1,0.08,1", ":2: qx, qy, qz, qw have length 0; a rotation has"),
+        (HEADER, "a,1,1,0,0,0,0,0.1,0.08,1", ":2: qx, qy, qz, qw have length 1.41421; a rotation"),
+        ("scene_id,x,y,z", "a,0,0,0", " has no column qx, qy, qz, qw; grasps of VGN have scene_id"),
+        (HEADER + ",x", f"a,{DOWN},0,0,0.1,0.08,1,2", ":1: column 'x' is there twice"),
+    ],
+)
+def test_malformed(header: str, line: str, message: str, tmp_path: Path) -> None:
+    path = grasps_csv(tmp_path / "a.csv", line, header=header)
+    with pytest.raises(InvalidInputError) as error:
+        FORMAT.read(path, PANDA)
+    assert str(error.value).startswith(f"{path}{message}")
+
+
+def test_other_files(tmp_path: Path) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "binary.csv").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
+    for name, message in {
+        "empty.csv": "is empty",
+        "binary.csv": "is not a CSV file",
+        "missing.csv": "cannot read",
+    }.items():
+        assert not FORMAT.recognises(tmp_path / name)
+        with pytest.raises(InvalidInputError, match=message):
+            FORMAT.read(tmp_path / name, PANDA)
