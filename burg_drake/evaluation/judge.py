@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from burg_drake.simulation.trial_settings import TrialSettings
 
 MARGINS = (
-    *("overlap", "slip", "tilt", "pad_force", "patch_area"),
+    *("overlap", "clearance", "slip", "tilt", "pad_force", "patch_area"),
     *("lift", "others_moved", "end_time"),
 )
 """Margins of a verdict: see `simulation.result.Margins`."""
@@ -246,7 +246,7 @@ class StationJudge:
             X_WG = np.array([self._X_WO[instance] @ grasps[k].X_OG for k in chosen])
             found = self._trial.clearance.check_all(instance, X_WG)
             for k, clearance in zip(chosen, found, strict=True):
-                margins = {"overlap": clearance.overlap}
+                margins = {"overlap": clearance.overlap, "clearance": clearance.clearance}
                 decisions[k] = Decision(clearance.outcome, clearance.blocker, margins=margins)
         return decisions
 

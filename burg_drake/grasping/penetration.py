@@ -15,7 +15,12 @@ from burg_drake.grasping.poses import Poses
 
 
 def penetration_depths(
-    one: Polytope, other: Convex, X_BA: Poses, floor: Array | float = 0.0
+    one: Polytope,
+    other: Convex,
+    X_BA: Poses,
+    floor: Array | float = 0.0,
+    *,
+    faces_only: bool = False,
 ) -> Array:
     """Smallest translation that separates a polytope from another shape.
 
@@ -24,6 +29,8 @@ def penetration_depths(
         other: the shape, given in B; M shapes or one for all.
         X_BA: (M,) poses of A in B.
         floor: (M,) depths below it need not be known [m].
+        faces_only: ask only for directions normal to a face of either shape. What comes out is an
+            upper bound of the depth then, and equal to it where the nearest way out is such a one.
 
     Returns:
         (M,) depths [m]. Where the shapes are apart, or the depth is below the floor, the number is
@@ -35,7 +42,7 @@ def penetration_depths(
     overlap = dot(normals, (p[0], p[1], p[2])) + one.offsets + other.reach(normals)
     depth = np.minimum(overlap.min(axis=1), other.along_own_faces(vertices))
     left = np.flatnonzero(depth > floor)
-    if len(left):
+    if len(left) and not faces_only:
         normals, vertices = (each(lambda v: v[left], part) for part in (normals, vertices))
         edges = other.some(left).along_edges(one, normals, vertices)
         depth[left] = np.minimum(depth[left], edges)

@@ -10,6 +10,8 @@ returns does not depend on the trials before it.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from pydrake.geometry import (
     CollisionFilterDeclaration,
@@ -122,15 +124,17 @@ class HandTrial:
         _check_overrides(friction, mass)
         screen = self.clearance.check(instance, X_WG)
         if screen.outcome is not None:
-            margins = Margins(overlap=screen.overlap, end_time=0.0)
+            margins = Margins(overlap=screen.overlap, clearance=screen.clearance, end_time=0.0)
             return TrialResult(outcome=screen.outcome, margins=margins, blocker=screen.blocker)
         try:
-            return self.begin(instance, X_WG, friction=friction, mass=mass).run()
+            found = self.begin(instance, X_WG, friction=friction, mass=mass).run()
+            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             self._prepared = None
+            end_time = self.context.get_time()
             return TrialResult(
                 outcome=Outcome.SIMULATION_FAILED,
-                margins=Margins(overlap=0.0, end_time=self.context.get_time()),
+                margins=Margins(overlap=0.0, clearance=screen.clearance, end_time=end_time),
                 reason=" ".join(str(error).split()),
             )
 

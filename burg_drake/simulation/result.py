@@ -15,6 +15,8 @@ class Margins:
 
     Attributes:
         overlap: how deep the open hand overlaps what it collides with [m]; 0 if clear.
+        clearance: signed distance of the open hand from the body nearest to it [m]; negative: how
+            deep it overlaps what it collides with.
         slip: how far the target moved in the hand since the grip, at the grasp point [m].
         tilt: how far the target turned in the hand since the grip [rad].
         pad_force: normal force of the weaker pad [N], along the closing direction.
@@ -26,6 +28,7 @@ class Margins:
     """
 
     overlap: float = math.nan
+    clearance: float = math.nan
     slip: float = math.nan
     tilt: float = math.nan
     pad_force: float = math.nan

@@ -119,7 +119,9 @@ def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
         X_WG = trial.diagram.X_WO(grasp.instance) @ grasp.X_OG
         found = trial.clearance.check(grasp.instance, X_WG)
         assert (found.outcome, found.blocker) == (decision.outcome, decision.blocker)
-        assert found.overlap == decision.margins["overlap"]
+        margins = {"overlap": found.overlap, "clearance": found.clearance}
+        assert decision.margins == margins
+        assert (found.clearance >= 0.0) == (found.outcome is None)
 
 
 def test_a_judge_without_a_last_word_is_a_mistake() -> None:

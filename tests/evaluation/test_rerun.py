@@ -45,6 +45,13 @@ def test_the_same_bits_are_as_recorded() -> None:
     assert differences(changed(lift=math.nan), VERDICT) == []
 
 
+def test_a_margin_that_was_not_measured_then_is_no_difference() -> None:
+    assert differences(VERDICT, changed(clearance=0.003)) == []
+    found = differences(changed(clearance=0.002), changed(clearance=0.003))
+    assert [d.name for d in found] == ["clearance"]
+    assert [d.name for d in differences(changed(clearance=0.002), VERDICT)] == ["clearance"]
+
+
 def test_the_last_bit_counts() -> None:
     found = differences(VERDICT, changed(slip=np.nextafter(0.1 + 0.2, 1.0)))
     assert [difference.name for difference in found] == ["slip"]

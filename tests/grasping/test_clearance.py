@@ -23,7 +23,8 @@ from burg_drake.core.frames import (
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance, _shape
+from burg_drake.grasping.clearance import HandClearance
+from burg_drake.grasping.collision_geometry import shape_of
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
@@ -163,7 +164,7 @@ def test_a_shape_that_the_screen_does_not_know_is_named() -> None:
     tip = GeometryInstance(RigidTransform(), Capsule(0.01, 0.02), "tip")
     geometry = graph.RegisterAnchoredGeometry(source, tip)
     with pytest.raises(InvalidInputError, match=r"'tip' is a Capsule; .* knows boxes, cylinders"):
-        _shape(graph.model_inspector(), geometry, np.eye(4))
+        shape_of(graph.model_inspector(), geometry, np.eye(4))
 
 
 def test_depth_in_the_table_is_that_of_the_lowest_point(clearance: HandClearance) -> None:

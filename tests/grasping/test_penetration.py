@@ -83,6 +83,21 @@ def test_two_cubes_edge_to_edge() -> None:
     assert both_ways(CUBE, CUBE, make_pose(R, far)) == 0.0
 
 
+def test_faces_alone_see_no_gap_between_crossed_edges() -> None:
+    """Edges 30 mm apart; with faces over each other they tell the same as all axes."""
+    R = rotation_from_rpy((np.pi / 4, 0, 0)).T @ rotation_from_rpy((0, np.pi / 4, 0))
+    for gap in (0.03, -0.03):
+        p = rotation_from_rpy((np.pi / 4, 0, 0)).T @ (0, 0, np.sqrt(2) + gap)
+        X_BA = Poses.of(inverse(make_pose(R, p))[None])
+        one, other = Polytope.from_points(CUBE), box(np.ones(3))
+        (bound,) = penetration_depths(one, other, X_BA, faces_only=True)
+        assert bound > max(0.05, depth(one, other, make_pose(R, p)))
+    for height in (0.98, 1.02):
+        X_AB = make_pose(rotation_from_rpy((0, 0, 0.3)), (0.1, 0.2, height))
+        (bound,) = penetration_depths(one, other, Poses.of(inverse(X_AB)[None]), faces_only=True)
+        assert bound == pytest.approx(1.0 - height, abs=1e-12)
+
+
 def overlap_exists(one: np.ndarray, other: np.ndarray) -> bool:
     """Whether two hulls share a point: convex combinations that are equal."""
     n, m = len(one), len(other)

@@ -4,42 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pydrake.geometry import Box, Convex, Cylinder, QueryObject, Sphere
-from pydrake.geometry import Shape as DrakeShape
+from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
+from random_shapes import KINDS, random_pose, random_shape
 
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.grasping import screen
-from burg_drake.grasping.screen import TOUCHING, Body, HandScreen
+from burg_drake.grasping import body, screen
+from burg_drake.grasping.body import TOUCHING, Body
+from burg_drake.grasping.screen import HandScreen
 from burg_drake.grasping.shape import Shape
 
-KINDS = ("box", "cylinder", "ball", "hull")
 FINGER = Shape.box(make_pose(p_AB=(0.04, 0.0, 0.0)), np.array([0.01, 0.01, 0.02]))
 TABLE = Body(make_pose(p_AB=(0.3, 0.0, -0.05)), [Shape.box(np.eye(4), np.array([0.6, 0.7, 0.05]))])
-
-
-def random_pose(rng: np.random.Generator, spread: float) -> np.ndarray:
-    return make_pose(rotation_from_rpy(rng.uniform(-3, 3, 3)), rng.uniform(-spread, spread, 3))
-
-
-def random_shape(kind: str, rng: np.random.Generator) -> tuple[Shape, DrakeShape, RigidTransform]:
-    """A shape of some centimetres at a random place, for the screen and for Drake."""
-    X_BP = random_pose(rng, 0.05)
-    half = rng.uniform(0.01, 0.04, 3)
-    match kind:
-        case "box":
-            shape, drake = Shape.box(X_BP, half), Box(*(2 * half))
-        case "cylinder":
-            shape, drake = Shape.cylinder(X_BP, half[0], half[2]), Cylinder(half[0], 2 * half[2])
-        case "ball":
-            shape, drake = Shape.ball(X_BP, half[0]), Sphere(half[0])
-        case _:
-            points = rng.uniform(-1, 1, (12, 3)) * half
-            shape, drake = Shape.hull(X_BP, points), Convex(points.T, "hull")
-    return shape, drake, RigidTransform(X_BP)
 
 
 class Pair:
@@ -178,7 +157,7 @@ def test_results_do_not_depend_on_the_batch(monkeypatch: pytest.MonkeyPatch) -> 
     assert turned[0].tolist() == names[mixed].tolist()
     assert turned[1].tobytes() == depth[mixed].tobytes()
     monkeypatch.setattr(screen, "CHUNK", 7)
-    monkeypatch.setattr(screen, "BLOCK", 100)
+    monkeypatch.setattr(body, "BLOCK", 100)
     cut = Pair(1).screen.deepest(X_WG, order)
     assert (cut[0].tolist(), cut[1].tobytes()) == (names.tolist(), depth.tobytes())
 
