@@ -1,12 +1,17 @@
-"""`python -m tools.pictures`: renders the pictures of the station and the built-in objects.
+"""`python -m tools.pictures [station] [pages]`: makes pictures for the documentation.
 
-Those of Meshcat and of the report are screenshots of the pages that the commands write with --html.
+`station` renders those of the station and the built-in objects by Drake. `pages` takes those of
+grasps by a column and of frames from the pages that the commands write with --html, by a Chromium
+that runs without a display. The others of Meshcat and of the report are screenshots by hand.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import shutil
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +21,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from burg_drake import build_station_diagram, load_library, load_scene, load_station
+from burg_drake.apps.cli import main as burg_drake
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.station.station import Camera, Station
@@ -58,18 +64,75 @@ def render(scene: Scene, station: Station, camera: Camera, robot: str, file: str
     image.save(IMAGES / file, optimize=True)
 
 
-def main() -> None:
-    """Writes all pictures."""
-    station = load_station("panda_tabletop")
-    overview = station.document.cameras["overview"]
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+OPTIONS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader"),
+    *("--enable-unsafe-swiftshader", "--disable-background-networking", "--hide-scrollbars"),
+    "--virtual-time-budget=12000",
+)
+COLORS = 256
+"""Of a screenshot, which makes its PNG a third of the size."""
+CONTROLS = "<style>.dg {display: none !important}</style></body>"
+"""Hides Meshcat's own button in pages."""
+
+
+def photograph(page: Path, file: str, size: tuple[int, int]) -> None:
+    """Takes a picture of a page.
+
+    Raises:
+        SystemExit: there is no browser.
+    """
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        raise SystemExit(f"no browser of {', '.join(BROWSERS)} is there to look at pages with")
+    head, _, tail = page.read_text().rpartition("</body>")
+    page.write_text(head + CONTROLS + tail)
+    shot = page.with_suffix(".png")
+    arguments = [f"--window-size={size[0]},{size[1]}", f"--screenshot={shot}", page.as_uri()]
+    subprocess.run([browser, *OPTIONS, *arguments], check=True, capture_output=True)
+    image = Image.open(shot).convert("RGB")
+    # without k-means thin lines take the colours of large areas
+    few = image.quantize(COLORS, kmeans=16, dither=Image.Dither.NONE)
+    IMAGES.mkdir(parents=True, exist_ok=True)
+    few.save(IMAGES / file, optimize=True)
+
+
+def pages() -> None:
+    """Writes the pictures of grasps by a column and of frames."""
+    with tempfile.TemporaryDirectory() as folder:
+        grasps, page = f"{folder}/grasps.h5", Path(folder) / "page.html"
+        for command in (
+            f"grasps sample tabletop_six -n 30 --clear --diverse 8 -o {grasps}",
+            f"grasps score {grasps} --friction 0.6 -o {grasps}",
+            f"grasps show {grasps} --color epsilon --html {page}",
+        ):
+            burg_drake(command.split())
+        photograph(page, "grasp_quality.png", (1200, 760))
+        burg_drake(["frames", "--html", str(page)])
+        photograph(page, "frames.png", (1200, 780))
+
+
+def station() -> None:
+    """Writes the pictures of the station and the built-in objects."""
+    panda = load_station("panda_tabletop")
+    overview = panda.document.cameras["overview"]
     portrait = dataclasses.replace(overview, width=960, height=720, focal=(1000.0, 1000.0))
-    render(load_scene("tabletop_six"), station, portrait, "arm", "station.png")
+    render(load_scene("tabletop_six"), panda, portrait, "arm", "station.png")
     nearer = dataclasses.replace(portrait, focal=(1350.0, 1350.0))
     render(load_scene("tabletop_six"), load_station("panda_wsg"), nearer, "arm", "wsg.png")
     # seen from the front of the board, 40 degrees from above
     X_WC = Pose((-0.31, 0.0, 0.82), rpy_deg=(-134.0, 0.0, -90.0))
     close = Camera(X_WC=X_WC, width=960, height=720, focal=(1150.0, 1150.0))
-    render(household(), station, close, "none", "household.png")
+    render(household(), panda, close, "none", "household.png")
+
+
+def main() -> None:
+    """Makes the kinds of pictures that are named, or all."""
+    kinds = {"station": station, "pages": pages}
+    for name in sys.argv[1:] or kinds:
+        if name not in kinds:
+            raise SystemExit(f"there are no pictures {name!r}, only {', '.join(kinds)}")
+        kinds[name]()
 
 
 if __name__ == "__main__":

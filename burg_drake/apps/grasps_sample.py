@@ -1,7 +1,258 @@
+"""`burg-drake grasps sample`: antipodal grasps on the objects of a scene or library."""
+
 from __future__ import annotations
 
-from typing import Any
+import argparse
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import (
+    DEFAULT_APPROACH_ANGLE,
+    add_station,
+    add_verb,
+    approach_angle,
+    number,
+    positive,
+    positive_int,
+    seed,
+)
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+
+if TYPE_CHECKING:
+    from burg_drake.apps.grasp_source import Source
+    from burg_drake.core.frames import Array
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.sampling_settings import SamplingSettings
+    from burg_drake.scene.scene import Scene
+    from burg_drake.station.station import Station
+
+DEFAULT_GRASPS = 1000
 
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
+    parser = add_verb(
+        group,
+        "sample",
+        run_sample,
+        "sample antipodal grasps on the objects of a scene or a library",
+        "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
+        "burg-drake grasps sample tabletop_six --instance mug --clear --from-arm-side -o mug.h5",
+        "burg-drake grasps sample household --object mug -n 500 --diverse 4 -o mug.npz",
+        "burg-drake grasps sample household --standoffs-mm 0,4,-4 --approaches 6 -o many.h5",
+        "",
+        "The grasps of an object follow from --seed and the object, whatever else there is;",
+        "`evaluate` samples the same ones with the same settings.",
+    )
+    parser.add_argument(
+        "source", metavar="SCENE|LIB", help="scene file or library folder, or a built-in name"
+    )
+    parser.add_argument(
+        "-n",
+        metavar="N",
+        type=positive_int,
+        default=DEFAULT_GRASPS,
+        help="grasps for each instance, or object of a library (default: %(default)s)",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="grasp file to write, .h5 or .npz"
+    )
+    parser.add_argument(
+        "--to", metavar="FORMAT", help="format of another project, if the suffix does not tell it"
+    )
+    for name, what in (("object", "this object"), ("instance", "this instance of the scene")):
+        parser.add_argument(
+            f"--{name}",
+            metavar="NAME",
+            action="append",
+            help=f"only {what}; may be given several times",
+        )
+    add_station(parser)
+    _add_settings(parser)
+    parser.add_argument(
+        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
+    )
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--friction", metavar="MU", type=positive, help="coefficient (default: the object's)"
+    )
+    parser.add_argument(
+        "--approaches",
+        metavar="K",
+        type=positive_int,
+        default=1,
+        help="approach angles for each pair of contacts (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--approach-angle",
+        metavar="DEG",
+        type=approach_angle,
+        help="in a scene, largest angle between approach and straight down"
+        f" (default: {DEFAULT_APPROACH_ANGLE:g}; 180: any)",
+    )
+    parser.add_argument(
+        "--from-arm-side",
+        action="store_true",
+        help="in a scene, only approaches that do not point back to the arm",
+    )
+    parser.add_argument(
+        "--standoffs-mm",
+        metavar="A,B",
+        type=_standoffs,
+        default=(0.0,),
+        help="give every grasp with the hand this far back, or, below 0, further on (default: 0)",
+    )
+    parser.add_argument(
+        "--weights",
+        metavar="OBJECT=FILE.npy",
+        type=_named_file,
+        action="append",
+        default=[],
+        help="density of contacts on each face of an object's surface; may be given several times",
+    )
+    parser.add_argument(
+        "--clear",
+        action="store_true",
+        help="only grasps at which the open hand overlaps neither the object nor the scene",
+    )
+    parser.add_argument(
+        "--diverse",
+        metavar="K",
+        type=positive_int,
+        default=1,
+        help="sample K times as many and keep those that are farthest apart",
+    )
+
+
+def run_sample(arguments: argparse.Namespace) -> int:
+    """Samples and writes a file; 1 if there are no grasps at all."""
+    from burg_drake.apps.grasp_source import open_source
+    from burg_drake.evaluation.sampled_set import sampled_set
+    from burg_drake.evaluation.sampling_settings import SamplingSettings
+    from burg_drake.formats.grasp_files import FORMATS, format_by_suffix
+    from burg_drake.station.gripper import gripper_of
+    from burg_drake.station.station import load_station
+
+    format = FORMATS[arguments.to] if arguments.to else format_by_suffix(arguments.output)
+    if format.frame != "object":
+        raise InvalidInputError(
+            f"{format.title} has grasps in the {format.frame} frame; sample into a .h5 file, and"
+            " bring that into the other frame with `burg-drake grasps convert`"
+        )
+    source = open_source(arguments.source)
+    station = load_station(arguments.station)
+    settings = SamplingSettings(
+        friction=arguments.friction,
+        approaches=arguments.approaches,
+        approach_angle_deg=arguments.approach_angle,
+        from_arm_side=arguments.from_arm_side,
+        standoffs=arguments.standoffs_mm,
+        weights={name: _load_weights(path) for name, path in arguments.weights},
+        clear=arguments.clear,
+        diverse=arguments.diverse,
+    )
+    sampled, seconds = _sample(arguments, source, station, settings)
+    grasps = sampled_set(
+        sampled, source.library, source.scene, station, arguments.n, arguments.seed, settings
+    )
+    gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
+    notes = format.write(grasps, Path(arguments.output), gripper)
+    _print_table(sampled, seconds, arguments.n)
+    for note in notes:
+        print(f"burg-drake: note: {note}", file=sys.stderr)
+    print(f"wrote {len(grasps)} grasps to {arguments.output}")
+    few = [name for name, found in sampled.items() if len(found) < arguments.n]
+    if few:
+        print(
+            f"burg-drake: fewer than asked, as there are hardly any more: {', '.join(few)}",
+            file=sys.stderr,
+        )
+    return 0 if len(grasps) else 1
+
+
+def _sample(
+    arguments: argparse.Namespace, source: Source, station: Station, settings: SamplingSettings
+) -> tuple[dict[str, GraspSet], dict[str, float]]:
+    """Grasps, and how long they took [s], by instance or object."""
+    from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
+
+    if source.scene is None:
+        if arguments.instance:
+            raise InvalidInputError(
+                f"{arguments.source} is a library, which has no instances; choose with --object"
+            )
+        stream = sample_library(
+            source.library, station, arguments.n, arguments.seed, settings, arguments.object
+        )
+    else:
+        chosen = _instances(source.scene, arguments.instance, arguments.object)
+        stream = sample_scene(source.scene, station, arguments.n, arguments.seed, settings, chosen)
+    sampled, seconds = {}, {}
+    start = time.perf_counter()
+    for name, grasps in stream:
+        sampled[name], seconds[name] = grasps, time.perf_counter() - start
+        start = time.perf_counter()
+    if not sampled:
+        raise InvalidInputError(f"{arguments.source} has no free objects; nothing to sample on")
+    return sampled, seconds
+
+
+def _instances(scene: Scene, instances: list[str] | None, objects: list[str] | None) -> list[str]:
+    """Names of the free instances that are chosen by their own names or by those of objects."""
+    known = {name: instance.object for name, instance in scene.instances.items()}
+    for object in objects or ():
+        if object not in known.values():
+            raise UnknownNameError(
+                f"scene {scene.name!r} has no free object {object!r};"
+                f" {nearest(object, set(known.values()))}"
+            )
+    if instances is None and objects is None:
+        return list(known)
+    return [*(instances or ()), *(name for name in known if known[name] in (objects or ()))]
+
+
+def _load_weights(path: str) -> Array:
+    import numpy as np
+
+    try:
+        weights = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        reason = getattr(error, "strerror", None) or "not an array of numbers in numpy's format"
+        raise InvalidInputError(f"cannot read weights {path}: {reason}") from error
+    if not isinstance(weights, np.ndarray):
+        weights.close()
+        raise InvalidInputError(f"{path} holds several arrays; give a .npy file with one")
+    return weights
+
+
+def _print_table(sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("on", no_wrap=True)
+    for column in ("asked", "found", "rays", "tried", "seconds"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for name, grasps in sampled.items():
+        counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
+        table.add_row(name, *(f"{count:,}" for count in counts), f"{seconds[name]:.2f}")
+    Console().print(table)
+
+
+def _standoffs(text: str) -> tuple[float, ...]:
+    """Millimetres, separated by commas, as metres."""
+    return tuple(1e-3 * number(word) for word in text.split(","))
+
+
+def _named_file(text: str) -> tuple[str, str]:
+    """`OBJECT=FILE`."""
+    name, equals, path = text.partition("=")
+    if not (name and equals and path):
+        raise argparse.ArgumentTypeError(f"{text!r} is not OBJECT=FILE.npy, such as mug=rim.npy")
+    return name, path

@@ -1,18 +1,25 @@
-"""`burg-drake grasps show`: the grasps of a run, coloured by what became of them."""
+"""`burg-drake grasps show`: the grasps of a run or of a file, coloured by what is known of them."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_verb, add_view, positive_int
+from burg_drake.apps.arguments import DEFAULT_STATION, add_verb, add_view, number, positive_int
+from burg_drake.apps.given_grasps import renaming
+from burg_drake.apps.grasp_source import Source, add_source, source_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome
 
 if TYPE_CHECKING:
-    from burg_drake.evaluation.run_store import Run
-    from burg_drake.visualization.page import LegendEntry
+    from pydrake.geometry import Meshcat
+
+    from burg_drake.core.frames import Array
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.station.station import Station
 
 DEFAULT_LIMIT = 300
 
@@ -23,13 +30,52 @@ def add_to(group: Any) -> None:
         group,
         "show",
         run_show,
-        "show the scene of a run with its grasps, coloured by outcome, in Meshcat",
+        "show grasps in Meshcat, coloured by outcome, score or any other column",
         "burg-drake grasps show runs/first",
         "burg-drake grasps show runs/first --instance mug --outcome lifted,slipped",
-        "burg-drake grasps show runs/first --html grasps.html",
+        "burg-drake grasps show runs/first --color slip --range 0 0.005",
+        "burg-drake grasps show grasps.h5 --color clearance --html grasps.html",
+        "burg-drake grasps show mug.h5 --library household --object mug",
     )
-    show.add_argument("run_folder", metavar="RUN", help="folder of a run")
+    show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
+    add_source(show)
+    show.add_argument(
+        "--station",
+        metavar="STATION",
+        help="where the scene of a grasp file is (default: what the file names, else"
+        f" {DEFAULT_STATION})",
+    )
+    show.add_argument(
+        "--rename",
+        "--grasps-object",
+        metavar="[THEIRS=]OURS",
+        dest="rename",
+        type=renaming,
+        action="append",
+        default=[],
+        help="what scene or library call an object of the file; OURS alone is for all its grasps",
+    )
+    _add_choice(show)
+    show.add_argument(
+        "--color",
+        metavar="COLUMN",
+        help="what colours stand for: a column of the file, or of the results of a run"
+        " (default: outcome, else score, if there is any)",
+    )
+    show.add_argument(
+        "--range",
+        metavar=("LO", "HI"),
+        nargs=2,
+        type=number,
+        help="numbers that the colours begin and end with (default: those of the grasps shown,"
+        " without outliers)",
+    )
+    add_view(show)
+
+
+def _add_choice(show: argparse.ArgumentParser) -> None:
     show.add_argument("--instance", metavar="NAME", help="only grasps of this object of the scene")
+    show.add_argument("--object", metavar="NAME", help="only grasps of this object of the library")
     show.add_argument(
         "--outcome",
         metavar="A,B",
@@ -43,89 +89,155 @@ def add_to(group: Any) -> None:
         default=DEFAULT_LIMIT,
         help="at most N grasps of each object, taken evenly (default: %(default)s)",
     )
-    add_view(show)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Content:
+    """What there is to show.
+
+    Attributes:
+        grasps: all of them; with the column `instance` where there is a scene.
+        source: where their objects are.
+        station: for the hand, and where the scene is.
+        title: of the page.
+    """
+
+    grasps: GraspSet
+    source: Source
+    station: Station
+    title: str
 
 
 def run_show(arguments: argparse.Namespace) -> int:
-    """Shows the judged grasps of a run."""
+    """Shows grasps among the objects that they belong to."""
     import numpy as np
 
+    from burg_drake.apps.legend_text import print_legend
     from burg_drake.apps.live import open_view, present
-    from burg_drake.evaluation.run_store import load_run
+    from burg_drake.visualization.grasp_legend import color_by
     from burg_drake.visualization.grasp_view import draw_grasps
-    from burg_drake.visualization.scene_view import show_scene
 
-    run = load_run(arguments.run_folder)
-    scene, station = run.scene(), run.station()
-    chosen = _choose(run, arguments)
-    X_WO = {name: station.document.X_WS.matrix() @ scene.X_SO(name) for name in scene.instances}
-    candidates = run.candidates
-    X_WG = [X_WO[str(candidates.instance[i])] @ candidates.grasps.X_OG[i] for i in chosen]
-    verdicts = [run.verdicts.get(candidates.id[i]) for i in chosen]
-
+    content = _content(arguments)
+    grasps = _choose(content.grasps, arguments)
+    groups, legend = color_by(grasps, arguments.color, arguments.range)
+    width = np.where(np.isfinite(grasps.width), grasps.width, content.station.hand.opening[1])
     meshcat = open_view(arguments)
-    show_scene(scene, station, meshcat, robot="none")
-    counts = draw_grasps(
-        meshcat,
-        np.reshape(X_WG, (-1, 4, 4)),
-        station.hand,
-        [None if v is None else v.outcome for v in verdicts],
-        candidates.grasps.width[chosen],
-    )
-    legend = _legend(counts)
-    caption = f"{len(chosen)} of {len(candidates)} grasps"
-    _print_legend(legend)
-    present(meshcat, arguments, title=f"{scene.name}: grasps", caption=[caption], legend=legend)
+    draw_grasps(meshcat, _place(content, grasps, width, meshcat), width, groups)
+    caption = f"{len(grasps)} of {len(content.grasps)} grasps"
+    print_legend(legend)
+    present(meshcat, arguments, title=content.title, caption=[caption], legend=legend)
     return 0
 
 
-def _choose(run: Run, arguments: argparse.Namespace) -> list[int]:
-    """Indices of the candidates to be drawn."""
-    candidates = run.candidates
-    instances = dict.fromkeys(candidates.instance.tolist())
-    if arguments.instance is not None and arguments.instance not in instances:
-        raise UnknownNameError(
-            f"{run.path} has no grasps on {arguments.instance!r};"
-            f" {nearest(arguments.instance, instances)}"
+def _content(arguments: argparse.Namespace) -> Content:
+    from burg_drake.evaluation.candidate_files import read_grasps
+    from burg_drake.formats.grasp_files import read_grasp_file
+    from burg_drake.scene.scene import load_scene
+    from burg_drake.station.gripper import gripper_of
+    from burg_drake.station.station import load_station
+
+    path = Path(arguments.file)
+    if path.is_dir():
+        return _content_of_run(arguments)
+    station = load_station(arguments.station or DEFAULT_STATION)
+    gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
+    objects = dict(arguments.rename)
+    imported = read_grasp_file(path, gripper=gripper)
+    grasps = imported.grasps
+    told = grasps.provenance.get("station")
+    if arguments.station is None and isinstance(told, str):
+        station = load_station(told)
+    if len(grasps) == 0:
+        raise InvalidInputError(f"{path} has no grasps")
+    if imported.frame == "object":
+        grasps = _renamed(grasps, objects)
+        source = source_of(arguments, grasps, arguments.file)
+    elif imported.frame == "world" and arguments.scene is not None:
+        scene = load_scene(arguments.scene)
+        source = Source(scene.library, scene)
+    else:
+        raise InvalidInputError(
+            f"{path} has grasps in the {imported.frame} frame, not in those of objects; place them"
+            " with `burg-drake grasps convert --scene` first"
         )
+    if source.scene is not None:
+        given = read_grasps(source.scene, path, gripper, objects=objects)
+        grasps = _on_instances(given.by_instance)
+    return Content(grasps, source, station, title=path.name)
+
+
+def _content_of_run(arguments: argparse.Namespace) -> Content:
+    from burg_drake.evaluation.run_grasps import run_grasps
+    from burg_drake.evaluation.run_store import load_run
+
+    run = load_run(arguments.file)
+    for option in ("scene", "library", "station"):
+        if getattr(arguments, option) is not None:
+            raise InvalidInputError(
+                f"--{option} is for grasp files; {run.path} is a run, which has its own"
+            )
+    scene = run.scene()
+    source = Source(scene.library, scene)
+    return Content(run_grasps(run), source, run.station(), title=f"{scene.name}: grasps")
+
+
+def _renamed(grasps: GraspSet, objects: Mapping[str, str]) -> GraspSet:
+    """The grasps with other names of their objects; one by the empty text is for all."""
+    import numpy as np
+
+    names = [objects.get(name, objects.get("", name)) for name in grasps.object.tolist()]
+    return dataclasses.replace(grasps, object=np.array(names, dtype=str))
+
+
+def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
+    from burg_drake.core.grasps import GraspSet
+
+    return GraspSet.concatenate(
+        grasps.with_columns(instance=name) for name, grasps in by_instance.items()
+    )
+
+
+def _choose(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
+    """The grasps to be drawn."""
+    import numpy as np
+
+    keep = np.ones(len(grasps), dtype=bool)
+    for column in ("instance", "object"):
+        name = getattr(arguments, column)
+        if name is not None:
+            known = set(grasps.column(column).tolist())
+            if name not in known:
+                raise UnknownNameError(
+                    f"{arguments.file} has no grasps on {name!r}; {nearest(name, known)}"
+                )
+            keep &= grasps.column(column) == name
+    if arguments.outcome is not None:
+        keep &= np.isin(grasps.column("outcome"), [o.value for o in arguments.outcome])
+    holder = grasps.column("instance" if "instance" in grasps.columns else "object")
     chosen: list[int] = []
-    for name in [arguments.instance] if arguments.instance is not None else instances:
-        members = [i for i, n in enumerate(candidates.instance) if n == name]
-        if arguments.outcome is not None:
-            members = [i for i in members if _outcome(run, i) in arguments.outcome]
+    for name in dict.fromkeys(holder[keep].tolist()):
+        members = np.flatnonzero(keep & (holder == name))
         count = min(len(members), arguments.limit)
-        chosen += [members[k * len(members) // count] for k in range(count)]
+        chosen += [int(members[k * len(members) // count]) for k in range(count)]
     if not chosen:
-        raise InvalidInputError(f"{run.path} has no such grasps; choose other outcomes")
-    return chosen
+        raise InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
+    return grasps.select(chosen)
 
 
-def _outcome(run: Run, index: int) -> Outcome | None:
-    verdict = run.verdicts.get(run.candidates.id[index])
-    return None if verdict is None else verdict.outcome
+def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -> Array:
+    """Shows the objects, in their scene or in rows; returns `X_WG` (N, 4, 4) of their grasps."""
+    import numpy as np
 
+    from burg_drake.visualization.grasp_gallery import show_with_grasps
+    from burg_drake.visualization.scene_view import show_scene
 
-def _legend(counts: Mapping[Outcome | None, int]) -> list[LegendEntry]:
-    from burg_drake.visualization.grasp_view import grasp_path
-    from burg_drake.visualization.page import LegendEntry
-    from burg_drake.visualization.palette import GROUPS, UNJUDGED
-
-    entries = []
-    for group in (*GROUPS, UNJUDGED):
-        members = [o for o in counts if o in group.outcomes or (o is None and group is UNJUDGED)]
-        if members:
-            number = sum(counts[o] for o in members)
-            paths = tuple(grasp_path(o) for o in members)
-            entries.append(LegendEntry(f"{group.name} ({number})", group.hex, paths))
-    return entries
-
-
-def _print_legend(legend: list[LegendEntry]) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    for entry in legend:
-        Console().print(Text("■ ", style=entry.color) + Text(entry.label, style="default"))
+    scene, station = content.source.scene, content.station
+    if scene is None:
+        return show_with_grasps(content.source.library, grasps, width, meshcat)
+    X_WS = station.document.X_WS.matrix()
+    X_SO = {name: scene.X_SO(name) for name in set(grasps.column("instance").tolist())}
+    show_scene(scene, station, meshcat, robot="none")
+    return X_WS @ np.stack([X_SO[n] for n in grasps.column("instance").tolist()]) @ grasps.X_OG
 
 
 def _outcomes(text: str) -> set[Outcome]:

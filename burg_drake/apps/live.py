@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
-    from burg_drake.visualization.page import LegendEntry
+    from burg_drake.visualization.legend import ColorBar, LegendEntry
 
 
 def open_view(arguments: argparse.Namespace) -> Meshcat:
@@ -44,7 +44,7 @@ def present(
     *,
     title: str,
     caption: Sequence[str] = (),
-    legend: Sequence[LegendEntry] = (),
+    legend: Sequence[LegendEntry | ColorBar] = (),
 ) -> None:
     """Saves the page if --html was given; else prints the address and waits, unless told not to."""
     if arguments.html is not None:

@@ -1,25 +1,35 @@
-"""Samples the grasps that a run judges."""
+"""Samples antipodal grasps on the objects of a scene, or of a library.
+
+The random stream of an object follows from the seed and the object's content alone: neither the
+rest of the scene nor the order matters, and a run judges the grasps that a file got with the same
+settings.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core.content import rng_from
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.frames import Array, transform_points
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.approach_limits import from_above, from_arm_side
 from burg_drake.evaluation.candidates import Candidates, distinct, join_candidates
+from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
 from burg_drake.grasping.approach import ApproachCone
-from burg_drake.objects.entry import ObjectEntry
+from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
-DEFAULT_APPROACH_ANGLE_DEG = 75.0
-"""Keeps the hand above the horizontal, and leaves out pairs of an object's bottom and top for
-friction up to tan(15 deg) = 0.27: one of the two fingers would be below the table."""
+if TYPE_CHECKING:
+    import trimesh
 
-DOWN_DIGITS = 6
-"""Straight down in an object's frame is rounded, so that instances of one object that differ by a
-turn about the vertical share their grasps."""
+    from burg_drake.grasping.antipodal import Accept
+    from burg_drake.grasping.clearance import HandClearance
 
 
 def sample_candidates(
@@ -31,63 +41,234 @@ def sample_candidates(
 ) -> Candidates:
     """Samples antipodal grasps on every free instance.
 
-    The random stream follows from the seed and the object's content alone. All instances of an
-    object that lie on the same side get the same grasps, whatever else stands in the scene.
-
     Args:
         scene: the scene; its background objects get no grasps.
         station: gives the opening of the hand.
         n: grasps for each instance; there are fewer where the object has no more.
         seed: of the run.
-        approach_angle_deg: largest angle between the approach and straight down, above 0 to
-            180; with 180 the hand comes from anywhere.
+        approach_angle_deg: see `SamplingSettings`.
 
     Raises:
         InvalidInputError: n is below 1, or the angle out of its range.
         UnknownNameError: the mesh file of an object is missing.
     """
+    settings = SamplingSettings(approach_angle_deg=approach_angle_deg)
+    return join_candidates(dict(sample_scene(scene, station, n, seed, settings)))
+
+
+def sample_scene(
+    scene: Scene,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    instances: Iterable[str] | None = None,
+) -> Iterator[tuple[str, GraspSet]]:
+    """Samples grasps on the instances of a scene, one after the other.
+
+    All instances of an object get the same grasps that lie on the same side and have the same
+    limits, unless grasps have to be clear.
+
+    Args:
+        scene: the scene.
+        station: gives the opening of the hand, its body, and the place of the arm.
+        n: grasps for each instance; there are fewer where there are no more.
+        seed: of the random numbers.
+        settings: how.
+        instances: names of free instances; all if None.
+
+    Returns:
+        Names and grasps, in the frames of the objects.
+
+    Raises:
+        InvalidInputError: n is below 1, or a setting does not fit.
+        UnknownNameError: no such instance or object, or a mesh file is missing.
+    """
+    _check_count(n)
+    names = _known(instances, scene.instances, f"scene {scene.name!r} has no free instance")
+    objects = {instance.object for instance in scene.instances.values()}
+    _known(settings.weights, objects, "weights: the scene has no object")
+    return _sampled_scene(scene, station, n, seed, settings, names)
+
+
+def _sampled_scene(
+    scene: Scene,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    names: tuple[str, ...],
+) -> Iterator[tuple[str, GraspSet]]:
+    draw = _Sampler(scene.library, station, n, seed, settings)
+    screen = _scene_screen(scene, station) if settings.clear else None
+    found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
+    for name in names:
+        object, X_WO = scene.instance(name).object, _X_WO(scene, station, name)
+        cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
+        if screen is not None:
+            yield name, draw(object, cones, _clear(screen, name, X_WO))
+        else:
+            if (object, cones) not in found:
+                found[object, cones] = draw(object, cones)
+            yield name, found[object, cones]
+
+
+def sample_library(
+    library: ObjectLibrary,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    objects: Iterable[str] | None = None,
+) -> Iterator[tuple[str, GraspSet]]:
+    """Samples grasps on the objects of a library, one after the other, from all sides.
+
+    Args:
+        library: the library.
+        station: gives the opening of the hand and its body.
+        n, seed, settings: as for `sample_scene`.
+        objects: names in the library; all if None.
+
+    Returns:
+        Names and grasps, in the frames of the objects.
+
+    Raises:
+        InvalidInputError: n is below 1, or a setting does not fit, such as limits of the approach:
+            the objects of a library lie nowhere.
+        UnknownNameError: no such object, or a mesh file is missing.
+    """
+    _check_count(n)
+    if settings.approach_angle_deg is not None or settings.from_arm_side:
+        raise InvalidInputError(
+            f"objects of library {library.name!r} lie nowhere, so that there is no straight down"
+            " and no side of the arm; limit the approach in a scene"
+        )
+    where = f"library {library.name!r} has no object"
+    names = _known(objects, library.objects, where)
+    _known(settings.weights, library.objects, f"weights: {where}")
+    return _sampled_library(library, station, n, seed, settings, names)
+
+
+def _sampled_library(
+    library: ObjectLibrary,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    names: tuple[str, ...],
+) -> Iterator[tuple[str, GraspSet]]:
+    from burg_drake.grasping.clearance import hand_clearance_alone
+
+    draw = _Sampler(library, station, n, seed, settings)
+    for name in names:
+        accept = None
+        if settings.clear:
+            accept = _clear(hand_clearance_alone(library, name, station), name, np.eye(4))
+        yield name, draw(name, (), accept)
+
+
+class _Sampler:
+    """Samples on objects of one library with the same settings."""
+
+    def __init__(
+        self,
+        library: ObjectLibrary,
+        station: Station,
+        n: int,
+        seed: int,
+        settings: SamplingSettings,
+    ) -> None:
+        self._library, self._opening = library, station.hand.opening
+        self._n, self._seed, self._settings = n, seed, settings
+        self._pad = _pad(station)
+        self._surfaces: dict[str, trimesh.Trimesh] = {}
+
+    def surface(self, object: str) -> trimesh.Trimesh:
+        """The surface of an object, read once."""
+        if object not in self._surfaces:
+            self._surfaces[object] = self._library.surface(object)
+        return self._surfaces[object]
+
+    def __call__(
+        self, object: str, cones: tuple[ApproachCone, ...], accept: Accept | None = None
+    ) -> GraspSet:
+        """Grasps of an object."""
+        from burg_drake.grasping.antipodal import sample_antipodal
+
+        entry, settings = self._library.entry(object), self._settings
+        return distinct(
+            sample_antipodal(
+                self.surface(object),
+                self._n,
+                rng_from("antipodal", self._seed, entry.build),
+                friction=entry.friction if settings.friction is None else settings.friction,
+                opening=self._opening,
+                approaches=settings.approaches,
+                approach_cone=cones,
+                standoffs=settings.standoffs,
+                pad=self._pad,
+                weights=settings.weights.get(object),
+                accept=accept,
+                diverse=settings.diverse,
+                object=object,
+            )
+        )
+
+
+def _check_count(n: int) -> None:
     if n < 1:
         raise InvalidInputError(f"grasps per object is {n}; give 1 or more")
-    if not 0.0 < approach_angle_deg <= 180.0:
-        raise InvalidInputError(
-            f"approach angle is {approach_angle_deg:g} degrees; give more than 0, at most 180"
-        )
-    wanted: dict[str, tuple[str, ApproachCone | None]] = {}
-    for name, instance in scene.instances.items():
-        cone = _approach_cone(scene, station, name, approach_angle_deg)
-        wanted[name] = instance.object, cone
-    sampled = {
-        (object, cone): _sample_object(scene, station, object, n, seed, cone)
-        for object, cone in dict.fromkeys(wanted.values())
-    }
-    return join_candidates({name: sampled[key] for name, key in wanted.items()})
 
 
-def _approach_cone(
-    scene: Scene, station: Station, instance: str, angle_deg: float
-) -> ApproachCone | None:
-    """The cone about straight down, seen from an instance; None if it holds every direction."""
-    if angle_deg == 180.0:
-        return None
-    X_WO = station.document.X_WS.matrix() @ scene.X_SO(instance)
-    x, y, z = np.round(-X_WO[2, :3], DOWN_DIGITS) + 0.0  # no negative zeros
-    return ApproachCone((x, y, z), np.deg2rad(angle_deg))
+def _known(names: Iterable[str] | None, known: Iterable[str], what: str) -> tuple[str, ...]:
+    """The names, each once; all known ones if None."""
+    chosen = tuple(dict.fromkeys(known if names is None else names))
+    for name in chosen:
+        if name not in known:
+            raise UnknownNameError(f"{what} {name!r}; {nearest(name, known)}")
+    return chosen
 
 
-def _sample_object(
-    scene: Scene, station: Station, name: str, n: int, seed: int, cone: ApproachCone | None
-) -> GraspSet:
-    from burg_drake.grasping.antipodal import sample_antipodal
+def _X_WO(scene: Scene, station: Station, instance: str) -> Array:
+    X_WO: Array = station.document.X_WS.matrix() @ scene.X_SO(instance)
+    return X_WO
 
-    entry: ObjectEntry = scene.library.entry(name)
-    return distinct(
-        sample_antipodal(
-            scene.library.surface(name),
-            n,
-            rng_from("antipodal", seed, entry.build),
-            friction=entry.friction,
-            opening=station.hand.opening,
-            approach_cone=cone,
-            object=name,
-        )
-    )
+
+def _approach_cones(
+    surface: trimesh.Trimesh,
+    X_WO: Array,
+    station: Station,
+    instance: str,
+    settings: SamplingSettings,
+) -> tuple[ApproachCone, ...]:
+    """The limits of the approach to an instance; none where they hold every direction."""
+    angle = settings.approach_angle_deg
+    cones = from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG if angle is None else angle)
+    if settings.from_arm_side:
+        p_WM = transform_points(X_WO, surface.bounds).mean(axis=0)
+        cones += (from_arm_side(X_WO, p_WM, station, instance),)
+    return cones
+
+
+def _pad(station: Station) -> tuple[float, float]:
+    """From where to where the pads of the hand reach along z of G [m]."""
+    from burg_drake.station.hand_check import check_hand
+
+    low, high = check_hand(station.hand, station.hand_model, station.hand_path).pad_bounds
+    return low[2], high[2]
+
+
+def _scene_screen(scene: Scene, station: Station) -> HandClearance:
+    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.station.diagram import build_station_diagram
+
+    return HandClearance(build_station_diagram(scene, station, robot="hand"))
+
+
+def _clear(screen: HandClearance, instance: str, X_WO: Array) -> Accept:
+    """Keeps the grasps at which the open hand is clear."""
+
+    def accept(X_OG: Array) -> NDArray[np.bool_]:
+        return screen.measure(instance, X_WO @ X_OG).clear
+
+    return accept

@@ -1,68 +1,63 @@
 """Antipodal grasp sampling on triangle meshes for parallel-jaw hands.
 
-A point is drawn on the surface, a line through the material within the friction cone about the
-inward normal; where the line leaves the material again, within the friction cone of that face, the
-two points are a pair of contacts that two frictional fingers can squeeze without slipping (Nguyen,
-"Constructing force-closure grasps", IJRR 1988). The grasp frame G lies midway with +x along the
-line; the approach direction +z is uniform about it, or about the part of the turn that an approach
-cone leaves. The hand's own body is not looked at here.
+Pairs of contacts come from `contact_pairs`. The grasp frame G lies midway with +x along the closing
+line; the approach direction +z is uniform about it, or about the part of the turn that approach
+cones leave. The hand's own body is looked at only if the caller brings a test for it.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError, MeshError
-from burg_drake.core.frames import Array, grasp_from_axes
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, grasp_from_axes, pregrasp
 from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.approach import ApproachCone
-from burg_drake.grasping.rays import Indices, RayCaster
+from burg_drake.grasping.approach import ApproachCone, random_turns
+from burg_drake.grasping.contact_pairs import (
+    BLOCK,
+    FINGER_CLEARANCE,
+    ContactPairs,
+    draw_pairs,
+    perpendicular,
+)
+from burg_drake.grasping.diversity import farthest_points
+from burg_drake.grasping.surface import Surface
 from burg_drake.objects.entry import DEFAULT_FRICTION
 
 if TYPE_CHECKING:
     import trimesh
 
-SAMPLER_VERSION = 1
-"""Raised when the same arguments begin to give other grasps."""
+SAMPLER_VERSION = 2
+"""Raised when the same arguments begin to give other grasps; 2 differs from 1 by rounding, where
+there is an approach cone."""
 
 PANDA_OPENING = (0.0, 0.08)
 """Smallest and largest distance between the Franka Hand's fingers [m] (its datasheet)."""
 
-FINGER_CLEARANCE = 0.001
-"""Room that each open finger keeps to its contact [m], so that the open hand can be placed."""
-
-MIN_WIDTH = 1e-4
-"""Contacts closer than this are the two sides of a surface without thickness [m]."""
-
-CHUNK = 8192
-"""Rays cast at a time. Constant, so that the first n grasps of a seed do not depend on n."""
+PANDA_PAD = (-0.009, 0.0095)
+"""From where to where the Franka Hand's rubber tips reach along z of G [m]: 0.0584 + 0.04525 m from
+the hand's frame, 18.5 mm long (franka_ros, franka_hand.xacro), where G is at 0.1034 m."""
 
 PATIENCE = 2**18
 RARITY = 20_000
 """Sampling ends after `PATIENCE + RARITY * found` rays: where none of the first 262,144 rays finds
 a grasp, or less than one ray in 20,000 does, the object counts as having no (more) grasps."""
 
+TEST_PATIENCE = 20_000
+TEST_RARITY = 5_000
+"""It ends, too, after `TEST_PATIENCE + TEST_RARITY * accepted` grasps that `accept` was asked for:
+where it takes none of the first 20,000, or less than one in 5,000."""
 
-@dataclass(frozen=True)
-class ContactPairs:
-    """N pairs of opposing contacts.
-
-    Attributes:
-        p_OC1, p_OC2: (N, 3) contact points [m]; the closing direction is from C1 to C2, and its
-            component of largest magnitude is positive.
-        friction_needed: (N,) tangent of the larger of the two angles between the closing line and
-            the surface normals: the smallest friction coefficient that holds the pair.
-    """
-
-    p_OC1: Array
-    p_OC2: Array
-    friction_needed: Array
+Accept = Callable[[Array], NDArray[np.bool_]]
+"""Which of the grasps (N, 4, 4) in the object frame to keep, (N,); the answer for a grasp must not
+depend on the others."""
 
 
 def sample_antipodal(
@@ -73,234 +68,211 @@ def sample_antipodal(
     friction: float = DEFAULT_FRICTION,
     opening: tuple[float, float] = PANDA_OPENING,
     approaches: int = 1,
-    approach_cone: ApproachCone | None = None,
+    approach_cone: ApproachCone | Sequence[ApproachCone] | None = None,
+    standoffs: Sequence[float] = (0.0,),
+    pad: tuple[float, float] = PANDA_PAD,
+    weights: ArrayLike | None = None,
+    accept: Accept | None = None,
+    diverse: int = 1,
     object: str = "",
 ) -> GraspSet:
     """Samples grasps whose contacts are antipodal.
 
     Both contacts lie within the friction cone of their surface, both fingers close on them from
     outside of the material, and neither meets another part of the object on its way from the open
-    position. Fingers are exchangeable; of the two equal poses the one is given whose closing axis
-    has a positive component of largest magnitude.
+    position. Fingers are exchangeable; of the two equal poses the canonical one is given, whose
+    closing axis has a positive component of largest magnitude (`GraspSet.canonical`).
+
+    Distribution: a first contact is uniform on the surface, or has the density of the weights; the
+    line from it is uniform in the solid angle of the friction cone. A pair of patches dA1, dA2 at
+    distance r, whose normals make angles a1, a2 with the line between them, is thus found with a
+    probability in proportion to (w1 cos a2 + w2 cos a1) / r^2 dA1 dA2. It does not depend on how
+    the object lies or is triangulated. Approaches are uniform among the allowed turns about the
+    line. A test leaves of this what passes; with `diverse` above 1 the set covers the grasps
+    instead.
 
     Args:
         mesh: surface in the object frame O [m], faces wound so that normals point outward. It need
             not be watertight.
         n: number of grasps.
-        rng: the same generator state gives the same grasps, and the first of a larger n.
+        rng: the same generator state gives the same grasps, and, unless they are to be diverse, the
+            first of a larger n.
         friction: coefficient between object and fingers; the cone's half angle is its arctangent.
         opening: smallest and largest distance between the fingers [m]. Widths are at most the
             largest less `FINGER_CLEARANCE` on both sides.
         approaches: evenly spaced approach angles for each pair of contacts, the first one random.
-        approach_cone: where approach directions lie; anywhere if None. They are then uniform among
-            the angles about the closing axis that the cone allows, and a pair of contacts without
-            such an angle is left out: 60 degrees about straight down need a closing axis at most 60
-            degrees from horizontal. The same generator state draws the same pairs for any cone.
-        object: name of the library object.
+        approach_cone: where approach directions lie, or several cones that have to hold at once;
+            anywhere if None. They are then uniform among the directions that a pair's closing line
+            leaves; pairs whose line leaves none give no grasp.
+        standoffs: every pose is given once with each of these distances between G and the contacts
+            [m]. Above 0 the hand stays back, as in `frames.pregrasp`, and holds with its finger
+            tips; below 0 it goes further, and holds with what is behind the middle of its pads.
+        pad: from where to where the pads reach along z of G [m]; bounds of the standoffs.
+        weights: (F,) density of first contacts on each face of the mesh, from 0, in any unit.
+            Second contacts lie where the lines lead.
+        accept: keeps grasps that pass, such as those at which a hand is clear; n counts these.
+        diverse: of this many times n grasps those n are kept that `farthest_points` selects, in its
+            order: any first part of them covers the grasps, too.
+        object: name for the set's `object` column.
 
     Returns:
-        n grasps; fewer if there are none, or hardly any (see `PATIENCE`). `width` is the
-        distance of the contacts. `score` is 1 where the closing line meets both surfaces at right
-        angles and falls to 0 where all of the friction is needed: 1 - friction needed / friction.
+        n grasps, or fewer where the object has (almost) no more; see `PATIENCE` and
+        `TEST_PATIENCE`. `width` is the distance of the contacts; `score` is the share of the
+        friction that is left over, from 0 to 1 for a line along both normals. The provenance has
+        the parameters, the state of rng, and how many `rays` and grasps `tried` it took.
 
     Raises:
-        InvalidInputError: a parameter is out of its range.
-        MeshError: the mesh has no faces, vertices that are not finite, or is wound inside out.
+        InvalidInputError: a parameter is out of range, or the weights do not fit the mesh.
+        MeshError: the mesh has no face with area, is not finite, or is wound inside out.
     """
-    _check_parameters(n, friction, opening, approaches)
-    surface = Surface.of(mesh)
+    cones = (approach_cone,) if isinstance(approach_cone, ApproachCone) else approach_cone or ()
+    settings = AntipodalSettings(
+        friction=float(friction),
+        opening=(float(opening[0]), float(opening[1])),
+        approaches=int(approaches),
+        approach_cones=tuple(cones),
+        standoffs=tuple(float(d) for d in standoffs),
+        pad=(float(pad[0]), float(pad[1])),
+    )
+    if n < 0:
+        raise InvalidInputError(f"n is {n}; give the number of grasps, 0 or more")
+    if diverse < 1:
+        raise InvalidInputError(f"diverse is {diverse}; give how many times n to sample, from 1")
+    state = json.loads(json.dumps(rng.bit_generator.state, default=np.ndarray.tolist))
+    found = _collect(Surface.of(mesh, weights), n * diverse, rng, settings, accept)
     provenance = {
         "sampler": "antipodal",
         "version": SAMPLER_VERSION,
         "n": int(n),
-        "friction": float(friction),
-        "opening": [float(w) for w in opening],
+        **asdict(settings),
         "finger_clearance": FINGER_CLEARANCE,
-        "approaches": int(approaches),
-        "approach_cone": None if approach_cone is None else asdict(approach_cone),
+        "weights": None if weights is None else content_hash(np.asarray(weights, float)),
+        "tested": accept is not None,
+        "diverse": int(diverse),
         "mesh": content_hash(
             np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
         ),
-        "rng": json.loads(json.dumps(rng.bit_generator.state, default=np.ndarray.tolist)),
+        "rng": state,
+        "rays": found.rays,
+        "tried": found.tried,
     }
-    poses, widths, scores = [np.empty((0, 4, 4))], [np.empty(0)], [np.empty(0)]
-    found = rays = 0
-    while found < n and rays < PATIENCE + RARITY * found:
-        pairs = contact_pairs(surface, CHUNK, rng, friction, opening)
-        closing, center = pairs.p_OC2 - pairs.p_OC1, 0.5 * (pairs.p_OC1 + pairs.p_OC2)
-        pair, approach = _approach_directions(closing, approaches, approach_cone, rng)
-        poses.append(grasp_from_axes(closing[pair], approach, center[pair]))
-        widths.append(np.linalg.norm(closing, axis=1)[pair])
-        scores.append(1.0 - pairs.friction_needed[pair] / friction)
-        found += len(poses[-1])
-        rays += CHUNK
-    return GraspSet.create(
-        np.concatenate(poses)[:n],
-        object=object,
-        width=np.concatenate(widths)[:n],
-        score=np.concatenate(scores)[:n],
-        provenance=provenance,
+    grasps = GraspSet.create(
+        found.X_OG, object=object, width=found.width, score=found.score, provenance=provenance
     )
+    if diverse == 1:
+        return grasps
+    return grasps.select(farthest_points(grasps.X_OG, min(n, len(grasps))))
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A mesh made ready for sampling; faces without area are left out.
+@dataclass(frozen=True, kw_only=True)
+class AntipodalSettings:
+    """What makes a grasp antipodal, and the poses that a pair of contacts gives; fields as the
+    arguments of `sample_antipodal`.
 
-    Attributes:
-        triangles: (F, 3, 3) corners in the object frame [m].
-        normals: (F, 3) outward unit normals.
-        share: (F,) cumulative share of the area; the last entry is 1.
-        rays: caster for these triangles.
+    Raises:
+        InvalidInputError: a value is out of range.
     """
 
-    triangles: Array
-    normals: Array
-    share: Array
-    rays: RayCaster
+    friction: float
+    opening: tuple[float, float]
+    approaches: int
+    approach_cones: tuple[ApproachCone, ...]
+    standoffs: tuple[float, ...]
+    pad: tuple[float, float]
 
-    @classmethod
-    def of(cls, mesh: trimesh.Trimesh) -> Surface:
-        """Reads a mesh.
-
-        Raises:
-            MeshError: see `sample_antipodal`.
-        """
-        vertices = np.asarray(mesh.vertices, np.float64)
-        if not np.isfinite(vertices).all():
-            raise MeshError("the mesh has vertices that are not finite; repair it before sampling")
-        triangles = vertices[np.asarray(mesh.faces, np.int64).reshape(-1, 3)]
-        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        length = np.linalg.norm(cross, axis=1)
-        kept = length > 0.0
-        if not kept.any():
-            raise MeshError("the mesh has no faces with area; nothing can be grasped")
-        volume = np.einsum("ij,ij->", triangles[:, 0] - vertices.mean(axis=0), cross) / 6.0
-        if volume < 0.0 and mesh.is_watertight:
-            raise MeshError("the mesh is wound inside out; turn its faces with mesh.invert()")
-        total = np.cumsum(length[kept])
-        normals = cross[kept] / length[kept, None]
-        return cls(triangles[kept], normals, total / total[-1], RayCaster(triangles[kept]))
-
-    def draw(self, n: int, rng: np.random.Generator) -> tuple[Array, Indices]:
-        """(n, 3) points uniform on the surface, and their faces (n,)."""
-        face = np.searchsorted(self.share, rng.random(n), side="right")
-        u, v = rng.random((2, n, 1))
-        fold = u + v > 1.0  # the far half of the parallelogram, turned back into the triangle
-        u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)
-        a, b, c = np.swapaxes(self.triangles[face], 0, 1)
-        return a + u * (b - a) + v * (c - a), face
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.friction) and self.friction > 0.0):
+            raise InvalidInputError(
+                f"friction is {self.friction}; antipodal grasps need a number above 0"
+            )
+        if not 0.0 <= self.opening[0] < self.opening[1] < np.inf:
+            raise InvalidInputError(
+                f"opening is {self.opening}; give the smallest and largest finger distance [m]"
+            )
+        if self.approaches < 1:
+            raise InvalidInputError(
+                f"approaches is {self.approaches}; give 1 or more per contact pair"
+            )
+        if not self.standoffs:
+            raise InvalidInputError("standoffs is empty; give one or more distances, such as 0")
+        low, high = self.pad
+        for distance in self.standoffs:
+            if not low <= distance <= high:
+                raise InvalidInputError(
+                    f"standoff {1e3 * distance:g} mm puts the contacts off the finger pads; give"
+                    f" {1e3 * low:g} to {1e3 * high:g} mm"
+                )
 
 
-def contact_pairs(
+@dataclass(frozen=True, eq=False)
+class _Grasps:
+    """N grasps, and what it took to find them."""
+
+    X_OG: Array
+    width: Array
+    score: Array
+    rays: int = 0
+    tried: int = 0
+
+
+def _collect(
     surface: Surface,
     n: int,
     rng: np.random.Generator,
-    friction: float,
-    opening: tuple[float, float],
-) -> ContactPairs:
-    """Casts n rays from random surface points and keeps the pairs that fingers can close on.
+    settings: AntipodalSettings,
+    accept: Accept | None,
+) -> _Grasps:
+    """The first n grasps of a stream that depends on the random numbers alone."""
+    parts = [_Grasps(np.empty((0, 4, 4)), np.empty(0), np.empty(0))]
+    kept = tried = rays = 0
 
-    One ray can give several pairs: a line into the side of a mug leaves the material on the inside
-    of the near wall and again on the outside of the far wall, and fingers can close on both pairs.
+    def worth_testing() -> bool:
+        return kept < n and tried < TEST_PATIENCE + TEST_RARITY * kept
 
-    Args:
-        surface: where to sample.
-        n: number of rays.
-        rng: random numbers.
-        friction, opening: as for `sample_antipodal`.
-    """
-    widest = opening[1] - 2.0 * FINGER_CLEARANCE
-    p1, face1 = surface.draw(n, rng)
-    line = _directions_in_cone(-surface.normals[face1], np.arctan(friction), rng)
-    ray, face2, width = surface.rays.all_hits(p1, line, widest)
-    p1, face1, line = p1[ray], face1[ray], line[ray]
-    cosine = np.minimum(_dot(-surface.normals[face1], line), _dot(surface.normals[face2], line))
-    held = cosine >= 1.0 / np.hypot(1.0, friction)
-    held &= (width >= max(opening[0], MIN_WIDTH)) & (width <= widest)
-    p1, line, width, cosine = p1[held], line[held], width[held], cosine[held]
-    p2 = p1 + width[:, None] * line
-    travel = 0.5 * (opening[1] - width)
-    free = _finger_path_free(surface, p1, -line, travel)
-    free &= _finger_path_free(surface, p2, line, travel)
-    p1, p2, line, cosine = p1[free], p2[free], line[free], np.minimum(cosine[free], 1.0)
-    largest = np.abs(line).argmax(axis=1)[:, None]
-    turned = np.take_along_axis(line, largest, axis=1) < 0.0
-    return ContactPairs(
-        np.where(turned, p2, p1), np.where(turned, p1, p2), np.sqrt(1.0 - cosine**2) / cosine
+    while worth_testing() and rays < PATIENCE + RARITY * tried:
+        for pairs in draw_pairs(surface, rng, settings.friction, settings.opening):
+            block = _grasps_on(pairs, settings, rng)
+            tried += len(block.X_OG)
+            parts.append(block if accept is None else _accepted(block, accept))
+            kept += len(parts[-1].X_OG)
+            rays += BLOCK
+            if not worth_testing():
+                break
+    return _Grasps(
+        np.concatenate([part.X_OG for part in parts])[:n],
+        np.concatenate([part.width for part in parts])[:n],
+        np.concatenate([part.score for part in parts])[:n],
+        rays,
+        tried,
     )
 
 
-def _finger_path_free(
-    surface: Surface, p_OC: Array, outward: Array, travel: Array
-) -> NDArray[np.bool_]:
-    """(N,) whether fingers reach the contacts (N, 3) from `travel` (N,) [m] away along `outward`.
-
-    What the ray meets first decides: a face within the finger's travel is in the way, and a face
-    seen from behind, at any distance, means that the contact lies inside of material (solids that
-    overlap or touch, a surface that is doubled with both windings).
-    """
-    face, distance = surface.rays.first_hits(p_OC, outward)
-    from_behind = _dot(surface.normals[face], outward) > 0.0
-    return (face < 0) | ((distance > travel) & ~from_behind)
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """(N,) inner products of the rows of (N, 3) arrays."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
-
-
-def _directions_in_cone(axis: Array, half_angle: float, rng: np.random.Generator) -> Array:
-    """(N, 3) unit vectors, uniform on the spherical caps about unit vectors `axis` (N, 3)."""
-    cosine = 1.0 - rng.random((len(axis), 1)) * (1.0 - np.cos(half_angle))
-    azimuth = rng.uniform(0.0, 2.0 * np.pi, (len(axis), 1))
-    u, v = _perpendicular(axis)
-    sine = np.sqrt(1.0 - cosine**2)
-    return cosine * axis + sine * (np.cos(azimuth) * u + np.sin(azimuth) * v)
+def _grasps_on(
+    pairs: ContactPairs, settings: AntipodalSettings, rng: np.random.Generator
+) -> _Grasps:
+    """All grasps of each pair in turn: each approach, and on it each standoff."""
+    closing, center = pairs.p_OC2 - pairs.p_OC1, 0.5 * (pairs.p_OC1 + pairs.p_OC2)
+    width = np.linalg.norm(closing, axis=1)
+    u, v = perpendicular(closing / width[:, None])
+    turn = random_turns(settings.approach_cones, u, v, settings.approaches, rng)
+    allowed = np.flatnonzero(~np.isnan(turn[:, 0]))
+    turn = turn[allowed, :, None]
+    approach = np.cos(turn) * u[allowed, None] + np.sin(turn) * v[allowed, None]
+    pair = np.repeat(allowed, settings.approaches)
+    X_OG = grasp_from_axes(closing[pair], approach.reshape(-1, 3), center[pair])
+    if settings.standoffs != (0.0,):
+        moved = [pregrasp(X_OG, distance) for distance in settings.standoffs]
+        X_OG = np.stack(moved, axis=1).reshape(-1, 4, 4)
+        pair = np.repeat(pair, len(settings.standoffs))
+    score = 1.0 - pairs.friction_needed / settings.friction
+    return _Grasps(X_OG, width[pair], score[pair])
 
 
-def _approach_directions(
-    closing: Array, approaches: int, cone: ApproachCone | None, rng: np.random.Generator
-) -> tuple[Indices, Array]:
-    """Directions (M, 3) perpendicular to closing axes (N, 3), and whose they are (M,)."""
-    u, v = _perpendicular(closing / np.linalg.norm(closing, axis=1, keepdims=True))
-    first = rng.random((len(closing), 1))
-    if cone is None:
-        kept = np.arange(len(closing))
-        angle = 2.0 * np.pi * first + 2.0 * np.pi * np.arange(approaches) / approaches
-    else:
-        middle, half = cone.turns(u, v)
-        kept = np.flatnonzero(~np.isnan(half))
-        share = (first[kept] + np.arange(approaches) / approaches) % 1.0
-        angle = middle[kept, None] + half[kept, None] * (2.0 * share - 1.0)
-    direction = np.cos(angle)[..., None] * u[kept, None] + np.sin(angle)[..., None] * v[kept, None]
-    return np.repeat(kept, approaches), direction.reshape(-1, 3)
-
-
-def _perpendicular(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors (N, 3) that make a right-handed frame with the unit vectors `axis`.
-
-    Without branch or pole (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
-    """
-    x, y, z = axis.T
-    sign = np.copysign(1.0, z)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    u = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    v = np.stack([b, sign + y * y * a, -y], axis=1)
-    return u, v
-
-
-def _check_parameters(
-    n: Any, friction: float, opening: tuple[float, float], approaches: Any
-) -> None:
-    if n < 0:
-        raise InvalidInputError(f"n is {n}; give the number of grasps, 0 or more")
-    if not (np.isfinite(friction) and friction > 0.0):
-        raise InvalidInputError(f"friction is {friction}; antipodal grasps need a number above 0")
-    if not (0.0 <= opening[0] < opening[1] < np.inf):
+def _accepted(grasps: _Grasps, accept: Accept) -> _Grasps:
+    passed = np.asarray(accept(grasps.X_OG), dtype=bool)
+    if passed.shape != (len(grasps.X_OG),):
         raise InvalidInputError(
-            f"opening is {tuple(opening)}; give the smallest and largest finger distance [m]"
+            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has to"
+            " tell for each grasp whether to keep it"
         )
-    if approaches < 1:
-        raise InvalidInputError(f"approaches is {approaches}; give 1 or more per contact pair")
+    return _Grasps(grasps.X_OG[passed], grasps.width[passed], grasps.score[passed])

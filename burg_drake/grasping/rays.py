@@ -31,20 +31,24 @@ class RayCaster:
         offset: distance that rays start past their origins [m].
     """
 
-    def __init__(self, triangles: Array) -> None:
+    def __init__(self, vertices: Array, faces: Indices) -> None:
         """Builds the hierarchy.
 
         Args:
-            triangles: (F, 3, 3) corners of the faces [m], F >= 1.
+            vertices: (V, 3) [m].
+            faces: (F, 3) indices of their corners, F >= 1.
         """
-        corners = triangles.reshape(-1, 3)
-        lower, upper = corners.min(axis=0), corners.max(axis=0)
+        used = np.zeros(len(vertices), bool)
+        used[faces] = True
+        lower, upper = vertices[used].min(axis=0), vertices[used].max(axis=0)
         self._center = 0.5 * (lower + upper)
         self._radius = 0.5 * float(np.linalg.norm(upper - lower)) or 1.0
         self.offset = START_OFFSET * self._radius
         self._scene = EmbreeScene(robust=True)
-        scaled = ((triangles - self._center) / self._radius).astype(np.float32)
-        self._geometry = TriangleMesh(self._scene, np.ascontiguousarray(scaled))
+        scaled = ((vertices - self._center) / self._radius).astype(np.float32)
+        self._geometry = TriangleMesh(
+            self._scene, np.ascontiguousarray(scaled), np.ascontiguousarray(faces, np.int32)
+        )
 
     def first_hits(
         self, origins: Array, directions: Array, reach: float = np.inf

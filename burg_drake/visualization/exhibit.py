@@ -145,7 +145,7 @@ def _touching(entry: ObjectEntry) -> str:
 
 def draw_exhibit(meshcat: Meshcat, exhibit: Exhibit, placed: PlacedRow, unit: float) -> None:
     name = exhibit.name
-    _write(meshcat, f"{ROOT}/labels/{name}", exhibit.label, placed.p_WL)
+    write_label(meshcat, f"{ROOT}/labels/{name}", exhibit.label, placed.p_WL)
     poses = [f"poses/{name}/{k}" for k in range(len(exhibit.R_WO_poses))]
     homes = [f"{ROOT}/{home}" for home in (*(f"{c}/{name}" for c in COLUMNS), *poses)]
     for k, (home, p_WI) in enumerate(zip(homes, placed.p_WI, strict=True)):
@@ -166,7 +166,9 @@ def draw_exhibit(meshcat: Meshcat, exhibit: Exhibit, placed: PlacedRow, unit: fl
         X_WO = RigidTransform(RotationMatrix(R_WO), p_WI + lift)
         meshcat.SetTransform(f"{home}/object", X_WO)
         caption, width = exhibit.captions[k]
-        _write(meshcat, f"{home}/caption", caption, placed.captions[k] - (width / 2.0, 0.0, 0.0))
+        write_label(
+            meshcat, f"{home}/caption", caption, placed.captions[k] - (width / 2.0, 0.0, 0.0)
+        )
 
 
 def _draw_pieces(
@@ -220,7 +222,8 @@ def _joined(
     )
 
 
-def _write(meshcat: Meshcat, path: str, text: Mesh, p_WL: Array) -> None:
+def write_label(meshcat: Meshcat, path: str, text: Mesh, p_WL: Array) -> None:
+    """Puts a text's left foot at `p_WL` (3,) on the floor [m]."""
     meshcat.SetObject(path, text)
     meshcat.SetTransform(path, RigidTransform(p_WL + np.array([0.0, 0.0, LIFT])))
 

@@ -21,7 +21,7 @@ from burg_drake.visualization.exhibit import (
 )
 from burg_drake.visualization.gallery_layout import ASPECT, ELEVATION, Layout, lay_out
 from burg_drake.visualization.hydroelastic_view import HIGH_PRESSURE, hydroelastic_meshes
-from burg_drake.visualization.page import LegendEntry
+from burg_drake.visualization.legend import LegendEntry
 from burg_drake.visualization.portrait import camera_rotation, fit_camera
 
 LEGEND_ROOM = 0.15

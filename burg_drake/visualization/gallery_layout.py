@@ -97,25 +97,26 @@ class Layout:
             ]
         )
 
+    def distance(self) -> float:
+        """How far away, up to a factor, a camera has to be that sees all of it [m]."""
+        lower, upper = self.corners().min(axis=0), self.corners().max(axis=0)
+        return float(max((upper - lower)[0] / ASPECT, (upper - lower)[1] * np.sin(ELEVATION)))
 
-def lay_out(rows: Sequence[Row], unit: float, line: float) -> Layout:
+
+def lay_out(rows: Sequence[Row], unit: float, line: float, max_banks: int = MAX_BANKS) -> Layout:
     """Places rows in the number of banks that lets the camera come nearest.
 
     Args:
         rows: at least one.
         unit: size of a usual object [m].
         line: height of a line of text [m].
+        max_banks: at least one.
     """
     layouts = [
         _in_banks(rows, count, GAP * unit, line)
-        for count in range(1, min(MAX_BANKS, len(rows)) + 1)
+        for count in range(1, min(max_banks, len(rows)) + 1)
     ]
-
-    def distance(layout: Layout) -> float:
-        lower, upper = layout.corners().min(axis=0), layout.corners().max(axis=0)
-        return max((upper - lower)[0] / ASPECT, (upper - lower)[1] * np.sin(ELEVATION))
-
-    return min(layouts, key=distance)
+    return min(layouts, key=Layout.distance)
 
 
 def _in_banks(rows: Sequence[Row], count: int, gap: float, line: float) -> Layout:

@@ -19,6 +19,8 @@ from PIL import Image, ImageDraw, ImageFont
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
+from burg_drake.visualization.color_map import linear_light
+
 ROUGHNESS = 0.65
 """Of all surfaces: the gloss of paint and plastic."""
 
@@ -38,11 +40,12 @@ LABEL_INK = (52, 57, 64)
 """Colour of labels, as sRGB bytes."""
 
 
-def gltf_mesh(path: Path) -> Mesh:
+def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
     """A visual mesh file (.obj, with its materials and textures) as a glTF in memory.
 
     Args:
         path: the mesh [m].
+        opacity: 0 to 1, on top of the materials'.
 
     Returns:
         Drake's shape; the same look at the same place as the file's.
@@ -58,8 +61,10 @@ def gltf_mesh(path: Path) -> Mesh:
         surface = material.setdefault("pbrMetallicRoughness", {})
         surface |= {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
         r, g, b, a = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
-        surface["baseColorFactor"] = [*(ALBEDO * _linear(c) for c in (r, g, b)), a]
-        material["doubleSided"] = True
+        surface["baseColorFactor"] = [*(ALBEDO * _linear(c) for c in (r, g, b)), opacity * a]
+        material["doubleSided"] = opacity == 1.0  # else backs would shine through
+        if opacity < 1.0:
+            material["alphaMode"] = "BLEND"
     buffers = [files[buffer["uri"]] for buffer in document["buffers"]]
     return _shape(document, buffers, path.name)
 
@@ -149,8 +154,8 @@ def _data_uri(kind: str, data: bytes) -> str:
 
 
 def _linear(value: float) -> float:
-    """Linear light of an sRGB value in [0, 1] (IEC 61966-2-1), as glTF has its colour factors."""
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+    """Linear light of an sRGB value in [0, 1], as glTF has its colour factors."""
+    return float(linear_light(value))
 
 
 def _text_image(lines: tuple[str, ...]) -> Image.Image:

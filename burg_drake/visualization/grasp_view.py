@@ -1,19 +1,17 @@
-"""Grasps as small grippers, one mesh an outcome: thousands of them cost a browser nothing."""
+"""Grasps as small grippers, one mesh a colour: thousands of them cost a browser nothing."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.geometry import Meshcat, Rgba
+from pydrake.geometry import Meshcat
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, transform_points
-from burg_drake.core.outcome import Outcome
-from burg_drake.station.hand import Hand
-from burg_drake.visualization.palette import group_of
+from burg_drake.visualization.flat_mesh import draw_flat
+from burg_drake.visualization.grasp_groups import GraspGroup
 
 FINGER_LENGTH = 0.045
 """From the glyph's palm to the grasp frame's origin [m]."""
@@ -28,53 +26,34 @@ GRASPS_PATH = "/drake/grasps"
 
 
 def draw_grasps(
-    meshcat: Meshcat,
-    X_WG: ArrayLike,
-    hand: Hand,
-    outcomes: Sequence[Outcome | None] | None = None,
-    width: ArrayLike | None = None,
-) -> Counter[Outcome | None]:
-    """Draws grasps, coloured by outcome, in the place of those drawn before.
+    meshcat: Meshcat, X_WG: ArrayLike, width: ArrayLike, groups: Iterable[GraspGroup]
+) -> None:
+    """Draws grasps in groups of one colour each, in the place of those drawn before.
 
     Args:
-        meshcat: where to draw, below `/drake/grasps`, one path an outcome.
+        meshcat: where to draw, below `/drake/grasps`, one path a group.
         X_WG: (N, 4, 4) grasps in the world.
-        hand: gives the opening at which grasps of unknown width are drawn.
-        outcomes: (N,); None, or entries of None, for grasps that nobody judged.
-        width: (N,) distance between the pads [m]; NaN where unknown.
-
-    Returns:
-        Number of grasps drawn by outcome.
+        width: (N,) distance between the pads [m]; finite.
+        groups: with indices of the grasps; those that are in none are not drawn.
 
     Raises:
-        InvalidInputError: the lengths differ.
+        InvalidInputError: the lengths differ, or a width is not known.
     """
     poses = np.asarray(X_WG, dtype=float).reshape(-1, 4, 4)
-    n = len(poses)
-    verdicts = [None] * n if outcomes is None else list(outcomes)
-    if len(verdicts) != n:
-        raise InvalidInputError(f"{len(verdicts)} outcomes for {n} grasps; give one each")
-    widths = np.array(np.broadcast_to(np.nan if width is None else width, (n,)), dtype=float)
-    widths = np.where(np.isfinite(widths), widths, hand.opening[1])
+    widths = np.asarray(width, dtype=float)
+    if widths.shape != (len(poses),) or not np.isfinite(widths).all():
+        known = np.count_nonzero(np.isfinite(widths))
+        raise InvalidInputError(f"{known} known widths for {len(poses)} grasps; give one each")
     meshcat.Delete(GRASPS_PATH)
-    counts = Counter(verdicts)
-    for outcome in counts:
-        member = np.array([v is outcome for v in verdicts])
-        rgba = group_of(outcome).rgba
-        radius = BAR_RADIUS if rgba[3] == 1.0 else FAINT_BAR_RADIUS
-        vertices, faces = grasp_triangles(poses[member], widths[member], radius)
-        meshcat.SetTriangleMesh(
-            grasp_path(outcome),
-            vertices,
-            faces,
-            Rgba(*rgba),
-        )
-    return counts
+    for group in groups:
+        radius = BAR_RADIUS if group.rgba[3] == 1.0 else FAINT_BAR_RADIUS
+        vertices, faces = grasp_triangles(poses[group.members], widths[group.members], radius)
+        draw_flat(meshcat, grasp_path(group.key), vertices, faces, group.rgba)
 
 
-def grasp_path(outcome: Outcome | None) -> str:
-    """Where in Meshcat's tree the grasps with an outcome are."""
-    return f"{GRASPS_PATH}/{outcome or 'not_judged'}"
+def grasp_path(key: str) -> str:
+    """Where in Meshcat's tree the group of grasps with a key is."""
+    return f"{GRASPS_PATH}/{key}"
 
 
 def grasp_triangles(

@@ -9,6 +9,9 @@ class Html(str):
     """Markup that is complete and needs no escaping any more."""
 
 
+VOID = ("br", "hr", "meta", "img", "input", "rect", "line", "path", "circle")
+"""Elements without an end tag, and those of SVG that are closed at once."""
+
 Child = Html | str | int | float | None
 
 
@@ -26,7 +29,7 @@ def element(name: str, /, *children: Child, **attributes: str | float | None) ->
         for key, value in attributes.items()
         if value is not None
     )
-    if name in ("br", "hr", "meta", "img", "rect", "line", "path", "circle") and not children:
+    if name in VOID and not children:
         closing = "/" if name in ("rect", "line", "path", "circle") else ""
         return Html(f"<{name}{written}{closing}>")
     return Html(f"<{name}{written}>{join(*children)}</{name}>")

@@ -63,6 +63,21 @@ GROUPS = (
 
 UNJUDGED = Group("not judged", (0.34, 0.71, 0.91, 1.0), ())
 
+CATEGORIES: tuple[Rgba, ...] = (
+    (0.0, 0.45, 0.70, 1.0),
+    (0.90, 0.62, 0.0, 1.0),
+    (0.0, 0.62, 0.45, 1.0),
+    (0.80, 0.47, 0.65, 1.0),
+    (0.34, 0.71, 0.91, 1.0),
+    (0.84, 0.37, 0.0, 1.0),
+    (0.94, 0.89, 0.26, 1.0),
+)
+"""For names without an order, the most frequent first; there are no more hues that stay apart."""
+OTHERS: Rgba = (0.35, 0.35, 0.35, 0.6)
+"""Of all names beyond those."""
+UNKNOWN: Rgba = (0.62, 0.62, 0.62, 0.6)
+"""Where there is no value."""
+
 
 def group_of(outcome: Outcome | None) -> Group:
     """The group of an outcome; None stands for a grasp that nobody judged."""

@@ -68,7 +68,7 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
         (["--workers", "0"], "'0' is not a whole number from 1"),
         (["--engine", "fast"], "invalid choice: 'fast'"),
         (["--station", "nowhere"], "nowhere does not exist"),
-        (["--grasps", "nowhere.npz"], "nowhere.npz: No such file"),
+        (["--grasps", "nowhere.npz"], "nowhere.npz does not exist"),
         (["--grasps", "a.npz", "--grasps-per-object", "100"], "not allowed with argument --grasps"),
         (["-o", "/dev/null"], "cannot write to folder /dev/null"),
     ],

@@ -7,16 +7,18 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from recording import RecordingMeshcat
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, transform_points
 from burg_drake.core.outcome import Outcome
-from burg_drake.station.hand import load_hand
+from burg_drake.visualization.grasp_groups import all_alike, by_number, by_outcome
 from burg_drake.visualization.grasp_view import (
     BAR_RADIUS,
     FINGER_LENGTH,
     STEM_LENGTH,
     draw_grasps,
+    grasp_path,
     grasp_triangles,
 )
 from burg_drake.visualization.scene_view import open_meshcat
@@ -58,16 +60,41 @@ def test_many_glyphs_are_each_where_its_grasp_is() -> None:
         assert found == pytest.approx(transform_points(X, glyph(np.eye(4), width).vertices))
 
 
-def test_one_object_an_outcome() -> None:
-    meshcat, hand = open_meshcat(), load_hand("panda_hand")
-    poses = np.tile(np.eye(4), (4, 1, 1))
+def test_triangles_have_the_place_and_colour_of_their_group(recorder: RecordingMeshcat) -> None:
+    """As many glyphs as members, at their places, glowing in the linear light of the colour."""
+    n = 5
+    X_WG = make_pose(p_AB=np.arange(3 * n).reshape(n, 3))
+    values = np.array([0.1, 0.9, 0.1, math.nan, 0.5])
+    found = by_number(values, (0.0, 1.0))
+    draw_grasps(recorder, X_WG, np.full(n, WIDTH), found.groups)  # type: ignore[arg-type]
+    assert len(found.groups) == 4
+    for group in found.groups:
+        vertices, _ = recorder.triangles[grasp_path(group.key)]
+        assert vertices.shape[1] == 24 * len(group.members)  # four bars of six corners
+        middles = vertices.T.reshape(len(group.members), 24, 3).mean(axis=1)
+        offset = glyph(np.eye(4)).vertices.mean(axis=0)
+        assert middles == pytest.approx(X_WG[group.members, :3, 3] + offset)
+        material = f"{grasp_path(group.key)}/<object>"
+        for channel, value in zip("rgb", group.rgba, strict=False):
+            light = recorder.properties[material, f"material.emissive.{channel}"]
+            shown = 12.92 * light if light < 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055
+            assert shown == pytest.approx(value, abs=1e-3)
+        assert recorder.properties[material, "material.toneMapped"] is False
+
+
+def test_drawing_again_replaces() -> None:
+    meshcat = open_meshcat()
+    poses, widths = np.tile(np.eye(4), (4, 1, 1)), np.full(4, WIDTH)
     verdicts = [Outcome.LIFTED, Outcome.SLIPPED, Outcome.LIFTED, None]
-    counts = draw_grasps(meshcat, poses, hand, verdicts, [0.02, math.nan, 0.03, 0.04])
-    assert counts == {Outcome.LIFTED: 2, Outcome.SLIPPED: 1, None: 1}
+    draw_grasps(meshcat, poses, widths, by_outcome(verdicts))
     for name in ("lifted", "slipped", "not_judged"):
         assert meshcat.HasPath(f"/drake/grasps/{name}")
-    draw_grasps(meshcat, poses[:1], hand)
+    draw_grasps(meshcat, poses[:1], widths[:1], all_alike(1))
     assert not meshcat.HasPath("/drake/grasps/lifted")
-    assert meshcat.HasPath("/drake/grasps/not_judged")
-    with pytest.raises(InvalidInputError, match="1 outcomes for 4 grasps"):
-        draw_grasps(meshcat, poses, hand, [None])
+    assert meshcat.HasPath("/drake/grasps/all")
+
+
+@pytest.mark.parametrize("widths", [[0.01], [0.01, math.nan]])
+def test_widths_that_cannot_be_drawn(widths: list[float]) -> None:
+    with pytest.raises(InvalidInputError, match="for 2 grasps; give"):
+        draw_grasps(open_meshcat(), np.tile(np.eye(4), (2, 1, 1)), widths, all_alike(2))

@@ -10,7 +10,8 @@ import pytest
 from pydrake.geometry import Box, Rgba
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.visualization.page import LegendEntry, overlay, save_html
+from burg_drake.visualization.legend import LegendEntry
+from burg_drake.visualization.page import overlay, save_html
 from burg_drake.visualization.scene_view import open_meshcat
 
 

@@ -1,0 +1,140 @@
+"""`burg-drake grasps sample`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.evaluation.candidate_sampling import sample_candidates
+from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.objects.library import load_library
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.station import load_station
+
+TILTED = """\
+version: 1
+name: tilted
+library: household
+instances:
+  - object: box
+    X_SO: {{translation: [0.3, 0.2, 0.1], rpy_deg: [35, 40, 0]}}
+{second}
+"""
+
+Capture = pytest.CaptureFixture[str]
+
+
+def sample(*arguments: str | Path) -> int:
+    return main(["grasps", "sample", *map(str, arguments)])
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".npz"])
+def test_a_scene(scene_file: Path, tmp_path: Path, capsys: Capture, suffix: str) -> None:
+    out = tmp_path / f"grasps{suffix}"
+    assert sample(scene_file, "-n", 30, "-o", out) == 0
+    grasps = GraspSet.load(out)
+    assert grasps.column("instance").tolist() == ["mug"] * 30 + ["bottle"] * 30
+    assert grasps.provenance["scene"] == str(scene_file.resolve())
+    words = [line.split() for line in capsys.readouterr().out.splitlines() if line.strip()]
+    assert words[0] == ["on", "asked", "found", "rays", "tried", "seconds"]
+    assert [row[:3] for row in words[2:4]] == [["mug", "30", "30"], ["bottle", "30", "30"]]
+    assert words[-1] == ["wrote", "60", "grasps", "to", str(out)]
+
+
+def test_evaluate_judges_the_same_grasps(scene_file: Path, tmp_path: Path) -> None:
+    assert sample(scene_file, "-n", 20, "--seed", 7, "-o", tmp_path / "grasps.h5") == 0
+    scene, station = load_scene(scene_file), load_station("panda_tabletop")
+    given = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.h5").by_instance)
+    assert given.id == sample_candidates(scene, station, 20, seed=7).id
+
+
+def test_a_library_with_many_options(tmp_path: Path) -> None:
+    faces = len(load_library("household").surface("mug").faces)
+    np.save(tmp_path / "weights.npy", np.arange(float(faces)))
+    out = tmp_path / "grasps.h5"
+    options = ["--object", "mug", "--object", "can", "--friction", "0.3", "--approaches", "2"]
+    options += ["--standoffs-mm", "0,4,-4", "--diverse", "2", "--clear"]
+    options += ["--weights", f"mug={tmp_path / 'weights.npy'}"]
+    assert sample("household", "-n", 12, *options, "-o", out) == 0
+    grasps = GraspSet.load(out)
+    assert grasps.object.tolist() == ["mug"] * 12 + ["can"] * 12
+    told = grasps.provenance["parts"]["mug"]
+    assert told["standoffs"] == [0.0, 0.004, -0.004]
+    assert (told["friction"], told["approaches"], told["diverse"]) == (0.3, 2, 2)
+    assert told["weights"] is not None and told["tested"]
+    assert grasps.provenance["parts"]["can"]["weights"] is None
+
+
+def test_instances_by_name_or_object(scene_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "grasps.h5"
+    for option, name in (("--instance", "bottle"), ("--object", "bottle")):
+        assert sample(scene_file, option, name, "-n", 5, "--from-arm-side", "-o", out) == 0
+        assert set(GraspSet.load(out).column("instance")) == {"bottle"}
+
+
+def test_an_object_without_grasps_is_said(
+    scene_file: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    """A box stands on a corner: no line across it is level, and the hand comes straight down."""
+    scene_file.write_text(TILTED.format(second="  - object: mug"))
+    out = tmp_path / "grasps.h5"
+    options = ["--friction", "0.05", "--approach-angle", "5", "-n", 5, "-o", out]
+    assert sample(scene_file, *options) == 0
+    message = "burg-drake: fewer than asked, as there are hardly any more: box\n"
+    assert capsys.readouterr().err == message
+    assert GraspSet.load(out).column("instance").tolist() == ["mug"] * 5
+    scene_file.write_text(TILTED.format(second=""))
+    assert sample(scene_file, *options) == 1
+    assert len(GraspSet.load(out)) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["tabletop", "-o", "x.h5"], "tabletop is neither a scene nor an object library"),
+        (
+            ["household", "--instance", "mug", "-o", "x.h5"],
+            "has no instances; choose with --object",
+        ),
+        (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
+        (["tabletop_six", "--object", "can", "-o", "x.h5"], "has no free object 'can'"),
+        (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
+        (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; sample into a .h5 file"),
+        (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),
+        (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read weights no.npy"),
+        (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
+    ],
+)
+def test_what_cannot_be_done(
+    arguments: list[str], message: str, tmp_path: Path, capsys: Capture, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert sample(*arguments) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--standoffs-mm", "4,x"), ("--weights", "mug"), ("--diverse", "0"), ("-n", "0")],
+)
+def test_values_that_no_option_takes(option: str, value: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        sample("household", "-o", "x.h5", option, value)
+    assert ended.value.code == 2
+    assert repr(value.split(",")[-1]) in capsys.readouterr().err
+
+
+def test_weights_that_are_no_array(tmp_path: Path, capsys: Capture) -> None:
+    np.savez(tmp_path / "two.npz", a=np.ones(3))
+    (tmp_path / "text.npy").write_text("1 2 3")
+    for name, message in (("two.npz", "holds several arrays"), ("text.npy", "not an array")):
+        given = f"mug={tmp_path / name}"
+        assert sample("household", "--weights", given, "-o", tmp_path / "x.h5") == 2
+        assert message in capsys.readouterr().err

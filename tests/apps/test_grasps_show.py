@@ -1,0 +1,143 @@
+"""`grasps show` on runs by any column, on files in scenes and in rows, and what it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.run_store import Run
+from burg_drake.formats.grasp_files import write_grasp_file
+
+Capture = pytest.CaptureFixture[str]
+N = 12
+
+
+@pytest.fixture
+def grasps() -> GraspSet:
+    """From above on mug and bowl, with numbers, names, and one number missing."""
+    height = np.linspace(0.02, 0.08, N)
+    X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), np.stack([0 * height, 0 * height, height], -1))
+    clearance = np.linspace(-0.002, 0.02, N)
+    clearance[4] = np.nan
+    return GraspSet.create(
+        X_OG,
+        object=["mug"] * 8 + ["bowl"] * 4,
+        width=0.05,
+        score=height,
+        columns={"clearance": clearance, "maker": ["a", "b", "b"] * 4},
+    )
+
+
+@pytest.fixture
+def file(grasps: GraspSet, tmp_path: Path) -> Path:
+    path = tmp_path / "grasps.h5"
+    grasps.save(path)
+    return path
+
+
+def shown(capsys: Capture, *arguments: object) -> list[str]:
+    """Lines that the verb prints, without the last one, about the page."""
+    assert main(["grasps", "show", *map(str, arguments), "--no-wait"]) == 0
+    return capsys.readouterr().out.splitlines()[:-1]
+
+
+def refused(capsys: Capture, *arguments: object) -> str:
+    assert main(["grasps", "show", *map(str, arguments), "--no-wait"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_objects_in_rows_by_score(file: Path, tmp_path: Path, capsys: Capture) -> None:
+    page = tmp_path / "page.html"
+    arguments = ["grasps", "show", str(file), "--library", "household", "--html", str(page)]
+    assert main(arguments) == 0
+    title, histogram, ticks, wrote = capsys.readouterr().out.splitlines()
+    assert title == "score" and wrote == f"wrote {page}"
+    assert len(histogram) == 64 and ticks.split()[0] == "0.02"
+    text = page.read_text()
+    assert "<title>grasps.h5</title>" in text and "12 of 12 grasps" in text
+    assert 'class="bar"' in text and 'type="range"' in text
+    assert "<script src" not in text and "@import" not in text
+
+
+def test_in_the_scene_by_any_column(file: Path, capsys: Capture) -> None:
+    scene = ("--scene", "tabletop_six")
+    lines = shown(capsys, file, *scene, "--color", "clearance", "--range", 0, 0.01)
+    assert lines[0] == "clearance [m]"
+    assert lines[2].startswith("≤ 0") and lines[2].endswith("≥ 0.01")
+    assert lines[3:] == ["1 below the range, 5 above the range", "■ not known (1)"]
+    assert shown(capsys, file, *scene, "--color", "maker") == ["■ b (8)", "■ a (4)"]
+    assert shown(capsys, file, *scene, "--color", "instance") == ["■ mug (8)", "■ bowl (4)"]
+
+
+def test_choice(file: Path, capsys: Capture) -> None:
+    library = ("--library", "household", "--color", "object")
+    assert shown(capsys, file, *library, "--object", "bowl") == ["■ bowl (4)"]
+    assert shown(capsys, file, *library, "--limit", 3) == ["■ bowl (3)", "■ mug (3)"]
+    named = ("--grasps-object", "mug=can", "--grasps-object", "bowl=box")
+    assert shown(capsys, file, *library, *named) == ["■ can (8)", "■ box (4)"]
+
+
+def test_what_the_file_says_of_its_objects(
+    grasps: GraspSet, tmp_path: Path, capsys: Capture
+) -> None:
+    path = tmp_path / "told.npz"
+    told = GraspSet.create(grasps.X_OG, object="mug", provenance={"scene": "tabletop_six"})
+    told.save(path)
+    assert shown(capsys, path) == [f"■ grasps ({N})"]
+    grasps.save(tmp_path / "untold.npz")
+    assert "does not say where its objects are; give --scene or --library" in refused(
+        capsys, tmp_path / "untold.npz"
+    )
+
+
+def test_foreign_files(grasps: GraspSet, tmp_path: Path, capsys: Capture) -> None:
+    mug = grasps.select(grasps.object == "mug")
+    path = tmp_path / "mug_1.0.h5"
+    write_grasp_file(mug, path, "acronym")
+    lines = shown(
+        capsys, path, "--library", "household", "--grasps-object", "mug", "--color", "object"
+    )
+    assert lines == ["■ mug (8)"]
+    camera = tmp_path / "camera.npy"
+    write_grasp_file(mug, camera, "graspnet")
+    assert "grasps in the camera frame, not in those of objects; place them" in refused(
+        capsys, camera, "--library", "household"
+    )
+    world = tmp_path / "world.csv"
+    write_grasp_file(mug, world, "vgn")
+    assert "grasps in the world frame" in refused(capsys, world, "--library", "household")
+
+
+def test_a_run_by_its_margins(run: Run, capsys: Capture) -> None:
+    lines = shown(capsys, run.path, "--color", "pad_force")
+    assert lines[0] == "pad_force [N]" and lines[-1].startswith("■ not known (")
+    assert shown(capsys, run.path, "--color", "stage") == ["■ executed (2)", "■ clear (1)"]
+
+
+def test_refusals(file: Path, run: Run, tmp_path: Path, capsys: Capture) -> None:
+    library = ("--library", "household")
+    for arguments, message in [
+        ((file, *library, "--color", "clearence"), "no column 'clearence'; did you mean 'clear"),
+        ((file, *library, "--object", "mugg"), "has no grasps on 'mugg'; did you mean 'mug'"),
+        ((file, *library, "--outcome", "lifted"), "no column 'outcome'"),
+        ((file, *library, "--instance", "mug"), "no column 'instance'"),
+        ((file, *library, "--color", "maker", "--range", 0, 1), "column 'maker' has names"),
+        ((file, *library, "--range", 1, 0), "the range 1 to 0 does not rise"),
+        ((file, "--library", "kitchen"), "is neither a scene nor an object library"),
+        ((tmp_path / "none.h5",), "none.h5 does not exist"),
+        ((run.path, "--scene", "tabletop_six"), "--scene is for grasp files"),
+        ((run.path, "--station", "panda_wsg"), "--station is for grasp files"),
+    ]:
+        assert message in refused(capsys, *arguments)
+
+
+def test_an_empty_file(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "empty.npz"
+    GraspSet.create(np.empty((0, 4, 4)), object="mug").save(path)
+    assert "empty.npz has no grasps" in refused(capsys, path, "--library", "household")

@@ -1,0 +1,69 @@
+"""Legends as HTML: escaped, counted, and as long as they say."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from burg_drake.visualization.legend import (
+    BAR_WIDTH,
+    HISTOGRAM_HEIGHT,
+    MARGIN,
+    ColorBar,
+    LegendEntry,
+    legend_html,
+)
+
+BAR = ColorBar(
+    title="clearance [m] <b>",
+    colors=("#000000", "#888888", "#ffffff", "#ff0000"),
+    counts=(0, 10, 5, 0),
+    ticks=((0.0, "≤ 0"), (0.5, "1"), (1.0, "2")),
+    paths=("/g/0", "/g/1", "/g/2", "/g/3"),
+    note="3 below the range",
+)
+
+
+def rects(html: str) -> list[dict[str, str]]:
+    return [dict(re.findall(r'(\w+)="([^"]*)"', tag)) for tag in re.findall(r"<rect[^>]*>", html)]
+
+
+def test_histogram_is_in_proportion() -> None:
+    drawn = rects(BAR.html())
+    heights = [float(r["height"]) for r in drawn[::2]]
+    assert heights == pytest.approx([0.0, HISTOGRAM_HEIGHT, HISTOGRAM_HEIGHT / 2, 0.0])
+    feet = {float(r["y"]) + float(r["height"]) for r in drawn[::2]}
+    assert feet == {float(HISTOGRAM_HEIGHT)}
+
+
+def test_bar_has_every_color_side_by_side() -> None:
+    drawn = rects(BAR.html())[1::2]
+    assert [r["fill"] for r in drawn] == list(BAR.colors)
+    edges = [float(r["x"]) for r in drawn]
+    widths = [float(r["width"]) for r in drawn]
+    assert edges[0] == MARGIN and sum(widths) == BAR_WIDTH
+    assert [x + w for x, w in zip(edges, widths, strict=True)][:-1] == edges[1:]
+
+
+def test_ticks_are_below_their_places() -> None:
+    found = re.findall(r'<text x="([\d.]+)"[^>]*>([^<]*)</text>', BAR.html())
+    assert found == [
+        (f"{MARGIN:.1f}", "≤ 0"),
+        (f"{MARGIN + BAR_WIDTH / 2:.1f}", "1"),
+        (f"{MARGIN + BAR_WIDTH:.1f}", "2"),
+    ]
+
+
+def test_text_is_escaped_and_paths_are_there() -> None:
+    html = legend_html([BAR, LegendEntry("<i>&", "#123456", ("/g/unknown",))])
+    assert "<b>" not in html and "clearance [m] &lt;b&gt;" in html
+    assert "&lt;i&gt;&amp;" in html
+    assert 'data-paths="/g/0 /g/1 /g/2 /g/3"' in html
+    assert "<p>3 below the range</p>" in html
+    assert html.count('type="range"') == 2 and html.count('type="checkbox"') == 1
+
+
+def test_all_counts_zero() -> None:
+    empty = ColorBar("x", ("#000000",), (0,), ((0.0, "0"), (1.0, "1")), ("/g/0",))
+    assert float(rects(empty.html())[0]["height"]) == 0.0
