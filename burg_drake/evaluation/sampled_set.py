@@ -1,20 +1,62 @@
-"""Joins what was sampled on several objects into one set that says how it was made."""
+"""Sets of grasps sampled on several objects, which say how they were made."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
 from burg_drake.evaluation.candidates import INSTANCE
 from burg_drake.evaluation.run_document import software_versions
 from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
+
+
+def sample_grasps(
+    source: Scene | ObjectLibrary,
+    station: Station,
+    n: int,
+    *,
+    seed: int = 0,
+    settings: SamplingSettings | None = None,
+    only: Iterable[str] | None = None,
+) -> GraspSet:
+    """Samples antipodal grasps on the free objects of a scene, or on those of a library.
+
+    Args:
+        source: the scene, or the library, in which objects lie nowhere.
+        station: gives the hand and, in a scene, the place of the arm.
+        n: grasps for each instance or object; there are fewer where there are no more.
+        seed: of the random numbers. The grasps of an object follow from it and the object,
+            whatever else there is.
+        settings: how; the defaults if None.
+        only: names of instances of the scene, or of objects of the library; all if None.
+
+    Returns:
+        The grasps in the frames of their objects, in a scene with the column `instance`.
+
+    Raises:
+        InvalidInputError: n is below 1, a setting does not fit, or there is nothing to sample on.
+        UnknownNameError: no such instance or object, or a mesh file is missing.
+    """
+    chosen = settings or SamplingSettings()
+    scene, library = (source, source.library) if isinstance(source, Scene) else (None, source)
+    stream = (
+        sample_library(library, station, n, seed, chosen, only)
+        if scene is None
+        else sample_scene(scene, station, n, seed, chosen, only)
+    )
+    sampled = dict(stream)
+    if not sampled:
+        raise InvalidInputError(f"{source.name!r} has no free objects; nothing to sample on")
+    return sampled_set(sampled, library, scene, station, n, seed, chosen)
 
 
 def sampled_set(

@@ -22,21 +22,17 @@ from burg_drake.core.resources import builtin_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.station.engine import ENGINES
 
+GROUPS = (["library"], ["scene"], ["grasps"], ["hand"])
 HELP = (
     [],
-    ["library"],
-    ["library", "build"],
-    ["library", "list"],
-    ["scene"],
-    ["scene", "show"],
-    ["scene", "validate"],
-    ["evaluate"],
-    ["replay"],
-    ["grasps"],
-    ["grasps", "show"],
-    ["report"],
+    *GROUPS,
+    *(["library", v] for v in ("build", "add", "list", "show", "check", "import-burg")),
+    *(["library", "import-ycb"],),
+    *(["scene", v] for v in ("show", "validate", "settle", "import-burg")),
+    *(["grasps", v] for v in ("sample", "score", "show", "convert", "stats")),
+    *(["hand", v] for v in ("list", "check")),
+    *([v] for v in ("evaluate", "robustness", "replay", "report", "frames")),
 )
-LEAVES = ("build", "list", "show", "validate", "evaluate", "replay", "report")
 
 
 @pytest.mark.parametrize("verb", HELP, ids=" ".join)
@@ -46,7 +42,7 @@ def test_help(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert ended.value.code == 0
     text = capsys.readouterr().out
     assert text.startswith(f"usage: burg-drake {' '.join(verb)}".strip())
-    if not verb or verb[-1] in LEAVES:
+    if verb not in GROUPS:
         assert "examples:\n  burg-drake " in text
 
 

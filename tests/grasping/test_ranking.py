@@ -1,0 +1,76 @@
+"""What a column says about which grasps are good."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.grasping.average_precision import graspnet_ap
+from burg_drake.grasping.ranking import rank_by
+
+
+def with_column(score: ArrayLike, **column: ArrayLike) -> GraspSet:
+    """Grasps a decimetre apart, with scores and a column."""
+    spots = np.arange(len(np.asarray(score)))[:, None] * np.array([0.1, 0.0, 0.0])
+    return GraspSet.create(make_pose(p_AB=spots), object="mug", score=score, columns=column)
+
+
+def test_friction_needed() -> None:
+    needed = [0.1, 0.7, math.nan, 1.1]
+    grasps = with_column([4, 3, 2, 1], friction_needed=needed)
+    ranking = rank_by(grasps, "friction_needed")
+    assert ranking.criteria == ("mu 0.2", "mu 0.4", "mu 0.6", "mu 0.8", "mu 1", "mu 1.2")
+    assert ranking.good == (1, 1, 1, 2, 2, 3)
+    assert ranking.average_precision[0] == 1.0
+    assert ranking.average_precision[-1] == pytest.approx((1 + 1 + 3 / 4) / 3)
+    assert ranking.top.ap == graspnet_ap(grasps, needed).ap
+
+
+def test_outcomes() -> None:
+    outcome = ["slipped", "lifted", "", "lifted_disturbed"]
+    ranking = rank_by(with_column([4, 3, 2, 1], outcome=outcome), "outcome")
+    assert (ranking.criteria, ranking.grasps, ranking.good) == (("lifted",), 3, (1,))
+    assert ranking.average_precision == (0.5,)
+    assert ranking.top.kept.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("values", "judged", "ap"),
+    [
+        ([True, False, True], 3, (1 + 2 / 3) / 2),
+        ([1, 0, 1], 3, (1 + 2 / 3) / 2),
+        ([1.0, math.nan, 1.0], 2, 1.0),
+    ],
+)
+def test_truth_values(values: list[float], judged: int, ap: float) -> None:
+    ranking = rank_by(with_column([3, 2, 1], label=values), "label")
+    assert (ranking.criteria, ranking.grasps) == (("label",), judged)
+    assert ranking.average_precision[0] == pytest.approx(ap)
+
+
+@pytest.mark.parametrize("values", [[0.5, 1.0], ["good", "bad"], [2, 1]])
+def test_columns_that_judge_nothing(values: ArrayLike) -> None:
+    with pytest.raises(InvalidInputError, match="column 'label' does not say which grasps are"):
+        rank_by(with_column([2, 1], label=values), "label")
+
+
+def test_an_unknown_column() -> None:
+    with pytest.raises(UnknownNameError, match=r"no column 'lable'.*label"):
+        rank_by(with_column([2, 1], label=[0, 1]), "lable")
+
+
+@pytest.mark.parametrize("values", [[math.nan, math.nan], ["", ""]])
+def test_empty_columns(values: ArrayLike) -> None:
+    with pytest.raises(InvalidInputError, match="column 'label' judges none of the grasps"):
+        rank_by(with_column([2, 1], label=values), "label")
+
+
+def test_scores_are_needed() -> None:
+    with pytest.raises(InvalidInputError, match="ranks grasps by score, and none of those that"):
+        rank_by(with_column([math.nan, 1.0], label=[1.0, math.nan]), "label")
