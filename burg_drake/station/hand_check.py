@@ -41,8 +41,8 @@ class HandFigures:
 
     Attributes:
         opening: smallest and largest distance between the pads [m].
-        pad_bounds: smallest and largest coordinates of the first pad of the closed hand in the
-            grasp frame G [m].
+        pad_bounds: smallest and largest coordinates of the first pad in the grasp frame G [m];
+            those along x depend on how far the hand is open.
         pad_modulus: hydroelastic modulus of the first pad [Pa].
     """
 
@@ -85,15 +85,8 @@ def _check(hand: Hand, path: Path, content: str) -> HandFigures:
     largest, smallest = bench.check_opening("open"), bench.check_opening("closed")
     bench.check_approach()
     bench.check_coupling()
-    low, high = bench.bounds(0)
-    bounds = (
-        (float(low[0]), float(low[1]), float(low[2])),
-        (
-            float(high[0]),
-            float(high[1]),
-            float(high[2]),
-        ),
-    )
+    (x0, y0, z0), (x1, y1, z1) = bench.bounds(0).tolist()
+    bounds = (x0, y0, z0), (x1, y1, z1)
     return HandFigures((smallest, largest), bounds, bench.pad_modulus())
 
 

@@ -1,0 +1,147 @@
+"""Analytic quality of a set of grasps on several objects, with or without a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.errors import InvalidInputError, MeshError, UnknownNameError, nearest
+from burg_drake.core.frames import Array
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidates import INSTANCE
+from burg_drake.grasping.jaws import jaws_of
+from burg_drake.grasping.quality import (
+    DEFAULT_METRIC,
+    METRICS,
+    Payload,
+    check_metric,
+    grasp_quality,
+    quality_provenance,
+    score_of,
+)
+from burg_drake.grasping.surface import Surface
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+
+def scored_set(
+    grasps: GraspSet,
+    library: ObjectLibrary,
+    station: Station,
+    scene: Scene | None = None,
+    *,
+    friction: Mapping[str, float] | None = None,
+    by: str = DEFAULT_METRIC,
+) -> GraspSet:
+    """Adds the metrics of `grasping.quality`, and in a scene the clearance of the open hand.
+
+    Args:
+        grasps: in the frames of their objects.
+        library: has the objects.
+        station: whose hand it is.
+        scene: where the objects stand. A grasp is on the instance that its column `instance` names,
+            or on the only one of its object.
+        friction: coefficients by object, in place of the library's; under "" for all others.
+        by: the metric that becomes the score, `grasping.quality.METRICS`.
+
+    Returns:
+        The same grasps in the same order. In a scene they have three columns more: `clearance` [m],
+        negative where the hand overlaps something, and what it is nearest to or overlaps,
+        `nearest`; and `gravity_margin` is known.
+
+    Raises:
+        UnknownNameError: an object, an instance or the metric does not exist.
+        InvalidInputError: an object has several instances and grasps do not say which one they are
+            on, or the metric needs a scene.
+        MeshError: the surface of an object cannot be used.
+    """
+    check_metric(by)
+    if by == "gravity_margin" and scene is None:
+        raise InvalidInputError("gravity_margin needs to know where up is; give a scene")
+    chosen = dict(friction or {})
+    objects = sorted(set(grasps.object.tolist()))
+    for name in chosen:
+        if name and name not in objects:
+            raise UnknownNameError(
+                f"friction is given for {name!r}, of which there are no grasps;"
+                f" {nearest(name, objects)}"
+            )
+    jaws = jaws_of(station.hand, station.hand_model)
+    instance = None if scene is None else _instances(grasps, scene)
+    X_WO = None if scene is None or instance is None else _placed(instance, scene, station)
+    columns: dict[str, Any] = {name: np.full(len(grasps), np.nan) for name in METRICS}
+    columns["force_closure"] = np.zeros(len(grasps), bool)
+    payloads = {}
+    for name in objects:
+        mine = np.flatnonzero(grasps.object == name)
+        payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
+        payloads[name] = asdict(payload)
+        up = None if X_WO is None else X_WO[mine, 2, :3]
+        quality = grasp_quality(grasps.X_OG[mine], _surface(library, name), payload, jaws, up=up)
+        for metric in METRICS:
+            columns[metric][mine] = getattr(quality, metric)
+    if scene is not None and instance is not None and X_WO is not None:
+        columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station)
+    scored = grasps.with_columns(**columns, score=score_of(columns[by], by))
+    how = quality_provenance(jaws, by, payloads=payloads)
+    return replace(scored, provenance={**grasps.provenance, "quality": how})
+
+
+def _surface(library: ObjectLibrary, name: str) -> Surface:
+    try:
+        return Surface.of(library.surface(name))
+    except MeshError as error:
+        raise MeshError(f"object {name!r}: {error}") from error
+
+
+def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
+    """(N,) names of the instances that the grasps are on."""
+    if INSTANCE in grasps.columns:
+        names = grasps.column(INSTANCE)
+        for name in set(names.tolist()) - {""}:
+            if name not in scene.instances:
+                raise UnknownNameError(
+                    f"grasps are on instance {name!r}, which is not in scene {scene.name!r};"
+                    f" {nearest(name, scene.instances)}"
+                )
+    else:
+        names = np.full(len(grasps), "")
+    found = names.astype(object)
+    for object_name in sorted(set(grasps.object[names == ""].tolist())):
+        own = [name for name, i in scene.instances.items() if i.object == object_name]
+        if len(own) != 1:
+            raise InvalidInputError(
+                f"scene {scene.name!r} has {len(own)} instances of {object_name!r}; grasps need a"
+                f" column {INSTANCE!r} to say which one they are on"
+            )
+        found[(names == "") & (grasps.object == object_name)] = own[0]
+    return found.astype(str)
+
+
+def _placed(instance: NDArray[np.str_], scene: Scene, station: Station) -> Array:
+    """(N, 4, 4) poses of instances (N,) in the world."""
+    X_WO = np.empty((len(instance), 4, 4))
+    for name in set(instance.tolist()):
+        X_WO[instance == name] = station.document.X_WS.matrix() @ scene.X_SO(name)
+    return X_WO
+
+
+def _clearances(
+    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station
+) -> dict[str, Any]:
+    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.station.diagram import build_station_diagram
+
+    screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
+    clearance = np.full(len(instance), np.nan)
+    nearest_body = np.full(len(instance), "", dtype=object)
+    for name in sorted(set(instance.tolist())):
+        mine = instance == name
+        found = screen.measure(name, X_WG[mine])
+        clearance[mine], nearest_body[mine] = found.clearance, found.nearest
+    return {"clearance": clearance, "nearest": nearest_body.astype(str)}
