@@ -80,6 +80,19 @@ def add_station(parser: Parser) -> None:
     )
 
 
+def add_renaming(parser: Parser) -> None:
+    """The option --rename; evaluate, which is not about a file alone, calls it --grasps-object."""
+    parser.add_argument(
+        "--rename",
+        "--grasps-object",
+        metavar="[THEIRS=]OURS",
+        type=renaming,
+        action="append",
+        default=[],
+        help="call an object of the file otherwise; OURS alone is for all its grasps",
+    )
+
+
 def add_view(parser: Parser) -> None:
     """The options of verbs that show something."""
     parser.add_argument(
@@ -184,3 +197,11 @@ def coefficient(text: str) -> float:
     if mu < 0.0:
         raise argparse.ArgumentTypeError(f"{text} is not a friction coefficient from 0")
     return mu
+
+
+def renaming(text: str) -> tuple[str, str]:
+    """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
+    theirs, _, ours = text.rpartition("=")
+    if not ours:
+        raise argparse.ArgumentTypeError(f"{text!r} is not THEIRS=OURS, such as Mug_3f2a=mug")
+    return theirs, ours

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import Parser
+from burg_drake.apps.arguments import Parser, renaming
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -63,14 +63,6 @@ def add_given(parser: Parser, which: Any) -> None:
         help="instances by object id; without, grasps go to what is between their fingers",
     )
     group.add_argument("--scene-id", metavar="ID", help="which one of a file of several scenes")
-
-
-def renaming(text: str) -> tuple[str, str]:
-    """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
-    theirs, _, ours = text.rpartition("=")
-    if not ours:
-        raise argparse.ArgumentTypeError(f"{text!r} is not THEIRS=OURS, such as Mug_3f2a=mug")
-    return theirs, ours
 
 
 def numbering(text: str) -> dict[int, str]:

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import Parser, add_verb, number
-from burg_drake.apps.given_grasps import FRAMES, numbering, renaming
+from burg_drake.apps.arguments import Parser, add_renaming, add_verb, number
+from burg_drake.apps.given_grasps import FRAMES, numbering
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -59,15 +59,7 @@ def add_to(group: Any) -> None:
 def _add_selection(parser: Parser) -> None:
     """Options about which grasps are written, and of what."""
     parser.add_argument("--object", metavar="NAME", help="write the grasps of this object only")
-    parser.add_argument(
-        "--rename",
-        "--grasps-object",
-        metavar="[THEIRS=]OURS",
-        action="append",
-        type=renaming,
-        default=[],
-        help="call an object of IN otherwise; once for each",
-    )
+    add_renaming(parser)
     parser.add_argument(
         "--success-above",
         metavar="SCORE",

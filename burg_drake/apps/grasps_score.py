@@ -6,8 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_station, add_verb, friction
-from burg_drake.apps.given_grasps import renaming
+from burg_drake.apps.arguments import add_renaming, add_station, add_verb, friction
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def add_to(group: Any) -> None:
         "measure grasps analytically: force closure, epsilon, what weight they bear",
         "burg-drake grasps score grasps.h5 -o scored.h5",
         "burg-drake grasps score grasps.h5 --scene tabletop_six --by gravity_margin -o scored.h5",
-        "burg-drake grasps score theirs.json --library household --grasps-object mug -o ours.h5",
+        "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",
         "burg-drake grasps score grasps.h5 --friction 0.5 --friction mug=0.3",
         "",
         "Adds a column for each metric: force_closure, friction_needed, antipodal_angle [rad],",
@@ -72,14 +71,7 @@ def add_to(group: Any) -> None:
         default=[],
         help="coefficient (default: the object's); may be given several times",
     )
-    parser.add_argument(
-        "--grasps-object",
-        metavar="[THEIRS=]OURS",
-        type=renaming,
-        action="append",
-        default=[],
-        help="library's name of an object of the file; OURS alone is for all grasps",
-    )
+    add_renaming(parser)
 
 
 def run_score(arguments: argparse.Namespace) -> int:
@@ -99,7 +91,7 @@ def run_score(arguments: argparse.Namespace) -> int:
             f"{arguments.file} has grasps in the {imported.frame} frame; bring them into those of"
             " the objects with `burg-drake grasps convert`"
         )
-    grasps = with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
+    grasps = with_objects_renamed(imported.grasps, dict(arguments.rename))
     source = source_of(arguments, grasps, arguments.file)
     scored = scored_set(
         grasps,

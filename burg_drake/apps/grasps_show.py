@@ -8,8 +8,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import DEFAULT_STATION, add_verb, add_view, number, positive_int
-from burg_drake.apps.given_grasps import renaming
+from burg_drake.apps.arguments import (
+    DEFAULT_STATION,
+    add_renaming,
+    add_verb,
+    add_view,
+    number,
+    positive_int,
+)
 from burg_drake.apps.grasp_source import Source, add_source, source_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome
@@ -45,16 +51,7 @@ def add_to(group: Any) -> None:
         help="where the scene of a grasp file is (default: what the file names, else"
         f" {DEFAULT_STATION})",
     )
-    show.add_argument(
-        "--rename",
-        "--grasps-object",
-        metavar="[THEIRS=]OURS",
-        dest="rename",
-        type=renaming,
-        action="append",
-        default=[],
-        help="what scene or library call an object of the file; OURS alone is for all its grasps",
-    )
+    add_renaming(show)
     _add_choice(show)
     show.add_argument(
         "--color",
@@ -131,6 +128,7 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 def _content(arguments: argparse.Namespace) -> Content:
     from burg_drake.evaluation.candidate_files import read_grasps
+    from burg_drake.formats.conversion import with_objects_renamed
     from burg_drake.formats.grasp_files import read_grasp_file
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.gripper import gripper_of
@@ -150,7 +148,7 @@ def _content(arguments: argparse.Namespace) -> Content:
     if len(grasps) == 0:
         raise InvalidInputError(f"{path} has no grasps")
     if imported.frame == "object":
-        grasps = _renamed(grasps, objects)
+        grasps = with_objects_renamed(grasps, objects)
         source = source_of(arguments, grasps, arguments.file)
     elif imported.frame == "world" and arguments.scene is not None:
         scene = load_scene(arguments.scene)
@@ -179,14 +177,6 @@ def _content_of_run(arguments: argparse.Namespace) -> Content:
     scene = run.scene()
     source = Source(scene.library, scene)
     return Content(run_grasps(run), source, run.station(), title=f"{scene.name}: grasps")
-
-
-def _renamed(grasps: GraspSet, objects: Mapping[str, str]) -> GraspSet:
-    """The grasps with other names of their objects; one by the empty text is for all."""
-    import numpy as np
-
-    names = [objects.get(name, objects.get("", name)) for name in grasps.object.tolist()]
-    return dataclasses.replace(grasps, object=np.array(names, dtype=str))
 
 
 def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:

@@ -9,8 +9,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_verb, not_negative
-from burg_drake.apps.given_grasps import renaming
+from burg_drake.apps.arguments import add_renaming, add_verb, not_negative
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 
@@ -42,14 +41,7 @@ def add_to(group: Any) -> None:
     )
     parser.add_argument("a", metavar="A", help="grasp file of any format, or folder of a run")
     parser.add_argument("b", metavar="B", nargs="?", help="another one, to compare with A")
-    parser.add_argument(
-        "--grasps-object",
-        metavar="[THEIRS=]OURS",
-        type=renaming,
-        action="append",
-        default=[],
-        help="other name for an object of the files; OURS alone is for all grasps",
-    )
+    add_renaming(parser)
     match = parser.add_argument_group("what counts as a match of A and B (all must hold)")
     for name, unit, default, what in (
         ("translation", "mm", DEFAULT_TRANSLATION_MM, "distance of the grasp frames"),
@@ -88,7 +80,7 @@ def run_stats(arguments: argparse.Namespace) -> int:
 
     tolerance, column = _tolerance(arguments), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
-    sets = [_read(path, dict(arguments.grasps_object)) for path in paths]
+    sets = [_read(path, dict(arguments.rename)) for path in paths]
     _check_frames(paths, sets)
     summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]
     rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
