@@ -21,8 +21,8 @@ from scipy.spatial import ConvexHull
 from burg_drake.core.frames import Array
 from burg_drake.grasping.antipodal import sample_antipodal
 from burg_drake.grasping.ball import ball
-from burg_drake.grasping.contacts import grasp_contacts
-from burg_drake.grasping.quality import Payload, friction_needed, grasp_quality
+from burg_drake.grasping.contacts import friction_needed, grasp_contacts
+from burg_drake.grasping.quality import Payload, grasp_quality
 from burg_drake.grasping.surface import Surface
 from burg_drake.grasping.wrench_margins import ANY_WRENCH, epsilon_bracket, reaches
 from burg_drake.grasping.wrench_space import WrenchSpace, hull_volume
@@ -76,7 +76,7 @@ def report(what: str, seconds: float, grasps: int) -> None:
 def wrench_spaces(mesh: trimesh.Trimesh, X_OG: Array, center: Array) -> WrenchSpace:
     contacts = grasp_contacts(Surface.of(mesh), X_OG)
     closure = contacts.touching & (friction_needed(contacts) < FRICTION)
-    print(f"{closure.mean():.1%} in force closure")
+    print(f"{closure.mean():.1%} in force closure where grasped")
     length = float(np.linalg.norm(mesh.vertices - center, axis=1).max())
     return WrenchSpace.of(contacts.select(closure), FRICTION, center, length, X_OG[closure, :3, 1])
 

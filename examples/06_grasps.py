@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
 import burg_drake as burg
 
 scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
@@ -19,7 +22,9 @@ few = mugs.select(burg.farthest_points(mugs.X_OG, 40))
 found = burg.coverage(mugs, few)  # within 15 mm and 15 degrees
 print(f"the {len(few)} grasps of the mug that are farthest apart cover {found.overall.value:.0%}")
 
-for note in burg.write_grasp_file(mugs, "mug_isaac.yaml", format="isaac_grasp"):
-    print(f"note: {note}")
-again = burg.read_grasp_file("mug_isaac.yaml")
-print(f"read back {len(again.grasps)} grasps, in the {again.frame} frame")
+with tempfile.TemporaryDirectory() as folder:
+    path = Path(folder, "mug.yaml")
+    for note in burg.write_grasp_file(mugs, path, format="isaac_grasp"):
+        print(f"note: {note}")
+    theirs = burg.read_grasp_file(path)
+    print(f"read back {len(theirs.grasps)} grasps, in the {theirs.frame} frame")

@@ -23,6 +23,14 @@ class Parser(argparse.ArgumentParser):
         options.setdefault("allow_abbrev", False)
         super().__init__(**options)
 
+    def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
+        """Refuses what it does not know, for its verbs, too, which else leave that to the parser
+        of the whole command, whose help knows nothing of them."""
+        found, unknown = super().parse_known_args(*arguments, **named)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
     def error(self, message: str) -> NoReturn:
         """Ends the program with exit code 2."""
         self.exit(2, f"burg-drake: error: {message} (see {self.prog} --help)\n")

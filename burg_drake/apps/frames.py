@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_verb, add_view
+from burg_drake.apps.grasp_file import add_hand, named_gripper
 from burg_drake.core.errors import UnknownNameError, nearest
 
 if TYPE_CHECKING:
     from burg_drake.formats.grasp_format import GraspFormat, Gripper
 
-DEFAULT_HAND = "panda_hand"
 OURS = "burg_drake"
 
 OUR_FRAMES = (
@@ -42,12 +42,7 @@ def add_to(verbs: Any) -> None:
     frames.add_argument(
         "names", metavar="NAME", nargs="*", help="formats of grasp files (default: all)"
     )
-    frames.add_argument(
-        "--hand",
-        metavar="HAND",
-        default=DEFAULT_HAND,
-        help="hand document or built-in name (default: %(default)s)",
-    )
+    add_hand(frames)
     frames.add_argument(
         "--text", action="store_true", help="print the tables alone, without a view"
     )
@@ -58,13 +53,13 @@ def run_frames(arguments: argparse.Namespace) -> int:
     """Prints the tables and shows the frames."""
     formats = _formats(arguments.names)
     if arguments.text:
-        _print_tables(formats, _gripper(arguments.hand))
+        _print_tables(formats, named_gripper(arguments.hand))
         return 0
     from burg_drake.apps.live import open_view, present
     from burg_drake.station.hand import locate_hand
     from burg_drake.visualization.frames_view import show_frames
 
-    gripper = _gripper(arguments.hand)
+    gripper = named_gripper(arguments.hand)
     hand, model, _ = locate_hand(arguments.hand)
     meshcat = open_view(arguments)
     # ours is in every picture
@@ -85,19 +80,6 @@ def _formats(names: list[str]) -> Mapping[str, GraspFormat]:
         if name not in FORMATS:
             raise UnknownNameError(f"there is no grasp format {name!r}; {nearest(name, FORMATS)}")
     return {name: FORMATS[name] for name in names or FORMATS}
-
-
-def _gripper(hand: str) -> Gripper:
-    """What formats know of a hand; that of the Panda's without looking at its model."""
-    from burg_drake.formats.grasp_format import PANDA
-
-    if hand == DEFAULT_HAND:
-        return PANDA
-    from burg_drake.station.gripper import gripper_of
-    from burg_drake.station.hand import locate_hand
-
-    document, model, _ = locate_hand(hand)
-    return gripper_of(document, model)
 
 
 def _print_tables(formats: Mapping[str, GraspFormat], gripper: Gripper) -> None:

@@ -83,9 +83,12 @@ def source_of(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> Sou
         path: of the file, for messages.
 
     Raises:
-        InvalidInputError: neither option is given and the file names nothing.
+        InvalidInputError: neither option is given and the file names nothing, or the grasps are
+            far from their objects.
         UnknownNameError: what is named is not there, or lacks an object of the grasps.
     """
+    from burg_drake.evaluation.near_objects import require_near
+
     named = [arguments.scene, arguments.library]
     named += [grasps.provenance.get(key) for key in ("scene", "library")]
     reference = next((name for name in named if name), None)
@@ -93,11 +96,20 @@ def source_of(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> Sou
         raise InvalidInputError(
             f"{path} does not say where its objects are; give --scene or --library"
         )
-    source = open_source(str(reference))
+    try:
+        source = open_source(str(reference))
+    except UnknownNameError as error:
+        if reference in (arguments.scene, arguments.library):
+            raise
+        raise UnknownNameError(
+            f"{path} says that its objects are in {reference}, which is not there; give --scene or"
+            " --library"
+        ) from error
     for name in sorted(set(grasps.object.tolist())):
         if name not in source.library.objects:
             raise UnknownNameError(
                 f"{path} has grasps of object {name!r}, which is not in library"
                 f" {source.library.root}; {nearest(name, source.library.objects)}"
             )
+    require_near(grasps, source.library, path)
     return source

@@ -6,25 +6,24 @@ import math
 from collections.abc import Sequence
 from typing import TypeVar
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-
+from burg_drake.apps.number_tables import (
+    QUANTILES as SHOWN_QUANTILES,
+)
+from burg_drake.apps.number_tables import new_table, print_numbers, print_table
 from burg_drake.grasping.comparison import (
     QUANTILES,
     Comparison,
+    Distribution,
     ObjectComparison,
     ObjectSummary,
     SetSummary,
 )
 from burg_drake.grasping.coverage import Share
 from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.ranking import Ranking
+from burg_drake.grasping.ranking import FRICTION_NEEDED, Ranking
 
 MOST_VALUES = 6
 """Different values of a text column that are printed."""
-
-SHOWN_QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 ALL = "all"
 
@@ -39,18 +38,14 @@ def print_summary(title: str, summary: SetSummary, notes: Sequence[str] = ()) ->
         summary: its figures.
         notes: what was left behind as it was read.
     """
-    table = _table(title, "object", "grasps", "inst.", "equal", "width\n[mm]", "score")
+    table = new_table(title, "object", "grasps", "inst.", "equal", "width\n[mm]", "score")
     table.add_column("nearest\n[mm]", justify="right", no_wrap=True)
     for name, one in _with_all(summary.objects, summary.overall):
         table.add_row(name or "-", *_object_cells(one))
-    _print(table)
+    print_table(table)
     print("Means of width, score, and combined distance to the nearest other grasp.")
-    table = _table("", "column", "grasps", "mean", *(f"{q:.0%}" for q in SHOWN_QUANTILES))
-    for name, values in summary.numbers.items():
-        if values.count:
-            shown = [values.quantiles[QUANTILES.index(q)] for q in SHOWN_QUANTILES]
-            table.add_row(name, f"{values.count:,}", *_alike([values.mean, *shown]))
-    _print(table)
+    numbers = {name: values for name, values in summary.numbers.items() if values.count}
+    print_numbers("", {name: (of.count, _figures(of)) for name, of in numbers.items()})
     for name, share in summary.truths.items():
         print(f"{name}: {share.count:,} of {share.total:,} ({_share(share)})")
     for name, counts in summary.texts.items():
@@ -62,12 +57,12 @@ def print_summary(title: str, summary: SetSummary, notes: Sequence[str] = ()) ->
 
 def print_comparison(comparison: Comparison) -> None:
     """Prints how two sets compare, by object."""
-    table = _table("A and B", "object", "A", "B", "A has\nB near", "B has\nA near")
+    table = new_table("A and B", "object", "A", "B", "A has\nB near", "B has\nA near")
     for head in ("A to B\n[mm]", "95 %\n[mm]", "shift\n[mm]", "turn\n[deg]", "B to A\n[mm]"):
         table.add_column(head, justify="right", no_wrap=True)
     for name, one in _with_all(comparison.objects, comparison.overall):
         table.add_row(name or "-", *_comparison_cells(one))
-    _print(table)
+    print_table(table)
     overall = comparison.overall
     print(
         f"Near is {_bounds(comparison.tolerance)}. Medians of distances to the nearest grasp, where"
@@ -84,38 +79,34 @@ def print_ranking(ranking: Ranking) -> None:
     top = ranking.top
     length = len(top.precision)
     heads = ("good if", "good", "AP", f"AP of the top {length}")
-    table = _table(f"scores judged by {ranking.column}", *heads)
+    table = new_table(f"scores judged by {ranking.column}", *heads)
     rows = zip(
         ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
     )
     for name, good, ap, ap_top in rows:
         table.add_row(name, f"{good:,} of {ranking.grasps:,}", _figure(ap, 3), _figure(ap_top, 3))
-    _print(table)
+    print_table(table)
     print(
         f"AP is precision over recall. GraspNet-1Billion's AP of the top {length} is {top.ap:.3f};"
         f" it would be {top.attainable:.3f} if all {len(top.kept)} grasps that suppression leaves"
         " were good."
     )
-
-
-def _table(title: str, first: str, *others: str) -> Table:
-    table = Table(
-        box=box.SIMPLE_HEAD, title=title or None, title_justify="left", padding=(0, 1, 0, 0)
-    )
-    table.add_column(first, no_wrap=True)
-    for head in others:
-        table.add_column(head, justify="right", no_wrap=True)
-    return table
-
-
-def _print(table: Table) -> None:
-    Console(markup=False, highlight=False).print(table)
+    if ranking.colliding is not None:
+        print(f"{ranking.colliding:,} collide, counted as bad.")
+    elif ranking.column == FRICTION_NEEDED:
+        print("Collisions unknown, not counted: no column `clearance`, `screened` or `outcome`.")
 
 
 def _with_all(objects: dict[str, Row], overall: Row) -> list[tuple[str, Row]]:
     """Rows by object, and one of all if there are several."""
     rows = list(objects.items())
     return rows if len(rows) == 1 else [*rows, (ALL, overall)]
+
+
+def _figures(values: Distribution) -> dict[str, float]:
+    """Mean and quantiles by name."""
+    shown = {f"{q:.0%}": values.quantiles[QUANTILES.index(q)] for q in SHOWN_QUANTILES}
+    return {"mean": values.mean, **shown}
 
 
 def _object_cells(one: ObjectSummary) -> list[str]:
@@ -166,12 +157,3 @@ def _share(share: Share) -> str:
 
 def _figure(value: float, decimals: int = 1) -> str:
     return "-" if math.isnan(value) else f"{value:.{decimals}f}"
-
-
-def _alike(values: list[float]) -> list[str]:
-    """Numbers with as many decimals as give the largest one three digits."""
-    largest = max(abs(value) for value in values)
-    exponent = math.floor(math.log10(largest)) if largest else 0
-    if not -4 <= exponent <= 6:
-        return [f"{value:.2e}" for value in values]
-    return [_figure(value, max(0, 2 - exponent)) for value in values]

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import Parser, add_renaming, add_verb, number
-from burg_drake.apps.given_grasps import FRAMES, numbering
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.apps.grasp_file import (
+    FRAMES,
+    add_camera_options,
+    add_file_options,
+    add_hand,
+    gripper_for,
+)
+from burg_drake.apps.grasp_output import add_format, named, output_of, print_notes
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
-
-DEFAULT_HAND = "panda_hand"
 
 
 def add_to(group: Any) -> None:
@@ -26,32 +29,18 @@ def add_to(group: Any) -> None:
         "convert",
         run_convert,
         "write grasps of one format in another",
-        "burg-drake grasps convert --formats",
         "burg-drake grasps convert Mug_10f6_0.00027.h5 mug.h5 --rename mug",
         "burg-drake grasps convert grasps.h5 mug.yaml --to isaac_grasp --object mug",
         "burg-drake grasps convert grasps.h5 out/ --to graspgen --success-above 0.5",
+        "burg-drake grasps convert runs/first out/ --to acronym",
         "burg-drake grasps convert scene.npy grasps.h5 --scene tabletop_six --camera-pose cam.npy",
     )
-    parser.add_argument("input", metavar="IN", nargs="?", help="file of grasps")
-    parser.add_argument(
-        "output", metavar="OUT", nargs="?", help="file, or folder for one file an object"
-    )
-    parser.add_argument("--formats", action="store_true", help="list the formats and end")
-    parser.add_argument(
-        "--from", dest="source", metavar="FORMAT", help="format of IN (default: by its content)"
-    )
-    parser.add_argument(
-        "--to", dest="target", metavar="FORMAT", help="format of OUT (default: by its suffix)"
-    )
-    parser.add_argument(
-        "--hand",
-        metavar="HAND",
-        default=DEFAULT_HAND,
-        help="hand that the grasps are for: document or built-in name (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--gripper-link", metavar="NAME", help="what isaac_grasp files call the body of that hand"
-    )
+    parser.add_argument("input", metavar="IN", help="file of grasps, or folder of a run")
+    parser.add_argument("output", metavar="OUT", help="file, or folder for one file an object")
+    parser.add_argument("--formats", action=_Formats, nargs=0, help="list the formats and end")
+    add_file_options(parser)
+    add_format(parser)
+    add_hand(parser, default=None)
     _add_selection(parser)
     _add_placement(parser)
 
@@ -74,67 +63,23 @@ def _add_placement(parser: Parser) -> None:
         "frames", "For grasps that IN or OUT measure in a scene or a camera instead of an object."
     )
     group.add_argument("--scene", metavar="SCENE", help="scene in which the objects stand")
-    group.add_argument(
-        "--camera-pose",
-        metavar="FILE",
-        nargs="+",
-        default=[],
-        help="the camera in the scene frame: 4x4 .npy, FILE:INDEX, or YAML; several are multiplied",
-    )
+    add_camera_options(group)
     group.add_argument(
         "--frame", choices=tuple(FRAMES), help="what IN measures in, if not what its format says"
     )
     group.add_argument("--out-frame", choices=tuple(FRAMES), help="what OUT measures in, likewise")
-    group.add_argument(
-        "--object-ids",
-        metavar="ID=NAME,...",
-        type=numbering,
-        default={},
-        help="object ids of instances in GraspNet's files",
-    )
-    group.add_argument("--scene-id", metavar="ID", help="which one of a file of several scenes")
 
 
 def run_convert(arguments: argparse.Namespace) -> int:
     """Reads, changes what is asked for, writes, and says what got lost on the way."""
-    from burg_drake.formats.grasp_files import FORMATS, format_by_suffix, format_of
-
-    if arguments.formats:
-        _print_formats(list(FORMATS.values()))
-        return 0
-    if arguments.input is None or arguments.output is None:
-        raise InvalidInputError("give a file to read and a file or folder to write: IN OUT")
-    out = Path(arguments.output)
-    is_folder = out.is_dir() or arguments.output.endswith("/") or not out.suffix
-    if is_folder and arguments.target is None:
-        raise InvalidInputError(f"{out} is a folder; say in which format to write (--to)")
-    target = FORMATS[arguments.target] if arguments.target else format_by_suffix(out)
-    gripper = _gripper(arguments)
-    imported = _read(arguments, target, gripper)
-    source = FORMATS[arguments.source] if arguments.source else format_of(arguments.input)
-    _print_read(arguments.input, source, imported)
+    output = output_of(arguments.output, arguments.target)
+    gripper = gripper_for(arguments, path=arguments.input)
+    imported = _read(arguments, output.format, gripper)
+    _print_read(arguments, imported)
     grasps = _selected(imported.grasps, arguments)
-    if is_folder:
-        from burg_drake.formats.conversion import write_each_object
-
-        for path, notes in write_each_object(grasps, out, target, gripper).items():
-            _print_written(path, target, notes)
-    else:
-        _print_written(out, target, target.write(grasps, out, gripper))
+    output.require_fits(grasps.object.tolist())
+    output.write(grasps, gripper)
     return 0
-
-
-def _gripper(arguments: argparse.Namespace) -> Gripper:
-    """The hand of the grasps; for the Panda without a look into its model."""
-    from burg_drake.formats.grasp_format import PANDA
-
-    gripper = PANDA
-    if arguments.hand != DEFAULT_HAND:
-        from burg_drake.station.gripper import gripper_of
-        from burg_drake.station.hand import locate_hand
-
-        gripper = gripper_of(*locate_hand(arguments.hand))
-    return replace(gripper, body=arguments.gripper_link) if arguments.gripper_link else gripper
 
 
 def _read(arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper) -> Imported:
@@ -167,29 +112,30 @@ def _selected(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
     return grasps
 
 
-def _print_read(path: str, source: GraspFormat, imported: Imported) -> None:
+def _print_read(arguments: argparse.Namespace, imported: Imported) -> None:
     from burg_drake.core.errors import listing
     from burg_drake.evaluation.exchange import IN_WORDS
+    from burg_drake.evaluation.grasp_input import format_name
+    from burg_drake.formats.grasp_files import FORMATS
 
+    path = arguments.input
+    format = named(FORMATS[arguments.source or format_name(path)])
     names = sorted({name for name in imported.grasps.object.tolist() if name})
     of = f" of {listing(names)}" if names else ""
     where = IN_WORDS[imported.frame]
-    print(f"{path}: {_named(source)}, {len(imported.grasps)} grasps{of} in {where}")
-    _print_notes(imported.notes)
+    kind = "run" if Path(path).is_dir() else format
+    print(f"{path}: {kind}, {len(imported.grasps)} grasps{of} in {where}")
+    print_notes(imported.notes)
 
 
-def _print_written(path: Path, target: GraspFormat, notes: Sequence[str]) -> None:
-    print(f"{path}: written as {_named(target)}")
-    _print_notes(notes)
+class _Formats(argparse.Action):
+    """Lists the formats and ends, whatever else is given."""
 
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from burg_drake.formats.grasp_files import FORMATS
 
-def _named(format: GraspFormat) -> str:
-    return format.name if format.title == format.name else f"{format.name} ({format.title})"
-
-
-def _print_notes(notes: Sequence[str]) -> None:
-    for note in notes:
-        print(f"  {note}")
+        _print_formats(list(FORMATS.values()))
+        parser.exit()
 
 
 def _print_formats(formats: Sequence[GraspFormat]) -> None:
@@ -200,7 +146,7 @@ def _print_formats(formats: Sequence[GraspFormat]) -> None:
 
     for format in formats:
         frame = convention_of(format, PANDA)
-        print(f"{_named(format)} {' '.join(format.suffixes)}")
+        print(f"{named(format)} {' '.join(format.suffixes)}")
         print(
             f"  measured in {IN_WORDS[format.frame]}; approach {frame.approach}, closing"
             f" {frame.closing}, origin {frame.origin}"

@@ -6,7 +6,6 @@ import argparse
 import sys
 import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
@@ -14,11 +13,13 @@ from burg_drake.apps.arguments import (
     add_station,
     add_verb,
     approach_angle,
+    not_negative,
     number,
     positive,
     positive_int,
     seed,
 )
+from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def add_to(group: Any) -> None:
         "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
         "burg-drake grasps sample tabletop_six --instance mug --clear --from-arm-side -o mug.h5",
         "burg-drake grasps sample household --object mug -n 500 --diverse 4 -o mug.npz",
-        "burg-drake grasps sample household --standoffs-mm 0,4,-4 --approaches 6 -o many.h5",
+        "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
         "",
         "The grasps of an object follow from --seed and the object, whatever else there is;",
         "`evaluate` samples the same ones with the same settings.",
@@ -58,11 +59,13 @@ def add_to(group: Any) -> None:
         help="grasps for each instance, or object of a library (default: %(default)s)",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="grasp file to write, .h5 or .npz"
+        "-o",
+        "--output",
+        metavar="OUT",
+        required=True,
+        help="grasp file to write, such as .h5, or folder for one file an object",
     )
-    parser.add_argument(
-        "--to", metavar="FORMAT", help="format of another project, if the suffix does not tell it"
-    )
+    add_format(parser)
     for name, what in (("object", "this object"), ("instance", "this instance of the scene")):
         parser.add_argument(
             f"--{name}",
@@ -102,9 +105,10 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--standoffs-mm",
-        metavar="A,B",
-        type=_standoffs,
-        default=(0.0,),
+        metavar="MM",
+        type=number,
+        nargs="+",
+        default=[0.0],
         help="give every grasp with the hand this far back, or, below 0, further on (default: 0)",
     )
     parser.add_argument(
@@ -121,6 +125,18 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
         help="only grasps at which the open hand overlaps neither the object nor the scene",
     )
     parser.add_argument(
+        "--margin-mm",
+        metavar="MM",
+        type=not_negative,
+        default=0.0,
+        help="with --clear, only grasps that have this clearance (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--conservative",
+        action="store_true",
+        help="with --clear, test faster, which leaves out a tenth of the clear grasps, too",
+    )
+    parser.add_argument(
         "--diverse",
         metavar="K",
         type=positive_int,
@@ -134,38 +150,32 @@ def run_sample(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.grasp_source import open_source
     from burg_drake.evaluation.sampled_set import sampled_set
     from burg_drake.evaluation.sampling_settings import SamplingSettings
-    from burg_drake.formats.grasp_files import FORMATS, format_by_suffix
     from burg_drake.station.gripper import gripper_of
     from burg_drake.station.station import load_station
 
-    format = FORMATS[arguments.to] if arguments.to else format_by_suffix(arguments.output)
-    if format.frame != "object":
-        raise InvalidInputError(
-            f"{format.title} has grasps in the {format.frame} frame; sample into a .h5 file, and"
-            " bring that into the other frame with `burg-drake grasps convert`"
-        )
+    output = output_of(arguments.output, arguments.target, frame="object")
     source = open_source(arguments.source)
+    names = _chosen(arguments, source)
+    output.require_fits(_objects(source, names))
     station = load_station(arguments.station)
     settings = SamplingSettings(
         friction=arguments.friction,
         approaches=arguments.approaches,
         approach_angle_deg=arguments.approach_angle,
         from_arm_side=arguments.from_arm_side,
-        standoffs=arguments.standoffs_mm,
+        standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
         weights={name: _load_weights(path) for name, path in arguments.weights},
         clear=arguments.clear,
+        margin=1e-3 * arguments.margin_mm,
+        conservative=arguments.conservative,
         diverse=arguments.diverse,
     )
-    sampled, seconds = _sample(arguments, source, station, settings)
+    sampled, seconds = _sample(arguments, source, names, station, settings)
     grasps = sampled_set(
         sampled, source.library, source.scene, station, arguments.n, arguments.seed, settings
     )
-    gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
-    notes = format.write(grasps, Path(arguments.output), gripper)
     _print_table(sampled, seconds, arguments.n)
-    for note in notes:
-        print(f"burg-drake: note: {note}", file=sys.stderr)
-    print(f"wrote {len(grasps)} grasps to {arguments.output}")
+    output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
     few = [name for name, found in sampled.items() if len(found) < arguments.n]
     if few:
         print(
@@ -175,23 +185,40 @@ def run_sample(arguments: argparse.Namespace) -> int:
     return 0 if len(grasps) else 1
 
 
+def _chosen(arguments: argparse.Namespace, source: Source) -> list[str]:
+    """Names of the instances, or of the objects of a library, that are to be sampled on."""
+    if source.scene is not None:
+        return _instances(source.scene, arguments.instance, arguments.object)
+    if arguments.instance:
+        raise InvalidInputError(
+            f"{arguments.source} is a library, which has no instances; choose with --object"
+        )
+    return arguments.object or list(source.library.objects)
+
+
+def _objects(source: Source, names: list[str]) -> list[str]:
+    """The objects behind the names, as far as there are such names."""
+    if source.scene is None:
+        return names
+    instances = source.scene.instances
+    return [instances[name].object for name in names if name in instances]
+
+
 def _sample(
-    arguments: argparse.Namespace, source: Source, station: Station, settings: SamplingSettings
+    arguments: argparse.Namespace,
+    source: Source,
+    names: list[str],
+    station: Station,
+    settings: SamplingSettings,
 ) -> tuple[dict[str, GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
     from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
 
+    n, seed = arguments.n, arguments.seed
     if source.scene is None:
-        if arguments.instance:
-            raise InvalidInputError(
-                f"{arguments.source} is a library, which has no instances; choose with --object"
-            )
-        stream = sample_library(
-            source.library, station, arguments.n, arguments.seed, settings, arguments.object
-        )
+        stream = sample_library(source.library, station, n, seed, settings, names)
     else:
-        chosen = _instances(source.scene, arguments.instance, arguments.object)
-        stream = sample_scene(source.scene, station, arguments.n, arguments.seed, settings, chosen)
+        stream = sample_scene(source.scene, station, n, seed, settings, names)
     sampled, seconds = {}, {}
     start = time.perf_counter()
     for name, grasps in stream:
@@ -243,11 +270,6 @@ def _print_table(sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], 
         counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
         table.add_row(name, *(f"{count:,}" for count in counts), f"{seconds[name]:.2f}")
     Console().print(table)
-
-
-def _standoffs(text: str) -> tuple[float, ...]:
-    """Millimetres, separated by commas, as metres."""
-    return tuple(1e-3 * number(word) for word in text.split(","))
 
 
 def _named_file(text: str) -> tuple[str, str]:

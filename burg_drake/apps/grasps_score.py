@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_renaming, add_station, add_verb, friction
+from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -14,24 +14,11 @@ if TYPE_CHECKING:
 
 # Kept in step with grasping.quality, which imports too much for a help text; a test compares them.
 DEFAULT_METRIC = "load_margin"
-UNITS = {
-    "friction_needed": "",
-    "antipodal_angle": "deg",
-    "epsilon": "",
-    "volume": "",
-    "load_margin": "weights",
-    "gravity_margin": "weights",
-    "patch_area": "mm2",
-    "contact_offset": "mm",
-    "clearance": "mm",
-}
-"""Metrics of the table, and the units that they are printed in."""
-
-QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
+    from burg_drake.apps.grasp_file import add_file_options
     from burg_drake.apps.grasp_source import add_source
 
     parser = add_verb(
@@ -44,16 +31,25 @@ def add_to(group: Any) -> None:
         "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",
         "burg-drake grasps score grasps.h5 --friction 0.5 --friction mug=0.3",
         "",
-        "Adds a column for each metric: force_closure, friction_needed, antipodal_angle [rad],",
-        "epsilon, volume, load_margin (the weights that the grip bears in the worst direction),",
-        "gravity_margin (along gravity, in a scene), patch_area [m2], contact_offset [m]; and in a",
-        "scene clearance [m], negative where the open hand overlaps something, and nearest. Where",
-        "a pad meets nothing, the metrics are nan.",
+        "Adds a column for each metric. Of the grasp as given: friction_needed, antipodal_angle",
+        "[rad]. Where pads meet faces that lean more than friction holds, the object slides in the",
+        "hand until they hold it: slide [m], inf if they never do. Of the object at rest there:",
+        "force_closure, epsilon, volume, load_margin (how many times its weight the grip bears",
+        "without giving way, in the worst direction), gravity_margin (along gravity, in a scene;",
+        "below 1 the object begins to turn in the hand, which need not be a drop), patch_area",
+        "[m2], contact_offset [m]. In a scene also clearance [m], negative where the open hand",
+        "overlaps something, nearest, screened (clear, or which collision), collides_with. Where a",
+        "pad meets nothing, metrics are nan.",
     )
-    parser.add_argument("file", metavar="FILE", help="grasp file of any format")
+    parser.add_argument("file", metavar="FILE", help="grasp file of any format, or folder of a run")
+    add_file_options(parser)
     parser.add_argument(
-        "-o", "--output", metavar="OUT", help="grasp file to write (default: only print)"
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="grasp file to write, or folder for one file an object (default: only print)",
     )
+    add_format(parser)
     add_source(parser)
     add_station(parser)
     parser.add_argument(
@@ -76,16 +72,19 @@ def add_to(group: Any) -> None:
 
 def run_score(arguments: argparse.Namespace) -> int:
     """Scores, prints a table and writes a file."""
+    from burg_drake.apps.grasp_file import gripper_for
     from burg_drake.apps.grasp_source import source_of
+    from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.evaluation.scored_set import scored_set
     from burg_drake.formats.conversion import with_objects_renamed
-    from burg_drake.formats.grasp_files import read_grasp_file, write_grasp_file
-    from burg_drake.station.gripper import gripper_of
     from burg_drake.station.station import load_station
 
+    output = None
+    if arguments.output is not None:
+        output = output_of(arguments.output, arguments.target, frame="object")
     station = load_station(arguments.station)
-    gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
-    imported = read_grasp_file(arguments.file, gripper=gripper)
+    gripper = gripper_for(arguments, station)
+    imported = read_input(arguments.file, arguments.source, gripper)
     if imported.frame != "object":
         raise InvalidInputError(
             f"{arguments.file} has grasps in the {imported.frame} frame; bring them into those of"
@@ -93,6 +92,10 @@ def run_score(arguments: argparse.Namespace) -> int:
         )
     grasps = with_objects_renamed(imported.grasps, dict(arguments.rename))
     source = source_of(arguments, grasps, arguments.file)
+    if output is not None:
+        output.require_fits(grasps.object.tolist())
+    for note in imported.notes:
+        print(f"note: {note}")
     scored = scored_set(
         grasps,
         source.library,
@@ -101,35 +104,34 @@ def run_score(arguments: argparse.Namespace) -> int:
         friction=dict(arguments.friction),
         by=arguments.by,
     )
-    _print_table(scored)
-    if arguments.output is not None:
-        for note in write_grasp_file(scored, arguments.output, gripper=gripper):
-            print(f"burg-drake: note: {note}", file=sys.stderr)
-        print(f"wrote {len(scored)} grasps to {arguments.output}, scored by {arguments.by}")
+    _print_tables(scored)
+    if output is not None:
+        print(f"scored by {arguments.by}")
+        output.write(scored, gripper)
     return 0
 
 
-def _print_table(grasps: GraspSet) -> None:
-    """Quantiles of each metric by object."""
-    import numpy as np
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def _print_tables(grasps: GraspSet) -> None:
+    """Quantiles of each metric by object, and what the hand collides with."""
+    from collections import Counter
 
-    factor = {"deg": np.degrees(1.0), "mm": 1e3, "mm2": 1e6}
+    import numpy as np
+
+    from burg_drake.apps.number_tables import QUANTILES, print_numbers
+    from burg_drake.grasping.quality import METRICS
+
     for name in dict.fromkeys(grasps.object.tolist()):
         own = grasps.select(grasps.object == name)
-        closed = int(own.column("force_closure").sum())
-        title = f"{name}: {len(own):,} grasps, {closed:,} in force closure"
-        table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-        table.add_column("metric", no_wrap=True)
-        for column in ("known", *(f"{q:.0%}" for q in QUANTILES)):
-            table.add_column(column, justify="right", no_wrap=True)
-        for metric, unit in UNITS.items():
+        rows = {}
+        for metric in (*METRICS[1:], "clearance"):
             values = own.column(metric) if metric in own.columns else np.empty(0)
-            values = values[~np.isnan(values)] * factor.get(unit, 1.0)
+            values = values[~np.isnan(values)]
             if len(values):
-                shown = np.quantile(values, QUANTILES, method="nearest")
-                label = f"{metric} ({unit})" if unit else metric
-                table.add_row(label, f"{len(values):,}", *(f"{value:.3g}" for value in shown))
-        Console().print(table)
+                shown = np.quantile(values, QUANTILES, method="nearest").tolist()
+                figures = {f"{q:.0%}": value for q, value in zip(QUANTILES, shown, strict=True)}
+                rows[metric] = (len(values), figures)
+        closed = int(own.column("force_closure").sum())
+        print_numbers(f"{name}: {len(own):,} grasps, {closed:,} in force closure", rows)
+        if "screened" in own.columns:
+            counts = Counter(own.column("screened").tolist()).most_common()
+            print("screened: " + ", ".join(f"{outcome} {count:,}" for outcome, count in counts))

@@ -16,6 +16,7 @@ from burg_drake.apps.arguments import (
     number,
     positive_int,
 )
+from burg_drake.apps.grasp_file import add_file_options, gripper_for
 from burg_drake.apps.grasp_source import Source, add_source, source_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome
@@ -44,6 +45,7 @@ def add_to(group: Any) -> None:
         "burg-drake grasps show mug.h5 --library household --object mug",
     )
     show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
+    add_file_options(show)
     add_source(show)
     show.add_argument(
         "--station",
@@ -107,17 +109,17 @@ class Content:
 
 def run_show(arguments: argparse.Namespace) -> int:
     """Shows grasps among the objects that they belong to."""
-    import numpy as np
-
     from burg_drake.apps.legend_text import print_legend
     from burg_drake.apps.live import open_view, present
+    from burg_drake.evaluation.run_grasps import column_called
     from burg_drake.visualization.grasp_legend import color_by
     from burg_drake.visualization.grasp_view import draw_grasps
 
     content = _content(arguments)
     grasps = _choose(content.grasps, arguments)
-    groups, legend = color_by(grasps, arguments.color, arguments.range)
-    width = np.where(np.isfinite(grasps.width), grasps.width, content.station.hand.opening[1])
+    color = arguments.color and column_called(grasps, arguments.color)
+    groups, legend = color_by(grasps, color, arguments.range)
+    width = _widths(grasps, content.station.hand.opening[1])
     meshcat = open_view(arguments)
     draw_grasps(meshcat, _place(content, grasps, width, meshcat), width, groups)
     caption = f"{len(grasps)} of {len(content.grasps)} grasps"
@@ -126,21 +128,31 @@ def run_show(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _widths(grasps: GraspSet, widest: float) -> Array:
+    """(N,) at which fingers are drawn [m]: at their contacts, else as they arrive, else open."""
+    import numpy as np
+
+    from burg_drake.formats.grasp_format import PREGRASP_WIDTH
+
+    arriving = grasps.columns.get(PREGRASP_WIDTH, np.full(len(grasps), np.nan))
+    width = np.where(np.isfinite(grasps.width), grasps.width, arriving)
+    return np.where(np.isfinite(width), width, widest)
+
+
 def _content(arguments: argparse.Namespace) -> Content:
     from burg_drake.evaluation.candidate_files import read_grasps
+    from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.formats.conversion import with_objects_renamed
-    from burg_drake.formats.grasp_files import read_grasp_file
     from burg_drake.scene.scene import load_scene
-    from burg_drake.station.gripper import gripper_of
     from burg_drake.station.station import load_station
 
     path = Path(arguments.file)
     if path.is_dir():
         return _content_of_run(arguments)
     station = load_station(arguments.station or DEFAULT_STATION)
-    gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
+    gripper, format = gripper_for(arguments, station), arguments.source
     objects = dict(arguments.rename)
-    imported = read_grasp_file(path, gripper=gripper)
+    imported = read_input(path, format, gripper)
     grasps = imported.grasps
     told = grasps.provenance.get("station")
     if arguments.station is None and isinstance(told, str):
@@ -159,7 +171,7 @@ def _content(arguments: argparse.Namespace) -> Content:
             " with `burg-drake grasps convert --scene` first"
         )
     if source.scene is not None:
-        given = read_grasps(source.scene, path, gripper, objects=objects)
+        given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
         grasps = _on_instances(given.by_instance)
     return Content(grasps, source, station, title=path.name)
 

@@ -6,10 +6,10 @@ import argparse
 import dataclasses
 import json
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_renaming, add_verb, not_negative
+from burg_drake.apps.grasp_file import add_file_options, add_hand, gripper_for
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 
@@ -41,6 +41,8 @@ def add_to(group: Any) -> None:
     )
     parser.add_argument("a", metavar="A", help="grasp file of any format, or folder of a run")
     parser.add_argument("b", metavar="B", nargs="?", help="another one, to compare with A")
+    add_file_options(parser)
+    add_hand(parser, default=None)
     add_renaming(parser)
     match = parser.add_argument_group("what counts as a match of A and B (all must hold)")
     for name, unit, default, what in (
@@ -66,8 +68,8 @@ def add_to(group: Any) -> None:
     parser.add_argument(
         "--ap",
         metavar="COLUMN",
-        help="average precision of the scores, judged by a column: friction_needed, outcome, or"
-        " one of 0 and 1",
+        help="average precision of the scores, judged by a column: friction_needed (where what"
+        " collides is bad, by clearance, screened or outcome), outcome, or one of 0 and 1",
     )
     parser.add_argument("--json", metavar="FILE", help="write all figures to this file")
 
@@ -75,12 +77,16 @@ def add_to(group: Any) -> None:
 def run_stats(arguments: argparse.Namespace) -> int:
     """Prints the figures of one set or two."""
     from burg_drake.apps.grasp_tables import print_comparison, print_ranking, print_summary
+    from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.grasping.comparison import compare, summarize
     from burg_drake.grasping.ranking import rank_by
 
     tolerance, column = _tolerance(arguments), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
-    sets = [_read(path, dict(arguments.rename)) for path in paths]
+    told = arguments.hand or arguments.gripper_link
+    gripper = gripper_for(arguments) if told else None
+    sets = [read_input(path, arguments.source, gripper) for path in paths]
+    sets = _renamed(sets, dict(arguments.rename))
     _check_frames(paths, sets)
     summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]
     rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
@@ -111,23 +117,20 @@ def _tolerance(arguments: argparse.Namespace) -> Tolerance:
     )
 
 
-def _read(path: str, objects: dict[str, str]) -> Imported:
-    """A file of any format, or the grasps of a run with what became of them."""
-    import numpy as np
+def _renamed(sets: list[Imported], names: dict[str, str]) -> list[Imported]:
+    """The sets with other names of their objects; one that no set has is refused."""
+    from burg_drake.formats.conversion import with_objects_renamed
 
-    from burg_drake.formats.grasp_files import read_grasp_file
-    from burg_drake.formats.grasp_format import Imported
-
-    if Path(path).is_dir():
-        from burg_drake.evaluation.run_grasps import run_grasps
-        from burg_drake.evaluation.run_store import load_run
-
-        imported = Imported(run_grasps(load_run(path)), "object")
-    else:
-        imported = read_grasp_file(path)
-    names = [objects.get(n, objects.get("", n)) for n in imported.grasps.object.tolist()]
-    renamed = dataclasses.replace(imported.grasps, object=np.array(names, dtype=np.str_))
-    return dataclasses.replace(imported, grasps=renamed)
+    known = [set(imported.grasps.object.tolist()) for imported in sets]
+    everywhere = set().union(*known)
+    found = []
+    for imported, own in zip(sets, known, strict=True):
+        others = everywhere - own  # may be in one set only
+        mine = {theirs: ours for theirs, ours in names.items() if theirs not in others}
+        found.append(
+            dataclasses.replace(imported, grasps=with_objects_renamed(imported.grasps, mine))
+        )
+    return found
 
 
 def _check_frames(paths: list[str], sets: list[Imported]) -> None:

@@ -60,12 +60,12 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """Ends an error message about an unknown `name`: the nearest valid one and all that there are.
 
     Returns:
-        For example `did you mean 'mug'? Known: bowl, mug`.
+        For example `did you mean 'mug'? Known: bowl, mug`, or `known: bowl, mug`.
     """
     names = sorted(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    hint = f"did you mean {close[0]!r}? " if close else ""
-    return f"{hint}Known: {listing(names)}"
+    beginning = f"did you mean {close[0]!r}? Known" if close else "known"
+    return f"{beginning}: {listing(names)}"
 
 
 def listing(names: Sequence[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from pathlib import Path
@@ -58,3 +59,22 @@ def writable_folder(path: str | Path) -> Path:
             f"cannot write to folder {path}: {error.strerror or error}; choose a writable place"
         ) from error
     return path
+
+
+def require_writable(path: str | Path) -> None:
+    """Finds out whether a file can be written, before any work is spent on it; makes none.
+
+    Raises:
+        InvalidInputError: `path` is a folder, or nothing can be written where it is to be.
+    """
+    path = Path(path).absolute()
+    place = path if path.is_dir() else next(p for p in path.parents if p.exists())
+    try:
+        if place == path:
+            raise IsADirectoryError(errno.EISDIR, "it is a folder")
+        with tempfile.TemporaryFile(dir=place):
+            pass
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error

@@ -10,13 +10,13 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.damaged import DAMAGED, reason, without_warnings
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.grasps import GraspSet
@@ -27,6 +27,7 @@ READABLE = (1, 2)
 """Version 1 had no further columns."""
 
 FIXED = ("X_OG", "width", "id", "object", "score")
+TEXT = ("id", "object")
 PREFIX = "column:"
 """Of the names of further columns in `.npz`."""
 
@@ -52,21 +53,18 @@ def load_grasps(path: str | Path) -> GraspSet:
         with open(path, "rb") as stream:
             is_hdf5 = stream.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE
         read = _read_hdf5 if is_hdf5 else _read_npz
-        header, fixed, columns = read(Path(path))
-        return GraspSet(**fixed, provenance=header["provenance"], columns=columns)
+        with without_warnings():
+            header, fixed, columns = read(Path(path))
+            _check_types(header, fixed)
+            return GraspSet(**fixed, provenance=header["provenance"], columns=columns)
     except InvalidInputError:
         raise
-    except zipfile.BadZipFile as error:
-        raise _foreign(path, error) from error
     except OSError as error:
         raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, EOFError, RuntimeError, zlib.error) as error:
-        raise _foreign(path, error) from error
-
-
-def _foreign(path: str | Path, error: Exception) -> InvalidInputError:
-    reason = str(error) or type(error).__name__
-    return InvalidInputError(f"{path} is not a grasp set written by burg_drake: {reason}")
+    except DAMAGED as error:
+        raise InvalidInputError(
+            f"{path} is not a grasp set written by burg_drake: {reason(error)}"
+        ) from error
 
 
 def _check(path: Path, header: dict[str, Any]) -> None:
@@ -75,6 +73,14 @@ def _check(path: Path, header: dict[str, Any]) -> None:
             f"{path} has format {header['format']!r} version {header['version']!r};"
             f" this release reads {FORMAT!r} version {' and '.join(map(str, READABLE))}"
         )
+
+
+def _check_types(header: dict[str, Any], fixed: Columns) -> None:
+    if not isinstance(header["provenance"], dict):
+        raise ValueError("its provenance is no mapping")
+    for name, values in fixed.items():
+        if values.dtype.kind != ("U" if name in TEXT else "f"):
+            raise ValueError(f"{name} has values of type {values.dtype}")
 
 
 def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:

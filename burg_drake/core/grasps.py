@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.core.frames import Array, canonical_fingers, check_pose
 
 ID_DIGITS = 12
@@ -96,6 +96,11 @@ class GraspSet:
 
     def __len__(self) -> int:
         return len(self.X_OG)
+
+    def __repr__(self) -> str:
+        objects = listing(sorted(set(self.object.tolist())))
+        columns = f"; columns {', '.join(self.columns)}" if self.columns else ""
+        return f"GraspSet({len(self)} grasps of {objects}{columns})"
 
     @property
     def column_names(self) -> tuple[str, ...]:

@@ -14,10 +14,11 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing,
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import INSTANCE
+from burg_drake.evaluation.grasp_input import read_input
 from burg_drake.evaluation.instance_names import InstanceNames
+from burg_drake.evaluation.near_objects import require_near
 from burg_drake.evaluation.placement import Names, by_instance, held_instances
 from burg_drake.formats.conversion import with_objects_renamed
-from burg_drake.formats.grasp_files import read_grasp_file
 from burg_drake.formats.grasp_format import PANDA, Frame, Gripper
 from burg_drake.scene.scene import Scene
 
@@ -61,7 +62,7 @@ def read_grasps(
 
     Args:
         scene: the scene.
-        path: a file of any format in `formats.grasp_files`.
+        path: a file of any format in `formats.grasp_files`, or the folder of a run.
         gripper: the hand that the grasps are for.
         format: of the file; None to tell by the content.
         objects: names of the scene's objects, or of its instances, by the names that the file has;
@@ -76,7 +77,7 @@ def read_grasps(
         InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
         UnknownNameError: an object, instance or scene that is not there.
     """
-    imported = read_grasp_file(path, format, gripper)
+    imported = read_input(path, format, gripper)
     names = InstanceNames(scene, str(path), dict(objects or {}))
     grasps = _of_one_scene(imported.grasps, scene_id, names.path)
     frame = frame or imported.frame
@@ -86,9 +87,7 @@ def read_grasps(
                 f"{path} has grasps in the frames of their objects, to which neither a pose nor"
                 " object ids apply"
             )
-        if INSTANCE in grasps.columns and not objects:
-            return GivenGrasps(_of_instances(grasps), imported.notes)
-        return GivenGrasps(_of_objects(grasps, names), imported.notes)
+        return GivenGrasps(_of_names(grasps, names), imported.notes)
     if frame == "camera" and X_SF is None:
         raise InvalidInputError(
             f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
@@ -98,6 +97,32 @@ def read_grasps(
     owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
     placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
     return GivenGrasps(placed, (*imported.notes, *notes))
+
+
+def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
+    """Gives grasps in the frames of their objects to the instances of a scene.
+
+    Args:
+        scene: the scene.
+        grasps: with a column `instance` they stay on the instances that it names; else they go to
+            every instance of their object.
+
+    Returns:
+        The grasps by name of an instance, for `given_candidates`.
+
+    Raises:
+        UnknownNameError: the scene has no such object.
+    """
+    return _of_names(grasps, InstanceNames(scene, "the set", {}))
+
+
+def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
+    """The same, with the names of a file."""
+    on_instances = INSTANCE in grasps.columns and not names.given
+    found = _of_instances(grasps) if on_instances else _of_objects(grasps, names)
+    for part in found.values():
+        require_near(part, names.scene.library, names.path)
+    return found
 
 
 def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet:

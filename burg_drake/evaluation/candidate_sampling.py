@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from burg_drake.grasping.antipodal import Accept
-    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.grasping.clearance import HandClearance, Mode
 
 
 def sample_candidates(
@@ -106,7 +106,7 @@ def _sampled_scene(
         object, X_WO = scene.instance(name).object, _X_WO(scene, station, name)
         cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
         if screen is not None:
-            yield name, draw(object, cones, _clear(screen, name, X_WO))
+            yield name, draw(object, cones, _clear(screen, name, X_WO, settings))
         else:
             if (object, cones) not in found:
                 found[object, cones] = draw(object, cones)
@@ -163,7 +163,8 @@ def _sampled_library(
     for name in names:
         accept = None
         if settings.clear:
-            accept = _clear(hand_clearance_alone(library, name, station), name, np.eye(4))
+            screen = hand_clearance_alone(library, name, station)
+            accept = _clear(screen, name, np.eye(4), settings)
         yield name, draw(name, (), accept)
 
 
@@ -265,10 +266,11 @@ def _scene_screen(scene: Scene, station: Station) -> HandClearance:
     return HandClearance(build_station_diagram(scene, station, robot="hand"))
 
 
-def _clear(screen: HandClearance, instance: str, X_WO: Array) -> Accept:
+def _clear(screen: HandClearance, instance: str, X_WO: Array, settings: SamplingSettings) -> Accept:
     """Keeps the grasps at which the open hand is clear."""
+    mode: Mode = "conservative" if settings.conservative else "exact"
 
     def accept(X_OG: Array) -> NDArray[np.bool_]:
-        return screen.measure(instance, X_WO @ X_OG).clear
+        return screen.measure(instance, X_WO @ X_OG, mode=mode, margin=settings.margin).clear
 
     return accept

@@ -21,6 +21,7 @@ from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
 from burg_drake.core.resources import PACKAGE_URI
+from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
 from burg_drake.evaluation.candidates import Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
@@ -65,7 +66,7 @@ def evaluate(
     *,
     grasps_per_object: int = 100,
     approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
-    grasps: Mapping[str, GraspSet] | None = None,
+    grasps: GraspSet | Mapping[str, GraspSet] | None = None,
     engine: Engine | str = ENGINES["standard"],
     seed: int = 0,
     workers: int | None = None,
@@ -86,7 +87,9 @@ def evaluate(
         grasps_per_object: antipodal grasps to sample for each free instance.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
             above 0; 90 is as far as from the side, 180 from anywhere.
-        grasps: the user's own grasps in the object frame, by instance; nothing is sampled then.
+        grasps: the user's own grasps in the object frame; nothing is sampled then. A set goes to
+            the instances that its column `instance` names, or else to all instances of its objects;
+            a mapping has sets by instance, such as those of `read_grasps`.
         engine: how trials are stepped; an engine or the name of a preset.
         seed: of the sampling.
         workers: number of processes; as many as there are processors if None.
@@ -186,14 +189,15 @@ def _open(
     folder: Path,
     scene: Scene,
     station: Station,
-    grasps: Mapping[str, GraspSet] | None,
+    grasps: GraspSet | Mapping[str, GraspSet] | None,
     document: RunDocument,
     reporter: Reporter,
 ) -> Run:
     """Goes on with the run in the folder, or begins a new one there."""
     candidates: Candidates | None = None
     if grasps is not None:
-        candidates = given_candidates(scene, grasps)
+        given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+        candidates = given_candidates(scene, given)
         document = _with_grasps(document, scene, candidates, 0.0)
     if (folder / RUN_FILE).exists():
         run = load_run(folder)

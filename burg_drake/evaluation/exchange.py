@@ -11,9 +11,9 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.evaluation.grasp_input import read_input
 from burg_drake.evaluation.placement import in_frame
 from burg_drake.formats.conversion import with_objects_renamed
-from burg_drake.formats.grasp_files import read_grasp_file
 from burg_drake.formats.grasp_format import PANDA, Frame, Gripper, Imported
 from burg_drake.scene.scene import Scene
 
@@ -36,7 +36,7 @@ def read_in_frame(
     """Reads grasps and measures them in another frame, with the help of a scene where it takes one.
 
     Args:
-        path: the file.
+        path: the file, or the folder of a run.
         wanted: the frame; in that of their object, grasps get the column `instance`.
         gripper: the hand that they are for.
         format: of the file; None to tell by the content.
@@ -51,7 +51,7 @@ def read_in_frame(
         InvalidInputError: the file cannot be read, or a scene or the camera's pose is missing.
         UnknownNameError: an object, instance or scene that is not there.
     """
-    imported = read_grasp_file(path, format, gripper)
+    imported = read_input(path, format, gripper)
     given = frame or imported.frame
     if given == wanted:
         grasps = with_objects_renamed(imported.grasps, objects or {})

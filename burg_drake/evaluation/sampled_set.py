@@ -12,8 +12,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
 from burg_drake.evaluation.candidates import INSTANCE
-from burg_drake.evaluation.run_document import software_versions
 from burg_drake.evaluation.sampling_settings import SamplingSettings
+from burg_drake.evaluation.set_documents import object_files, set_documents
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
@@ -80,25 +80,16 @@ def sampled_set(
     Returns:
         The grasps, with all that it takes to sample them again: the documents and the content that
         they had, `n`, `seed`, `settings`, versions, and under `parts` the provenance of each
-        object's grasps. Weights of faces are there by their hashes.
+        object's grasps. Weights of faces are there by their hashes. `object_files` describes each
+        object as files of other projects do.
     """
-    kind, document = ("library", library.root) if scene is None else ("scene", scene.path)
+    objects = sorted({name for grasps in sampled.values() for name in grasps.object.tolist()})
     provenance: dict[str, Any] = {
-        kind: str(document.resolve()),
-        "station": str(station.path.resolve()),
+        **set_documents(library, scene, station, objects),
+        "object_files": object_files(library, objects),
         "n": n,
         "seed": seed,
         "settings": _plain(settings),
-        "content": {
-            **({} if scene is None else {"scene": scene.content}),
-            "station": station.content,
-            "objects": {
-                object: library.entry(object).build
-                for grasps in sampled.values()
-                for object in np.unique(grasps.object).tolist()
-            },
-        },
-        "versions": software_versions(),
         "parts": {name: dict(grasps.provenance) for name, grasps in sampled.items()},
     }
     joined = dataclasses.replace(GraspSet.concatenate(sampled.values()), provenance=provenance)

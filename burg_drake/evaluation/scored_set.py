@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import InvalidInputError, MeshError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import INSTANCE
+from burg_drake.evaluation.set_documents import set_documents
+from burg_drake.grasping.clearances import CLEARANCE_VERSION
 from burg_drake.grasping.jaws import jaws_of
 from burg_drake.grasping.quality import (
     DEFAULT_METRIC,
@@ -27,6 +30,9 @@ from burg_drake.grasping.surface import Surface
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
+
+SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
+"""Columns that only a scene gives."""
 
 
 def scored_set(
@@ -50,9 +56,11 @@ def scored_set(
         by: the metric that becomes the score, `grasping.quality.METRICS`.
 
     Returns:
-        The same grasps in the same order. In a scene they have three columns more: `clearance` [m],
-        negative where the hand overlaps something, and what it is nearest to or overlaps,
-        `nearest`; and `gravity_margin` is known.
+        The same grasps in the same order; `provenance["quality"]` tells with what they were scored.
+        In a scene `gravity_margin` is known, and there are the `SCENE_COLUMNS`, which grasps from
+        elsewhere lose without one: `clearance` [m], negative where the hand overlaps something;
+        `nearest`, what it overlaps or is nearest to; `screened`, the outcome of the screen, `clear`
+        or one of `Outcome`; and `collides_with`, what decided it, "" if clear.
 
     Raises:
         UnknownNameError: an object, an instance or the metric does not exist.
@@ -63,14 +71,8 @@ def scored_set(
     check_metric(by)
     if by == "gravity_margin" and scene is None:
         raise InvalidInputError("gravity_margin needs to know where up is; give a scene")
-    chosen = dict(friction or {})
     objects = sorted(set(grasps.object.tolist()))
-    for name in chosen:
-        if name and name not in objects:
-            raise UnknownNameError(
-                f"friction is given for {name!r}, of which there are no grasps;"
-                f" {nearest(name, objects)}"
-            )
+    chosen = _friction(friction or {}, objects)
     jaws = jaws_of(station.hand, station.hand_model)
     instance = None if scene is None else _instances(grasps, scene)
     X_WO = None if scene is None or instance is None else _placed(instance, scene, station)
@@ -85,11 +87,25 @@ def scored_set(
         quality = grasp_quality(grasps.X_OG[mine], _surface(library, name), payload, jaws, up=up)
         for metric in METRICS:
             columns[metric][mine] = getattr(quality, metric)
+    how: dict[str, Any] = {"payloads": payloads, **set_documents(library, scene, station, objects)}
     if scene is not None and instance is not None and X_WO is not None:
         columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station)
-    scored = grasps.with_columns(**columns, score=score_of(columns[by], by))
-    how = quality_provenance(jaws, by, payloads=payloads)
-    return replace(scored, provenance={**grasps.provenance, "quality": how})
+        how["clearance_version"] = CLEARANCE_VERSION
+    kept = {name: values for name, values in grasps.columns.items() if name not in SCENE_COLUMNS}
+    provenance = {**grasps.provenance, "quality": quality_provenance(jaws, by, **how)}
+    unscored = replace(grasps, columns=kept, provenance=provenance)
+    return unscored.with_columns(**columns, score=score_of(columns[by], by))
+
+
+def _friction(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
+    """Coefficients by object, and under "" for all others."""
+    for name in given:
+        if name and name not in objects:
+            raise UnknownNameError(
+                f"friction is given for {name!r}, of which there are no grasps;"
+                f" {nearest(name, objects)}"
+            )
+    return dict(given)
 
 
 def _surface(library: ObjectLibrary, name: str) -> Surface:
@@ -138,10 +154,15 @@ def _clearances(
     from burg_drake.station.diagram import build_station_diagram
 
     screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
-    clearance = np.full(len(instance), np.nan)
-    nearest_body = np.full(len(instance), "", dtype=object)
+    columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
     for name in sorted(set(instance.tolist())):
         mine = instance == name
         found = screen.measure(name, X_WG[mine])
-        clearance[mine], nearest_body[mine] = found.clearance, found.nearest
-    return {"clearance": clearance, "nearest": nearest_body.astype(str)}
+        screened = np.where(found.clear, Stage.CLEAR.value, found.outcome)
+        values = (found.clearance, found.nearest, screened, found.blocker)
+        for column, value in zip(SCENE_COLUMNS, values, strict=True):
+            columns[column][mine] = value
+    return {
+        name: values.astype(float if name == "clearance" else str)
+        for name, values in columns.items()
+    }

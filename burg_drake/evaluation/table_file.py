@@ -21,6 +21,9 @@ from burg_drake.evaluation.trial import MOVED
 
 T = TypeVar("T", int, float)
 
+HEAD = 1 << 16
+"""Characters that are looked at to recognise a file."""
+
 METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key of their metadata."""
 
@@ -81,6 +84,17 @@ def read_table(path: Path) -> Columns:
         raise InvalidInputError(f"{path} is not a results table (it is not a text file)") from error
     except ValueError as error:
         raise InvalidInputError(f"{path} is not a results table ({error})") from error
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file is a table of results, by its name or its first line."""
+    if path.suffix == ".parquet":
+        return path.is_file()
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            return {"id", "outcome", "X_OG"} <= set(next(csv.reader([file.readline(HEAD)]), []))
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return False
 
 
 def _csv_cells(rows: list[list[str]]) -> dict[str, list[str]]:

@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.damaged import DAMAGED, reason
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, inverse
@@ -78,7 +79,7 @@ def recognises(path: Path) -> bool:
 
         with h5py.File(path, "r") as file:
             return TRANSFORMS in file
-    except (OSError, RuntimeError):
+    except (OSError, *DAMAGED):
         return False
 
 
@@ -96,10 +97,10 @@ def read(path: Path, gripper: Gripper) -> Imported:
     except InvalidInputError:
         raise
     except OSError as error:
-        reason = error.strerror or "it is no HDF5 file, or only part of one"
-        raise InvalidInputError(f"cannot read {path}: {reason}") from error
-    except (RuntimeError, ValueError, KeyError, TypeError) as error:
-        raise InvalidInputError(f"{path} is a damaged HDF5 file: {error}") from error
+        why = error.strerror or "it is no HDF5 file, or only part of one"
+        raise InvalidInputError(f"cannot read {path}: {why}") from error
+    except DAMAGED as error:
+        raise InvalidInputError(f"{path} is a damaged HDF5 file: {reason(error)}") from error
 
 
 def _read(path: Path, file: Any, gripper: Gripper) -> Imported:
@@ -277,4 +278,5 @@ FORMAT = GraspFormat(
     recognises=recognises,
     read=read,
     write=write,
+    one_object=True,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+from burg_drake.core.damaged import DAMAGED
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasp_storage import FORMAT as MARK
 from burg_drake.core.grasp_storage import HDF5_SIGNATURE
@@ -20,20 +21,14 @@ def _recognises(path: Path) -> bool:
     try:
         with open(path, "rb") as stream:
             start = stream.read(len(HDF5_SIGNATURE))
-    except OSError:
-        return False
-    if start == HDF5_SIGNATURE:
-        import h5py
+        if start == HDF5_SIGNATURE:
+            import h5py
 
-        try:
             with h5py.File(path, "r") as file:
                 return bool(file.attrs.get("format") == MARK)
-        except (OSError, RuntimeError):
-            return False
-    try:
         with zipfile.ZipFile(path) as archive:
             return {"header.npy", "X_OG.npy"} <= set(archive.namelist())
-    except (OSError, zipfile.BadZipFile):
+    except (OSError, *DAMAGED):
         return False
 
 

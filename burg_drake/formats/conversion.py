@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,18 +42,29 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
     for name in names:
         if name not in known:
             raise UnknownNameError(f"no grasps are of object {name!r}; {nearest(name, known)}")
-    provenance = dict(grasps.provenance)
-    files = provenance.get("object_files")
-    if isinstance(files, Mapping):
-        provenance["object_files"] = {names.get(key, key): value for key, value in files.items()}
     return GraspSet.create(
         grasps.X_OG,
         object=np.array([names.get(name, name) for name in grasps.object.tolist()], dtype=str),
         width=grasps.width,
         score=grasps.score,
-        provenance=provenance,
+        provenance=_renamed(grasps.provenance, names),
         columns=grasps.columns,
     )
+
+
+def _renamed(provenance: Any, names: Mapping[str, str]) -> Any:
+    """A provenance whose `object_files`, and those of its parts, go by the new names."""
+    if not isinstance(provenance, Mapping):
+        return provenance
+    result = dict(provenance)
+    files, parts = result.get("object_files"), result.get("parts")
+    if isinstance(files, Mapping):
+        result["object_files"] = {names.get(key, key): value for key, value in files.items()}
+    if isinstance(parts, Mapping):
+        result["parts"] = {key: _renamed(part, names) for key, part in parts.items()}
+    elif isinstance(parts, (list, tuple)):
+        result["parts"] = [_renamed(part, names) for part in parts]
+    return result
 
 
 def of_object(grasps: GraspSet, name: str) -> GraspSet:

@@ -79,7 +79,7 @@ def format_of(path: str | Path) -> GraspFormat:
     tried = ", ".join(f"{name} ({' '.join(f.suffixes)})" for name, f in FORMATS.items())
     raise InvalidInputError(
         f"{path} is not a file of grasps in a format that is known; tried {tried}. If it is one of"
-        " them, name it (--from) to see what is wrong"
+        " them, name that one to see what is wrong"
     )
 
 
@@ -119,10 +119,10 @@ def format_by_suffix(path: str | Path) -> GraspFormat:
     if not fitting:
         known = sorted({suffix for format in FORMATS.values() for suffix in format.suffixes})
         raise InvalidInputError(
-            f"{path}: no format of grasps has the suffix {suffix!r}; name one of"
-            f" {', '.join(FORMATS)} (--to), or use a suffix: {' '.join(known)}"
+            f"{path}: no format of grasps has the suffix {suffix!r}; name one of the"
+            f" formats {', '.join(FORMATS)}, or use a suffix: {' '.join(known)}"
         )
     if len(fitting) > 1 and fitting[0].name != "burg_drake":
         names = " or ".join(format.name for format in fitting)
-        raise InvalidInputError(f"{path}: {suffix} can be {names}; name the one you want (--to)")
+        raise InvalidInputError(f"{path}: {suffix} can be {names}; name the format that you want")
     return fitting[0]

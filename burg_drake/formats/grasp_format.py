@@ -21,6 +21,10 @@ from burg_drake.core.grasps import GraspSet
 Frame = Literal["object", "world", "camera"]
 """What grasp poses of a file are measured in."""
 
+PREGRASP_WIDTH = "pregrasp_width"
+"""Column: distance between the pads with which the hand arrives [m], in contrast to `width`, that
+of the contacts; NaN if unknown."""
+
 
 @dataclass(frozen=True)
 class GripperJoint:
@@ -133,6 +137,7 @@ class GraspFormat:
         recognises: whether a file is of this kind, by its content; False for what cannot be read.
         read: the grasps of a file made for a gripper.
         write: writes grasps of a gripper and returns what the file cannot carry, one sentence each.
+        one_object: a file holds the grasps of one object.
     """
 
     name: str
@@ -146,3 +151,4 @@ class GraspFormat:
     recognises: Callable[[Path], bool]
     read: Callable[[Path, Gripper], Imported]
     write: Callable[[GraspSet, Path, Gripper], tuple[str, ...]]
+    one_object: bool = False

@@ -236,4 +236,5 @@ FORMAT = GraspFormat(
     recognises=recognises,
     read=read,
     write=write,
+    one_object=True,
 )

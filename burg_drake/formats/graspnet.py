@@ -8,7 +8,9 @@ From the sources of github.com/graspnet/graspnetAPI and of networks that are tra
   the object's surface that the network has chosen; the finger tips are `depth` beyond it along x,
   and the contacts are taken to be at the tips (`plot_gripper_pro_max` in utils/utils.py,
   `collision_detection` in utils/eval_utils.py). `width` is the opening with which the hand
-  arrives, `height` the fingers' size along z (0.02 m in networks and in the evaluation).
+  arrives, not the distance of the contacts: grasps collide whose object reaches into the fingers'
+  boxes, which begin at +-width/2. `height` is the fingers' size along z (0.02 m in networks and in
+  the evaluation).
 - A higher score is better: 1.1 - friction coefficient in labels that the API has loaded
   (docs/source/grasp_format.rst), a confidence from networks. Networks write -1 as object id
   (`pred_decode` of graspnet/graspnet-baseline).
@@ -27,7 +29,7 @@ from numpy.typing import ArrayLike
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, make_pose
 from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
+from burg_drake.formats.grasp_format import PREGRASP_WIDTH, GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
 from burg_drake.formats.npy_array import npy_shape, read_npy, write_npy
 from burg_drake.formats.rigid import nearest_rigid
@@ -41,6 +43,9 @@ DEFAULT_DEPTH = 0.02
 """Of grasps that come without [m]; labels and networks have depths of 0.01 to 0.04."""
 NO_OBJECT = -1
 """Object id of grasps that come without."""
+ARRIVAL_CLEARANCE = 0.01
+"""Room between each finger and its contact on arrival, of grasps that come without an opening [m].
+Ours, as much as their fingers are thick: enough for contacts that are not the outermost points."""
 
 R_FG = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Our grasp frame in theirs: z, the approach, is their x, and x, the closing direction, their y."""
@@ -79,10 +84,10 @@ def _read(path: Path, gripper: Gripper) -> Imported:
     grasps = GraspSet.create(
         X_CF @ X_FG(rows[:, DEPTH], gripper),
         object="",
-        width=rows[:, WIDTH],
         score=rows[:, SCORE],
         provenance={"format": FORMAT.name, "file": str(path)},
         columns={
+            PREGRASP_WIDTH: rows[:, WIDTH],
             "height": rows[:, HEIGHT],
             "depth": rows[:, DEPTH],
             "object_id": np.where(np.isfinite(ids), ids, NO_OBJECT).astype(np.int64),
@@ -93,18 +98,17 @@ def _read(path: Path, gripper: Gripper) -> Imported:
 
 def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     n = len(grasps)
-    notes = left_behind(grasps, ("width", "score", "height", "depth", "object_id"), FORMAT.title)
-    width, score = grasps.width, grasps.score
-    if np.isnan(width).any():
-        unknown = f"{int(np.isnan(width).sum())} grasps of unknown width"
-        notes += (f"{unknown} got the hand's opening of {gripper.opening[1]:g} m.",)
+    carried = ("score", PREGRASP_WIDTH, "height", "depth", "object_id")
+    opening, assumed = _openings(grasps, gripper)
+    notes = (*left_behind(grasps, carried, FORMAT.title), *assumed)
+    score = grasps.score
     if np.isnan(score).any():
         notes += (f"{int(np.isnan(score).sum())} grasps without a score got 0.",)
     depth = _numbers(grasps, "depth", DEFAULT_DEPTH)
     X_CF = grasps.X_OG @ inverse(X_FG(depth, gripper))
     rows = np.empty((n, NUMBERS))
     rows[:, SCORE] = np.where(np.isnan(score), 0.0, score)
-    rows[:, WIDTH] = np.where(np.isnan(width), gripper.opening[1], width)
+    rows[:, WIDTH] = opening
     rows[:, HEIGHT] = _numbers(grasps, "height", DEFAULT_HEIGHT)
     rows[:, DEPTH] = depth
     rows[:, ROTATION] = X_CF[:, :3, :3].reshape(n, 9)
@@ -112,6 +116,25 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     rows[:, OBJECT] = _numbers(grasps, "object_id", NO_OBJECT)
     write_npy(path, rows.astype(np.float32))
     return notes
+
+
+def _openings(grasps: GraspSet, gripper: Gripper) -> tuple[Array, tuple[str, ...]]:
+    """(N,) distance of the pads on arrival [m], and notes about those that had to be assumed."""
+    widest = gripper.opening[1]
+    given = _numbers(grasps, PREGRASP_WIDTH, np.nan)
+    roomy = np.minimum(grasps.width + 2.0 * ARRIVAL_CLEARANCE, widest)
+    of_width = np.isnan(given) & ~np.isnan(roomy)
+    unknown = np.isnan(given) & np.isnan(roomy)
+    notes: tuple[str, ...] = ()
+    if of_width.any():
+        notes += (
+            f"width is the opening on arrival there: {int(of_width.sum())} grasps got the distance"
+            f" of their contacts and {2e3 * ARRIVAL_CLEARANCE:g} mm, at most {widest:g} m.",
+        )
+    if unknown.any():
+        count = int(unknown.sum())
+        notes += (f"{count} grasps of unknown width got the hand's opening of {widest:g} m.",)
+    return np.where(of_width, roomy, np.where(unknown, widest, given)), notes
 
 
 def _numbers(grasps: GraspSet, name: str, default: float) -> Array:
@@ -132,8 +155,14 @@ FORMAT = GraspFormat(
     suffixes=(".npy",),
     frame="camera",
     source="github.com/graspnet/graspnetAPI, graspnetAPI/grasp.py",
-    carries=("score", "width (the opening of the hand)", "height", "depth", "object_id"),
-    cannot_carry=("names of objects", "further columns", "provenance", "double precision"),
+    carries=("score", "pregrasp_width", "height", "depth", "object_id"),
+    cannot_carry=(
+        "width",
+        "names of objects",
+        "further columns",
+        "provenance",
+        "double precision",
+    ),
     X_GF=_X_GF,
     recognises=_recognises,
     read=_read,

@@ -20,18 +20,20 @@ the gripper, as GraspGen writes them, are the matter of `graspgen_yaml`.
 
 from __future__ import annotations
 
-import json
 import re
+from functools import partial
 from pathlib import Path
 
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
+from burg_drake.formats.grasp_format import GraspFormat, Gripper
+from burg_drake.formats.isaac_dialect import Dialect
 from burg_drake.formats.isaac_reader import read_yaml
 from burg_drake.formats.isaac_writer import write_yaml
-from burg_drake.formats.one_object import only_object
 
-KIND = "an isaac_grasp file"
+END = 1 << 16
+"""Bytes at each end of a file that are looked at to recognise it: keys that are written in the
+order of the alphabet name the gripper after the grasps."""
+
 _FORMAT_LINE = re.compile(rb"^[\"']?format[\"']?\s*:\s*[\"']?isaac_grasp\b", re.MULTILINE)
 _GRIPPER = re.compile(
     rb"^[\"']?gripper_(frame|frame_link|file)[\"']?\s*:|cspace_position", re.MULTILINE
@@ -45,48 +47,27 @@ def X_GF(gripper: Gripper) -> Array:
 
 def recognises(path: Path) -> bool:
     """Text with `format: isaac_grasp` that says something of the gripper."""
-    return is_isaac_grasp(path) and names_gripper(path)
+    return says_of_hand(path) is True
 
 
-def is_isaac_grasp(path: Path) -> bool:
-    """Text with the line `format: isaac_grasp`."""
+def says_of_hand(path: Path) -> bool | None:
+    """Whether text with the line `format: isaac_grasp` has a gripper frame, a gripper's file or
+    joints, which GraspGen does not write; None for other files."""
     try:
-        return _FORMAT_LINE.search(path.read_bytes()) is not None
+        with path.open("rb") as stream:
+            text = stream.read(END)
+            stream.seek(max(END, path.stat().st_size - END))
+            text += stream.read(END)
     except OSError:
-        return False
+        return None
+    return _GRIPPER.search(text) is not None if _FORMAT_LINE.search(text) else None
 
 
-def names_gripper(path: Path) -> bool:
-    """Text with a gripper frame, a gripper's file or joints, which GraspGen does not write."""
-    return _GRIPPER.search(path.read_bytes()) is not None
-
-
-def read(path: Path, gripper: Gripper) -> Imported:
-    """The grasps of a file; `score` is the confidence.
-
-    Raises:
-        DocumentError: no such file, or a value that cannot be used; the message says where.
-    """
-    return read_yaml(path, gripper, X_GF)
-
-
-def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
-    """Writes the grasps of one object.
-
-    Raises:
-        InvalidInputError: grasps of several objects, or the place cannot be written to.
-    """
-    name = only_object(grasps, KIND)
-    frames = [
-        f"object_frame_link: {json.dumps(f'/World/{name}')}",
-        f"gripper_frame_link: {json.dumps(f'/World/{gripper.body}')}",
-    ]
-    return write_yaml(grasps, path, gripper, X_GF, frames)
-
+DIALECT = Dialect("isaac_grasp", "Isaac Sim grasp editor", X_GF, says_of_hand=True)
 
 FORMAT = GraspFormat(
-    name="isaac_grasp",
-    title="Isaac Sim grasp editor",
+    name=DIALECT.name,
+    title=DIALECT.title,
     suffixes=(".yaml", ".yml"),
     frame="object",
     source="Isaac Sim manual, Grasp Editor; Isaac ROS manual, Isaac Grasp File",
@@ -94,6 +75,7 @@ FORMAT = GraspFormat(
     cannot_carry=("several objects", "further columns", "scale of the object"),
     X_GF=X_GF,
     recognises=recognises,
-    read=read,
-    write=write,
+    read=partial(read_yaml, DIALECT),
+    write=partial(write_yaml, DIALECT),
+    one_object=True,
 )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,31 +13,27 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import DocumentError, listing
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_from_quaternion
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
-from burg_drake.formats.grasp_format import Gripper, Imported
+from burg_drake.formats.grasp_format import PREGRASP_WIDTH, Gripper, Imported
+from burg_drake.formats.isaac_dialect import CLOSED, NAME, OPEN, Dialect
 from burg_drake.formats.one_object import object_name, scale_note
 from burg_drake.formats.yaml_text import load_texts
 
 GRIPPER_KEYS = ("gripper_frame_link", "gripper_frame")
 OBJECT_KEYS = ("object_file", "object_frame_link", "object_frame")
-CLOSED, OPEN = "cspace_position", "pregrasp_cspace_position"
 KNOWN = ("confidence", "position", "orientation", CLOSED, OPEN)
-NAME, PREGRASP_WIDTH = "name", "pregrasp_width"
-"""Columns."""
 TAKEN = (*FIXED_COLUMNS, NAME, PREGRASP_WIDTH)
 UNIT = 1e-3
 """Largest deviation of a quaternion's length from 1 that is taken for rounding; the manual's own
 example has five decimals."""
 
-Frame = Callable[[Gripper], Array]
 
-
-def read_yaml(path: Path, gripper: Gripper, frame: Frame) -> Imported:
+def read_yaml(dialect: Dialect, path: Path, gripper: Gripper) -> Imported:
     """The grasps of a file; `score` is the confidence.
 
     Args:
+        dialect: of the file.
         path: the file.
         gripper: the hand of the grasps.
-        frame: the pose in G of what the file's poses are those of.
 
     Raises:
         DocumentError: no such file, or a value that cannot be used; the message says where.
@@ -52,6 +48,7 @@ def read_yaml(path: Path, gripper: Gripper, frame: Frame) -> Imported:
         if not isinstance(grasp, dict):
             raise _fail(path, f"grasps.{name}", grasp, "position and orientation")
     object, described = _object(path, document)
+    X_FG = inverse(dialect.X_GF(gripper))
     columns: dict[str, NDArray[Any]] = {NAME: np.array(list(grasps), dtype=str)}
     width, note = _widths(path, grasps, CLOSED, gripper)
     opening, _ = _widths(path, grasps, OPEN, gripper)
@@ -60,7 +57,7 @@ def read_yaml(path: Path, gripper: Gripper, frame: Frame) -> Imported:
     further, left = _further(grasps)
     notes: tuple[str, ...] = ()
     if not any(key in document for key in GRIPPER_KEYS):
-        axis = "xyz"[int(np.argmax(np.abs(inverse(frame(gripper))[:3, 0])))]
+        axis = "xyz"[int(np.argmax(np.abs(X_FG[:3, 0])))]
         notes += (
             f"The file names no gripper frame; fingers were taken to close along its {axis}.",
         )
@@ -69,13 +66,13 @@ def read_yaml(path: Path, gripper: Gripper, frame: Frame) -> Imported:
     if "scale" in described:
         notes += (scale_note(object, str(described["file"]), float(described["scale"])),)
     set_ = GraspSet.create(
-        _poses(path, grasps) @ inverse(frame(gripper)),
+        _poses(path, grasps) @ X_FG,
         object=object,
         width=width,
         score=_confidences(path, grasps),
         columns={**further, **columns},
         provenance={
-            "format": "isaac_grasp",
+            "format": dialect.name,
             "file": str(path),
             "object_files": {object: described},
         },
@@ -100,8 +97,8 @@ def _check_gripper(path: Path, document: Mapping[str, Any], gripper: Gripper) ->
     if key is not None and object_name(link) != gripper.body:
         raise DocumentError(
             f"{path}: {key}: {link!r} is not {gripper.body!r}, the frame of hand {gripper.name!r};"
-            " give the hand of these grasps (--hand), or what its body is called there, if that"
-            " has the same frame (--gripper-link)"
+            " read it with the hand that the grasps were made for, or, if the two frames are the"
+            f" same, name {object_name(link)!r} as the gripper's link"
         )
 
 

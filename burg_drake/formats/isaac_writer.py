@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,30 +10,39 @@ import numpy as np
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.grasp_format import Gripper
-from burg_drake.formats.isaac_reader import CLOSED, NAME, OPEN, PREGRASP_WIDTH, Frame
+from burg_drake.formats.grasp_format import PREGRASP_WIDTH, Gripper
+from burg_drake.formats.isaac_dialect import CLOSED, NAME, OPEN, Dialect
 from burg_drake.formats.left_behind import left_behind
+from burg_drake.formats.one_object import only_object
+
+SLACK = 1e-6
+"""By which a width may be beyond the hand's opening and still be its end [m]: single precision."""
 
 
-def write_yaml(
-    grasps: GraspSet, path: Path, gripper: Gripper, frame: Frame, header: Sequence[str]
-) -> tuple[str, ...]:
-    """Writes a file; returns what it cannot carry.
+def write_yaml(dialect: Dialect, grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    """Writes the grasps of one object; returns what the file cannot carry.
 
     Args:
+        dialect: of the file.
         grasps: of one object.
         path: the file.
         gripper: the hand of the grasps.
-        frame: the pose in G of what the file's poses are those of.
-        header: lines above the grasps; without any, joints are not written either.
+
+    Raises:
+        InvalidInputError: grasps of several objects, or the place cannot be written to.
     """
-    X_OF = grasps.X_OG @ frame(gripper)
+    object = only_object(grasps, f"a file of {dialect.title}")
+    X_OF = grasps.X_OG @ dialect.X_GF(gripper)
     q = quaternion_from_rotation(X_OF[:, :3, :3])
     closed = gripper.positions(grasps.width)
     opening = grasps.columns.get(PREGRASP_WIDTH, np.full(len(grasps), gripper.opening[1]))
     opened = gripper.positions(opening)
-    joints = bool(header)
-    lines = ["format: isaac_grasp", "format_version: 1.0", *header, "grasps:"]
+    joints = dialect.says_of_hand
+    frames = [
+        f"object_frame_link: {json.dumps(f'/World/{object}')}",
+        f"gripper_frame_link: {json.dumps(f'/World/{gripper.body}')}",
+    ]
+    lines = ["format: isaac_grasp", "format_version: 1.0", *(frames if joints else ()), "grasps:"]
     for i, name in enumerate(_names(grasps)):
         score = grasps.score[i]
         confidence = ".nan" if np.isnan(score) else _text(score)
@@ -51,10 +59,20 @@ def write_yaml(
             lines += [f"    {OPEN}:"]
             lines += [f"      {joint}: {_text(p[i])}" for joint, p in opened.items()]
     atomic_write(path, "\n".join(lines) + "\n")
-    return _notes(grasps, joints)
+    beyond = _beyond(grasps.width, opening, gripper) if joints else ()
+    return (*beyond, *_notes(grasps, dialect))
 
 
-def _notes(grasps: GraspSet, joints: bool) -> tuple[str, ...]:
+def _beyond(width: Array, opening: Array, gripper: Gripper) -> tuple[str, ...]:
+    """A note if the hand cannot open or close so far."""
+    low, high = gripper.opening
+    off = [(w < low - SLACK) | (w > high + SLACK) for w in (width, opening)]
+    count = int((off[0] | off[1]).sum())
+    told = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
+    return (f"widths of {count} grasps are beyond {told}",) if count else ()
+
+
+def _notes(grasps: GraspSet, dialect: Dialect) -> tuple[str, ...]:
     notes = []
     known = grasps.score[~np.isnan(grasps.score)]
     if len(known) < len(grasps):
@@ -64,8 +82,8 @@ def _notes(grasps: GraspSet, joints: bool) -> tuple[str, ...]:
             f"confidence is meant to be from 0 to 1; the scores reach from {known.min():.3g} to"
             f" {known.max():.3g}."
         )
-    carried = ["score", NAME, *(("object", "width", PREGRASP_WIDTH) if joints else ())]
-    return (*notes, *left_behind(grasps, carried, "isaac_grasp"))
+    of_hand = ("object", "width", PREGRASP_WIDTH) if dialect.says_of_hand else ()
+    return (*notes, *left_behind(grasps, ("score", NAME, *of_hand), dialect.title))
 
 
 def _names(grasps: GraspSet) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.damaged import DAMAGED, reason, without_warnings
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 
@@ -22,9 +23,9 @@ HEADERS = {
 def npy_shape(path: Path) -> tuple[int, ...] | None:
     """Shape of the numbers in a `.npy` file, from its header; None for anything else."""
     try:
-        with path.open("rb") as stream:
+        with path.open("rb") as stream, without_warnings():
             shape, _, dtype = HEADERS[np.lib.format.read_magic(stream)](stream)
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, *DAMAGED):
         return None
     return shape if dtype.kind in "fiu" else None
 
@@ -36,12 +37,12 @@ def read_npy(path: Path) -> NDArray[np.float64]:
         InvalidInputError: the file cannot be read, is cut off, or holds something else.
     """
     try:
-        with path.open("rb") as stream:
+        with path.open("rb") as stream, without_warnings():
             values = np.lib.format.read_array(stream, allow_pickle=False)
     except OSError as error:
         raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, EOFError) as error:
-        raise InvalidInputError(f"{path} is not a .npy file of numbers: {error}") from error
+    except DAMAGED as error:
+        raise InvalidInputError(f"{path} is not a .npy file of numbers: {reason(error)}") from error
     if values.dtype.kind not in "fiu":
         raise InvalidInputError(f"{path} has values of type {values.dtype}; expected numbers")
     return values.astype(np.float64)

@@ -21,6 +21,9 @@ HANDS = {"panda": "panda_hand", "franka_panda": "panda_hand"}
 
 MESH_SUFFIXES = ("obj", "stl", "ply", "off", "dae", "glb", "gltf", "usd", "usda", "usdc", "usdz")
 
+LIBRARY_MESHES = ("mesh.obj", "surface.obj")
+"""Kept in step with pipeline.geometry, which formats must not need; a test compares them."""
+
 
 def only_object(grasps: GraspSet, kind: str) -> str:
     """The object that all grasps are of.
@@ -34,20 +37,25 @@ def only_object(grasps: GraspSet, kind: str) -> str:
     if len(names) > 1:
         raise InvalidInputError(
             f"the grasps are of {len(names)} objects ({listing(names)}) and {kind} holds those of"
-            " one; choose one of them (--object), or name a folder, which gets one file an object"
+            " one; choose one of them, or write a file for each"
         )
     return names[0]
 
 
 def object_name(file: str) -> str:
-    """What an object is called whose mesh or prim has this path, such as `meshes/Mug/1a2b.obj`."""
-    last = file.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+    """What an object is called whose mesh or prim has this path, such as `meshes/Mug/1a2b.obj`.
+
+    Meshes of our libraries are called alike and lie in a folder an object: `mug/mesh.obj`.
+    """
+    *folders, last = file.replace("\\", "/").rstrip("/").split("/")
+    if last in LIBRARY_MESHES and folders and folders[-1]:
+        return folders[-1]
     stem, _, suffix = last.rpartition(".")
     return stem if stem and suffix.lower() in MESH_SUFFIXES else last
 
 
 def description_of(grasps: GraspSet, name: str) -> dict[str, Any]:
-    """What a file that was read said of an object: `file`, `scale` and more; empty if unknown."""
+    """What is told of an object: its mesh `file`, its `scale` and more; empty if nothing is."""
     return _find(grasps.provenance, name) or {}
 
 
@@ -55,7 +63,8 @@ def _find(provenance: Mapping[str, Any], name: str) -> dict[str, Any] | None:
     files = provenance.get("object_files")
     if isinstance(files, Mapping) and isinstance(files.get(name), Mapping):
         return dict(files[name])
-    for part in provenance.get("parts", ()):
+    parts = provenance.get("parts", ())
+    for part in parts.values() if isinstance(parts, Mapping) else parts:
         if isinstance(part, Mapping) and (found := _find(part, name)):
             return found
     return None

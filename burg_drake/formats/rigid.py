@@ -40,8 +40,11 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     last = np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0)
     _refuse(last > NOTED, where, "has a last row other than 0 0 0 1")
     R = poses[:, :3, :3]
-    off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    _refuse(np.linalg.det(R) < 0.0, where, "is a mirror image, not a rotation")
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size
+        off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        mirrored = np.linalg.det(R) < 0.0
+    off = np.where(np.isnan(off), np.inf, off)
+    _refuse(mirrored, where, "is a mirror image, not a rotation")
     _refuse(off > ROUNDING, where, "is no rotation: not orthonormal by", off)
     U, _, Vt = np.linalg.svd(R)
     notes: tuple[str, ...] = ()

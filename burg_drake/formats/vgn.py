@@ -14,7 +14,7 @@ From the sources of github.com/ethz-asl/vgn and github.com/UT-Austin-RPL/GIGA:
   0.048 m to our finger tips, and in simulation 0.022 m from the hand's centre of mass, which is
   in a URDF outside of the repository. We take the 0.05 m that the grasps were sampled with.
 - `width` is the distance of the fingers after closing where the grasp lifted something, else
-  the hand's largest opening (`execute_grasp`).
+  the hand's largest opening (`execute_grasp`), which tells nothing of the grasp.
 """
 
 from __future__ import annotations
@@ -49,6 +49,10 @@ NEEDED = (*QUATERNION, *POSITION)
 """Of the columns; files of predictions may do without the others."""
 FINGER_DEPTH = 0.05
 """From the origin of a grasp to the finger tips [m]."""
+RESULTS_POSE = "X_OG"
+"""A column by which tables of our runs, which have those of `NEEDED`, too, are told apart."""
+HEAD = 1 << 16
+"""Characters that are looked at to recognise a file."""
 UNIT = 1e-3
 """A quaternion whose length is off by more is none."""
 
@@ -60,35 +64,40 @@ def _X_GF(gripper: Gripper) -> Array:
 def _recognises(path: Path) -> bool:
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            header = next(csv.reader(stream), [])
+            header = next(csv.reader([stream.readline(HEAD)]), [])
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
-    return set(NEEDED) <= {name.strip() for name in header}
+    names = {name.strip() for name in header}
+    return set(NEEDED) <= names and RESULTS_POSE not in names
 
 
 def _read(path: Path, gripper: Gripper) -> Imported:
-    cells = _cells(path)
+    cells, lines = _cells(path)
     missing = [name for name in NEEDED if name not in cells]
     if missing:
         raise InvalidInputError(
             f"{path} has no column {', '.join(missing)}; grasps of VGN have {','.join(COLUMNS)}"
         )
-    xyzw = np.stack([_numbers(path, name, cells[name]) for name in QUATERNION], axis=-1)
+    xyzw = np.stack([_numbers(path, name, cells[name], lines) for name in QUATERNION], axis=-1)
     length = np.linalg.norm(xyzw, axis=-1)
     bad = ~(np.abs(length - 1.0) < UNIT)
     if bad.any():
         i = int(np.argmax(bad))
         raise InvalidInputError(
-            f"{path}:{i + 2}: qx, qy, qz, qw have length {length[i]:g}; a rotation has length 1"
+            f"{path}:{lines[i]}: qx, qy, qz, qw have length {length[i]:g}; a rotation has length 1"
         )
-    p_VF = np.stack([_numbers(path, name, cells[name]) for name in POSITION], axis=-1)
+    p_VF = np.stack([_numbers(path, name, cells[name], lines) for name in POSITION], axis=-1)
     X_VF = make_pose(rotation_from_quaternion(np.roll(xyzw, 1, axis=-1)), p_VF)
     columns: dict[str, NDArray[Any]] = {
         name: np.array(texts) if name == "scene_id" else _typed(texts)
         for name, texts in cells.items()
         if name not in (*NEEDED, "width")
     }
-    width = _numbers(path, "width", cells["width"]) if "width" in cells else None
+    width: Array | None = None
+    notes: tuple[str, ...] = ()
+    if "width" in cells:
+        width = _numbers(path, "width", cells["width"], lines)
+        width, notes = _of_contacts(width, columns.get("label"))
     grasps = GraspSet.create(
         X_VF @ inverse(_X_GF(gripper)),
         object="",
@@ -96,44 +105,57 @@ def _read(path: Path, gripper: Gripper) -> Imported:
         provenance={"format": FORMAT.name, "file": str(path)},
         columns=columns,
     )
-    return Imported(grasps, FORMAT.frame)
+    return Imported(grasps, FORMAT.frame, notes)
 
 
-def _cells(path: Path) -> dict[str, list[str]]:
-    """The texts of a CSV file by column."""
+def _of_contacts(width: Array, label: NDArray[Any] | None) -> tuple[Array, tuple[str, ...]]:
+    """(N,) widths without those of failures, and a note if there were some."""
+    if label is None or label.dtype.kind != "f":
+        return width, ()
+    left = ~np.isnan(width) & (label == 0.0)
+    note = f"width was left aside of {int(left.sum())} failures: it is the open hand's."
+    return np.where(left, np.nan, width), (note,) if left.any() else ()
+
+
+def _cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
+    """The texts of a CSV file by column, and the lines that they end on."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if row]
+            reader = csv.reader(stream)
+            numbered = [(reader.line_num, row) for row in reader if row]
     except OSError as error:
         raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise InvalidInputError(f"{path} is not a CSV file: {error}") from error
-    if not rows:
+    if not numbered:
         raise InvalidInputError(f"{path} is empty; grasps of VGN have {','.join(COLUMNS)}")
-    header = [name.strip() for name in rows[0]]
+    (first, names), *rows = numbered
+    header = [name.strip() for name in names]
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
-        raise InvalidInputError(f"{path}:1: column {twice!r} is there twice")
-    for line, row in enumerate(rows[1:], 2):
+        raise InvalidInputError(f"{path}:{first}: column {twice!r} is there twice")
+    for line, row in rows:
         if len(row) != len(header):
             raise InvalidInputError(
                 f"{path}:{line}: has {len(row)} cells, the first line has {len(header)}"
             )
-    return {name: [row[k].strip() for row in rows[1:]] for k, name in enumerate(header)}
+    cells = {name: [row[k].strip() for _, row in rows] for k, name in enumerate(header)}
+    return cells, [line for line, _ in rows]
 
 
-def _numbers(path: Path, name: str, texts: Sequence[str]) -> Array:
+def _numbers(path: Path, name: str, texts: Sequence[str], lines: Sequence[int]) -> Array:
     """A column of finite numbers; NaN is fine for a width."""
     values = np.empty(len(texts))
     for i, text in enumerate(texts):
         try:
             values[i] = float(text) if text or name != "width" else np.nan
         except ValueError as error:
-            raise InvalidInputError(f"{path}:{i + 2}: {name} is {text!r}, not a number") from error
+            where = f"{path}:{lines[i]}: {name}"
+            raise InvalidInputError(f"{where} is {text!r}, not a number") from error
     bad = np.isinf(values) | (np.isnan(values) & (name != "width"))
     if bad.any():
         i = int(np.argmax(bad))
-        raise InvalidInputError(f"{path}:{i + 2}: {name} is {texts[i]}; give a finite number")
+        raise InvalidInputError(f"{path}:{lines[i]}: {name} is {texts[i]}; give a finite number")
     return values
 
 
@@ -154,9 +176,14 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     if label is None:
         notes += ("No grasp has a label; these cells are empty.",)
         label = [""] * len(grasps)
-    if np.isnan(grasps.width).any():
-        notes += (f"{int(np.isnan(grasps.width).sum())} grasps have no width; empty cells.",)
-    width = ["" if np.isnan(w) else w for w in grasps.width.tolist()]
+    failed = np.array([mark == 0 for mark in label], dtype=bool)
+    if failed.any():
+        widest = f"{gripper.opening[1]:g} m"
+        notes += (f"{int(failed.sum())} failures got the hand's opening of {widest} as width.",)
+    widths = np.where(failed, gripper.opening[1], grasps.width)
+    if np.isnan(widths).any():
+        notes += (f"{int(np.isnan(widths).sum())} grasps have no width; empty cells.",)
+    width = ["" if np.isnan(w) else w for w in widths.tolist()]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -192,7 +219,7 @@ FORMAT = GraspFormat(
     suffixes=(".csv",),
     frame="world",
     source="github.com/ethz-asl/vgn, src/vgn/io.py",
-    carries=("width", "label", "scene_id"),
+    carries=("width of successes", "label", "scene_id"),
     cannot_carry=("score", "names of objects", "further columns", "provenance"),
     X_GF=_X_GF,
     recognises=_recognises,

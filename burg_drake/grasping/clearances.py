@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
 
+CLEARANCE_VERSION = 1
+"""Raised when the same grasps begin to get other clearances or outcomes."""
+
 
 @dataclass(frozen=True)
 class Clearance:

@@ -13,7 +13,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.coverage import Share, coverage, nearest_grasps
 from burg_drake.grasping.diversity import neighbour_distances
 from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.similarity import LEVER, METRICS_VERSION
+from burg_drake.grasping.similarity import DISTANCE_VERSION, LEVER
 from burg_drake.grasping.targets import INSTANCE
 
 Mask = NDArray[np.bool_]
@@ -77,7 +77,7 @@ class SetSummary:
         numbers: of each column of numbers, and of the coordinates `x`, `y`, `z` [m].
         truths: grasps for which each column of truth values holds.
         texts: how often each value of each column of text occurs, the most frequent first.
-        version: `METRICS_VERSION`.
+        version: `DISTANCE_VERSION`.
     """
 
     overall: ObjectSummary
@@ -85,7 +85,7 @@ class SetSummary:
     numbers: dict[str, Distribution]
     truths: dict[str, Share]
     texts: dict[str, dict[str, int]]
-    version: int = field(default=METRICS_VERSION)
+    version: int = field(default=DISTANCE_VERSION)
 
 
 @dataclass(frozen=True)
@@ -117,14 +117,14 @@ class Comparison:
         objects: by name, of every object of either set.
         shared_ids: identifiers that both sets have.
         tolerance: what counts as a match.
-        version: `METRICS_VERSION`.
+        version: `DISTANCE_VERSION`.
     """
 
     overall: ObjectComparison
     objects: dict[str, ObjectComparison]
     shared_ids: int
     tolerance: Tolerance
-    version: int = field(default=METRICS_VERSION)
+    version: int = field(default=DISTANCE_VERSION)
 
 
 def distribution(values: ArrayLike) -> Distribution:

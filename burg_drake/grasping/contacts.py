@@ -3,8 +3,8 @@
 Each pad moves along its side of the closing axis until it touches; it is a Winkler foundation
 (Johnson, "Contact Mechanics", 1985, section 4.3): independent springs over a flat face, pressed in
 against the rigid object until they carry the hand's force. The object turns a little between the
-pads until their pressures face each other, which `indentation` works out; nothing else moves, and
-the pads' other faces and the rest of the hand are not looked at.
+pads until their pressures face each other, which `indentation` works out; nothing else moves here
+(`sliding` has what comes next), and the pads' other faces and the rest of the hand do not enter.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Contacts:
     torsion_radius: Array
     indentation: Array
 
-    def select(self, index: NDArray[np.bool_]) -> Contacts:
+    def select(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> Contacts:
         """Some of the grasps."""
         return Contacts(*(getattr(self, field.name)[index] for field in fields(self)))
 
@@ -80,6 +80,23 @@ def grasp_contacts(surface: Surface, X_OG: Array, jaws: Jaws = PANDA_JAWS) -> Co
     ]
     names = [field.name for field in fields(Contacts)]
     return Contacts(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def friction_needed(contacts: Contacts) -> Array:
+    """(N,) tangent of the larger angle between inward normals and the line through both contacts.
+
+    Less friction does not hold. Infinite from 90 degrees, NaN where not both pads touch.
+    """
+    angle = largest_angle(contacts.normal, contacts.p_OC[:, 1] - contacts.p_OC[:, 0])
+    return np.asarray(np.where(angle < 0.5 * np.pi, np.tan(angle), np.inf) + 0.0 * angle)
+
+
+def largest_angle(normal: Array, line: Array) -> Array:
+    """(N,) larger of the angles between normals (N, 2, 3) and the line (N, 3) that leads from the
+    first contact to the second, turned round for the second [rad]."""
+    towards = np.stack([line, -line], axis=1)
+    sine = np.linalg.norm(np.cross(normal, towards), axis=-1)
+    return np.asarray(np.arctan2(sine, (normal * towards).sum(axis=-1)).max(axis=1))
 
 
 def _contacts(surface: Surface, X_OG: Array, jaws: Jaws) -> Contacts:

@@ -19,8 +19,8 @@ from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.pose_search import Tolerance, find_nearest, find_within
 from burg_drake.grasping.similarity import (
+    DISTANCE_VERSION,
     LEVER,
-    METRICS_VERSION,
     check_lever,
     components,
     pair_angle,
@@ -57,13 +57,13 @@ class Matches:
         matched: (N,) bool, in the order of the set.
         object: (N,) names of the objects.
         tolerance: what counted as a match.
-        version: `METRICS_VERSION`.
+        version: `DISTANCE_VERSION`.
     """
 
     matched: NDArray[np.bool_]
     object: NDArray[np.str_]
     tolerance: Tolerance
-    version: int = field(default=METRICS_VERSION)
+    version: int = field(default=DISTANCE_VERSION)
 
     @property
     def overall(self) -> Share:
@@ -89,7 +89,7 @@ class Nearest:
         translation: (N,) [m].
         angle: (N,) modulo the swap of the fingers [rad].
         lever: of the combined distance [m/rad].
-        version: `METRICS_VERSION`.
+        version: `DISTANCE_VERSION`.
     """
 
     index: NDArray[np.intp]
@@ -97,7 +97,7 @@ class Nearest:
     translation: Array
     angle: Array
     lever: float
-    version: int = field(default=METRICS_VERSION)
+    version: int = field(default=DISTANCE_VERSION)
 
 
 def coverage(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.grasping.average_precision import (
     FRICTIONS,
     TopPrecision,
@@ -19,6 +19,12 @@ from burg_drake.grasping.average_precision import (
 
 FRICTION_NEEDED = "friction_needed"
 """Column of least friction coefficients; it is judged at GraspNet-1Billion's coefficients."""
+CLEARANCE = "clearance"
+"""Column of signed clearances [m]; one below 0 is a collision."""
+SCREENED = ("screened", "outcome")
+"""Columns of outcomes of which those of the stage `clear` are collisions."""
+COLLISIONS = tuple(outcome.value for outcome in Outcome if outcome.stage is Stage.CLEAR)
+"""Outcomes of the screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,9 @@ class Ranking:
         good: how many of them are good, by criterion.
         average_precision: area under precision over recall, without suppression, by criterion.
         top: GraspNet-1Billion's figure.
+        colliding: grasps that are bad at any friction because the hand collides, as in
+            GraspNet-1Billion's figure; None where the column says itself which grasps are good, or
+            no column tells collisions.
     """
 
     column: str
@@ -40,6 +49,7 @@ class Ranking:
     good: tuple[int, ...]
     average_precision: tuple[float, ...]
     top: TopPrecision
+    colliding: int | None = None
 
 
 def rank_by(grasps: GraspSet, column: str) -> Ranking:
@@ -47,7 +57,8 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
 
     Args:
         grasps: with scores; of equal scores none is better.
-        column: `friction_needed`, judged at several coefficients; outcomes, of which `lifted` is
+        column: `friction_needed`, judged at several coefficients, where what collides is bad (a
+            negative `clearance`, or so `screened` or `outcome`); outcomes, of which `lifted` is
             good, and grasps without an outcome are left out; or truth values or 0 and 1, where
             NaN is left out, too.
 
@@ -56,6 +67,9 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
         InvalidInputError: the column holds something else or nothing, or no grasp has a score.
     """
     criteria, judged, good = _judge(grasps.column(column), column)
+    colliding = _colliding(grasps) if column == FRICTION_NEEDED else None
+    if colliding is not None:
+        good = good & ~colliding[:, None]
     if not judged.any():
         raise InvalidInputError(f"column {column!r} judges none of the grasps; it has no values")
     grasps, good = grasps.select(judged), good[judged]
@@ -72,7 +86,19 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
         good=tuple(good.sum(axis=0).tolist()),
         average_precision=tuple(curve.ap for curve in curves),
         top=precision_at_top(grasps, good),
+        colliding=None if colliding is None else int(colliding.sum()),
     )
+
+
+def _colliding(grasps: GraspSet) -> NDArray[np.bool_] | None:
+    """(N,) whether some column tells that the hand collides; None if none tells anything."""
+    told = colliding = np.full(len(grasps), False)
+    for name, values in grasps.columns.items():
+        if name == CLEARANCE and values.dtype.kind == "f":
+            told, colliding = told | ~np.isnan(values), colliding | (values < 0.0)
+        elif name in SCREENED and values.dtype.kind == "U":
+            told, colliding = told | (values != ""), colliding | np.isin(values, COLLISIONS)
+    return colliding if told.any() else None
 
 
 def _judge(

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 
-METRICS_VERSION = 1
+DISTANCE_VERSION = 1
 """Of the distances here and of what is computed from them; changes when a figure would."""
 
 LEVER = 0.001 / math.radians(1.0)

@@ -23,13 +23,13 @@ class Surface:
     Attributes:
         triangles: (F, 3, 3) corners in the object frame [m].
         normals: (F, 3) outward unit normals.
-        share: (F,) cumulative probability of the faces; the last entry is 1.
+        cumulative: (F,) probability of each face and all before it; the last entry is 1.
         rays: caster for these triangles.
     """
 
     triangles: Array
     normals: Array
-    share: Array
+    cumulative: Array
     rays: RayCaster
 
     @classmethod
@@ -73,7 +73,7 @@ class Surface:
 
         Faces have probability proportional to area times weight; points are uniform on a face.
         """
-        face = np.searchsorted(self.share, rng.random(n), side="right")
+        face = np.searchsorted(self.cumulative, rng.random(n), side="right")
         u, v = rng.random((2, n, 1))
         fold = u + v > 1.0  # the far half of the parallelogram, turned back into the triangle
         u, v = np.where(fold, 1.0 - u, u), np.where(fold, 1.0 - v, v)

@@ -83,7 +83,7 @@ def test_as_a_process() -> None:
     assert done.returncode == 2
     assert done.stdout == ""
     names = ", ".join(builtin_names("scenes"))
-    assert done.stderr == f"burg-drake: error: nowhere does not exist; Known: {names}\n"
+    assert done.stderr == f"burg-drake: error: nowhere does not exist; known: {names}\n"
 
 
 @pytest.mark.parametrize("arguments", [[], ["scene"], ["nonsense"], ["evaluate", "--sead", "1"]])
@@ -96,6 +96,25 @@ def test_usage_errors_are_one_line(
     error = capsys.readouterr().err
     assert error.startswith("burg-drake: error: ")
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "verb"),
+    [
+        (["--sead", "report", "a"], "burg-drake"),
+        (["evaluate", "a", "--sead", "1"], "burg-drake evaluate"),
+        (["grasps", "stats", "a", "b", "c"], "burg-drake grasps stats"),
+        (["hand", "list", "--all"], "burg-drake hand list"),
+    ],
+)
+def test_what_is_not_known_leads_to_the_help_of_its_verb(
+    arguments: list[str], verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(arguments)
+    error = capsys.readouterr().err
+    assert "unrecognized arguments: " in error
+    assert error.endswith(f"(see {verb} --help)\n")
 
 
 def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:

@@ -10,6 +10,7 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
+from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.scene.scene import load_scene
 
@@ -67,6 +68,14 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
         file["grasps/qualities/flex/object_in_gripper"] = np.array([0, 1])
     assert main(["evaluate", "tabletop_six", "--grasps", str(path)]) == 2
     assert "say which one it is (--grasps-object 3f2a=NAME)" in capsys.readouterr().err
+    millimetres = tmp_path / "millimetres.h5"
+    with h5py.File(path) as file, h5py.File(millimetres, "w") as other:
+        X_OB = file["grasps/transforms"][()]
+        X_OB[:, :3, 3] *= 1000.0
+        other["object/file"], other["object/scale"] = "box.obj", 1.0
+        other["grasps/transforms"] = X_OB
+    assert main(["evaluate", "tabletop_six", "--grasps", str(millimetres)]) == 2
+    assert "lengths have to be metres" in capsys.readouterr().err
     results = judged(tmp_path, "--grasps", str(path), "--grasps-object", "box")
     assert results["outcome"].tolist() == OUTCOMES
     assert np.isfinite(results["q_grasp_7"]).all()  # the whole arm was asked
@@ -76,6 +85,15 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
         X_OG[:, :3].reshape(2, 12),
         atol=1e-12,
     )
+
+
+def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "grasps.h5"
+    hand = {"hand": {"name": "wsg_50"}}
+    GraspSet.create(X_OG, object="box", provenance=hand).save(path)
+    judged(tmp_path, "--grasps", str(path), "--no-reach")
+    note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
+    assert capsys.readouterr().out.startswith(note)
 
 
 @pytest.mark.parametrize(

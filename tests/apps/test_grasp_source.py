@@ -44,5 +44,7 @@ def test_what_cannot_be_found_is_said():
         open_source("houshold")
     with pytest.raises(InvalidInputError, match=r"mine.h5 does not say .* --scene or --library"):
         source_of(options(), on("mug"), "mine.h5")
+    with pytest.raises(UnknownNameError, match=r"mine.h5 says .* in gone.yaml, which is not"):
+        source_of(options(), on("mug", scene="gone.yaml"), "mine.h5")
     with pytest.raises(UnknownNameError, match=r"mine.h5 has grasps of object 'mog'.*'mug'"):
         source_of(options(library="household"), on("mog"), "mine.h5")

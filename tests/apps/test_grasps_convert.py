@@ -12,6 +12,7 @@ import yaml
 
 from burg_drake.apps import cli
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.run_store import Run
 from burg_drake.formats.grasp_files import FORMATS
 
 DOWN = np.array(
@@ -45,7 +46,7 @@ def test_acronym_becomes_ours(mug: str, capsys: pytest.CaptureFixture[str]) -> N
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == f"{mug}: acronym (ACRONYM), 2 grasps of mug in the frame of their object"
     assert "scaled by 0.5" in lines[1]
-    assert lines[2:] == ["mug.h5: written as burg_drake"]
+    assert lines[2:] == ["wrote 2 grasps to mug.h5"]
 
 
 def test_ours_becomes_isaac_grasp_of_another_hand(
@@ -96,18 +97,62 @@ def test_poses_that_were_measured_otherwise(mug: str) -> None:
     )
 
 
+def ended(*arguments: str) -> int | str | None:
+    """Exit code of a command line that is not run at all."""
+    with pytest.raises(SystemExit) as end:
+        convert(*arguments)
+    return end.value.code
+
+
+def test_options_may_stand_anywhere(mug: str) -> None:
+    convert(mug, "mug.h5", "--rename", "mug")
+    assert convert("mug.h5", "--to", "isaac_grasp", "x.yaml", "--object", "mug") == 0
+    assert Path("x.yaml").exists()
+
+
+def test_outcomes_of_a_run(mug: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert convert(str(run.path), "out/", "--to", "acronym") == 0
+    assert capsys.readouterr().out.startswith(f"{run.path}: run, 3 grasps of box in the frame")
+    with h5py.File("out/box.h5") as file:
+        assert file["grasps/qualities/flex/object_in_gripper"][()].tolist() == [1, 0, 0]
+        assert Path(file["object/file"].asstr()[()]).is_file()
+    assert convert(str(run.table_path), "r.h5") == 2
+    assert "is the table of a run; give the run's folder" in capsys.readouterr().err
+
+
+def test_the_hand_is_that_of_the_set(mug: str, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--object", "mug", "--station", "panda_wsg", "-n", "3", "-o", "wsg.h5"]
+    assert cli.main(["grasps", "sample", "household", *options]) == 0
+    for hand, joints in ((None, "wsg_left_joint"), ("panda_hand", "panda_finger_joint1")):
+        asked = ["--hand", hand] if hand else []
+        capsys.readouterr()
+        assert convert("wsg.h5", "w.yaml", "--to", "isaac_grasp", *asked) == 0
+        grasp = yaml.safe_load(Path("w.yaml").read_text())["grasps"]["grasp_0"]
+        assert joints in grasp["cspace_position"]
+        said = "for hand 'wsg_50' and are taken for those of 'panda_hand'"
+        assert (said in capsys.readouterr().out) == (hand is not None)
+    lost = GraspSet.create(np.eye(4), object="a", provenance={"hand": {"name": "gone_hand"}})
+    lost.save("lost.h5")
+    assert convert("lost.h5", "l.yaml", "--to", "isaac_grasp") == 2
+    assert "lost.h5 has grasps for a hand that cannot be used" in capsys.readouterr().err
+
+
 def test_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert convert("--formats") == 0
+    assert ended("--formats") == 0
     text = capsys.readouterr().out
     for name, format in FORMATS.items():
         assert f"{name} " in text and format.title in text
         assert all(suffix in text for suffix in format.suffixes)
 
 
+def test_both_names_are_needed(mug: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert ended(mug) == 2
+    assert "required: OUT (see burg-drake grasps convert --help)" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["mug.h5"], "IN OUT"),
         (["none.h5", "out.h5"], "none.h5 does not exist"),
         (["mug.h5", "out"], "out is a folder; say in which format"),
         (["mug.h5", "out.yaml"], "isaac_grasp or graspgen_yaml"),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -12,6 +14,8 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.evaluation.scored_set import scored_set
+from burg_drake.formats.grasp_files import read_grasp_file
 from burg_drake.objects.library import load_library
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import load_station
@@ -58,7 +62,7 @@ def test_a_library_with_many_options(tmp_path: Path) -> None:
     np.save(tmp_path / "weights.npy", np.arange(float(faces)))
     out = tmp_path / "grasps.h5"
     options = ["--object", "mug", "--object", "can", "--friction", "0.3", "--approaches", "2"]
-    options += ["--standoffs-mm", "0,4,-4", "--diverse", "2", "--clear"]
+    options += ["--standoffs-mm", "0", "4", "-4", "--diverse", "2", "--clear"]
     options += ["--weights", f"mug={tmp_path / 'weights.npy'}"]
     assert sample("household", "-n", 12, *options, "-o", out) == 0
     grasps = GraspSet.load(out)
@@ -68,6 +72,85 @@ def test_a_library_with_many_options(tmp_path: Path) -> None:
     assert (told["friction"], told["approaches"], told["diverse"]) == (0.3, 2, 2)
     assert told["weights"] is not None and told["tested"]
     assert grasps.provenance["parts"]["can"]["weights"] is None
+
+
+def test_clear_grasps_keep_a_margin(scene_file: Path, tmp_path: Path) -> None:
+    """The screen itself, asked about the grasps of each file, is the oracle."""
+    scene, station = load_scene(scene_file), load_station("panda_tabletop")
+    found = {}
+    for options in ((), ("--margin-mm", "4"), ("--conservative",)):
+        out = tmp_path / "grasps.h5"
+        mug = ["--instance", "mug", "-n", 60, "-o", out]
+        assert sample(scene_file, "--clear", *options, *mug) == 0
+        found[options] = GraspSet.load(out)
+    least = {
+        options: scored_set(grasps, scene.library, station, scene).column("clearance").min()
+        for options, grasps in found.items()
+    }
+    assert 0.0 <= least[()] < 0.004 <= least["--margin-mm", "4"]
+    assert least["--conservative",] >= 0.0
+    assert set(found["--conservative",].id) != set(found[()].id)
+    settings = found["--margin-mm", "4"].provenance["settings"]
+    assert (settings["margin"], settings["conservative"]) == (0.004, False)
+
+
+@pytest.mark.parametrize("way", ["sampled", "converted", "renamed and converted"])
+def test_files_of_other_projects_name_the_mesh(
+    scene_file: Path, tmp_path: Path, capsys: Capture, way: str
+) -> None:
+    options = ["--object", "mug", "-n", 5, "-o"]
+    graspgen, acronym = tmp_path / "mug.json", tmp_path / "theirs.h5"
+    if way == "sampled":
+        assert sample("household", *options, graspgen) == 0
+        assert sample("household", *options, acronym, "--to", "acronym") == 0
+    else:
+        ours = str(tmp_path / "ours.h5")
+        assert sample(scene_file, *options, ours) == 0
+        renaming = ["--rename", "mug=cup"] if way.startswith("renamed") else []
+        for out, format in ((graspgen, "graspgen"), (acronym, "acronym")):
+            assert main(["grasps", "convert", ours, str(out), "--to", format, *renaming]) == 0
+    said = capsys.readouterr()
+    assert "nothing says which mesh" not in said.out + said.err
+    mug, root = load_library("household").entry("mug"), load_library("household").root
+    told = json.loads(graspgen.read_text())["object"]
+    assert told == {"file": str((root / mug.mesh).resolve()), "scale": 1.0}
+    with h5py.File(acronym) as file:
+        assert file["object/file"].asstr()[()] == told["file"]
+        assert file["object/scale"][()] == 1.0
+        assert file["object/mass"][()] == mug.mass
+        assert file["object/friction"][()] == mug.friction
+        assert file["object/com"][()].tolist() == list(mug.mass_properties.center_of_mass)
+    for path in (graspgen, acronym):
+        assert set(read_grasp_file(path).grasps.object) == {"mug"}
+
+
+def test_a_folder_gets_a_file_an_object(scene_file: Path, tmp_path: Path, capsys: Capture) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    assert sample(scene_file, "-n", 3, "-o", out, "--to", "acronym") == 0
+    assert sorted(path.name for path in out.iterdir()) == ["bottle.h5", "mug.h5"]
+    assert len(read_grasp_file(out / "mug.h5").grasps) == 3
+    text = capsys.readouterr().out
+    assert f"wrote 6 grasps to {out} as acronym (ACRONYM)\n" in text and "NaN for 3" in text
+    new = f"{tmp_path}/new/"
+    assert sample(scene_file, "-n", 3, "--instance", "mug", "-o", new, "--to", "acronym") == 0
+    assert [path.name for path in Path(new).iterdir()] == ["mug.h5"]
+
+
+def test_nothing_is_sampled_in_vain(
+    scene_file: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from burg_drake.evaluation import candidate_sampling
+
+    monkeypatch.delattr(candidate_sampling, "sample_scene")
+    (tmp_path / "file").write_text("")
+    for out, message in (
+        (("x.h5", "--to", "acronym"), "the grasps are of 2 objects (bottle, mug)"),
+        ((tmp_path / "file" / "x.h5",), "cannot write"),
+        ((tmp_path,), "is a folder; say in which format to write (--to)"),
+    ):
+        assert sample(scene_file, "-n", 3, "-o", *out) == 2
+        assert message in capsys.readouterr().err
 
 
 def test_instances_by_name_or_object(scene_file: Path, tmp_path: Path) -> None:
@@ -104,9 +187,13 @@ def test_an_object_without_grasps_is_said(
         (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
         (["tabletop_six", "--object", "can", "-o", "x.h5"], "has no free object 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
-        (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; sample into a .h5 file"),
+        (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
         (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read weights no.npy"),
+        (
+            ["household", "--margin-mm", "3", "-o", "x.h5"],
+            "margin and conservative are of the test for clear grasps; ask for clear ones, too",
+        ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],
 )
@@ -122,13 +209,13 @@ def test_what_cannot_be_done(
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("--standoffs-mm", "4,x"), ("--weights", "mug"), ("--diverse", "0"), ("-n", "0")],
+    [("--standoffs-mm", "x"), ("--weights", "mug"), ("--diverse", "0"), ("-n", "0")],
 )
 def test_values_that_no_option_takes(option: str, value: str, capsys: Capture) -> None:
     with pytest.raises(SystemExit) as ended:
         sample("household", "-o", "x.h5", option, value)
     assert ended.value.code == 2
-    assert repr(value.split(",")[-1]) in capsys.readouterr().err
+    assert repr(value) in capsys.readouterr().err
 
 
 def test_weights_that_are_no_array(tmp_path: Path, capsys: Capture) -> None:

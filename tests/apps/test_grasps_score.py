@@ -10,6 +10,7 @@ import pytest
 from burg_drake.apps import grasps_score
 from burg_drake.apps.cli import main
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.run_store import Run
 from burg_drake.grasping.quality import DEFAULT_METRIC, METRICS
 
 Capture = pytest.CaptureFixture[str]
@@ -42,7 +43,52 @@ def test_columns_a_score_and_a_table(grasp_file: Path, tmp_path: Path, capsys: C
     median = np.quantile(scored.column("epsilon")[scored.object == "can"], 0.5, method="nearest")
     rows = [line.split() for line in text.splitlines()]
     assert next(row for row in rows if row[:1] == ["epsilon"])[4] == f"{median:.3g}"
-    assert text.splitlines()[-1] == f"wrote 24 grasps to {out}, scored by friction_needed"
+    assert text.splitlines()[-2:] == ["scored by friction_needed", f"wrote 24 grasps to {out}"]
+
+
+def test_other_formats(grasp_file: Path, tmp_path: Path, capsys: Capture) -> None:
+    out = tmp_path / "out"
+    assert score(grasp_file, "-o", out, "--to", "isaac_grasp") == 0
+    assert sorted(path.name for path in out.iterdir()) == ["box.yaml", "can.yaml"]
+    capsys.readouterr()
+    for options, message in (
+        ((tmp_path / "x.yaml",), "name the format that you want (--to)"),
+        ((tmp_path / "x.yaml", "--to", "isaac_grasp"), "the grasps are of 2 objects (box, can)"),
+        ((tmp_path / "x.csv",), "VGN and GIGA has grasps in the world frame"),
+        ((grasp_file / "x.h5",), "cannot write"),
+    ):
+        assert score(grasp_file, "-o", *options) == 2
+        text = capsys.readouterr()
+        assert message in text.err and not text.out  # no table: nothing was scored
+
+
+def test_a_run_and_what_became_of_it(run: Run, tmp_path: Path) -> None:
+    out = tmp_path / "scored.h5"
+    assert score(run.path, "-o", out) == 0
+    scored = GraspSet.load(out)
+    assert scored.column("outcome").tolist() == run.results["outcome"].tolist()
+    assert np.isfinite(scored.column("gravity_margin")[0])  # the run has a scene
+
+
+def test_another_hand_is_said(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "wsg.h5"
+    options = ["--object", "can", "-n", "3", "--station", "panda_wsg", "-o", str(path)]
+    assert main(["grasps", "sample", "household", *options]) == 0
+    for station, said in (("panda_tabletop", True), ("panda_wsg", False)):
+        capsys.readouterr()
+        assert score(path, "--station", station) == 0
+        note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
+        assert (note in capsys.readouterr().out) == said
+
+
+def test_millimetres_are_refused(grasp_file: Path, tmp_path: Path, capsys: Capture) -> None:
+    grasps = GraspSet.load(grasp_file)
+    X_OG = grasps.X_OG.copy()
+    X_OG[:, :3, 3] *= 1000.0
+    path = tmp_path / "mm.h5"
+    GraspSet.create(X_OG, object=grasps.object, provenance=grasps.provenance).save(path)
+    assert score(path) == 2
+    assert "lengths have to be metres" in capsys.readouterr().err
 
 
 def test_nothing_is_written_unasked(grasp_file: Path) -> None:
@@ -64,6 +110,17 @@ def test_one_line_says_what_is_wrong(grasp_file: Path, capsys: Capture) -> None:
         assert message in error and error.count("\n") == 1
 
 
+def test_a_scene_tells_collisions(scene_file: Path, tmp_path: Path, capsys: Capture) -> None:
+    grasps, out = tmp_path / "grasps.h5", tmp_path / "scored.h5"
+    sampling = ["grasps", "sample", str(scene_file), "--object", "mug", "-n", "20"]
+    assert main([*sampling, "-o", str(grasps)]) == 0
+    capsys.readouterr()
+    assert score(grasps, "-o", out) == 0
+    screened = GraspSet.load(out).column("screened").tolist()
+    (line,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("screened: "))
+    told = dict(part.split() for part in line.removeprefix("screened: ").split(", "))
+    assert told == {name: str(screened.count(name)) for name in set(screened)}
+
+
 def test_help_is_in_step_with_the_metrics() -> None:
     assert grasps_score.DEFAULT_METRIC == DEFAULT_METRIC
-    assert [*grasps_score.UNITS, "force_closure"] == [*METRICS[1:], "clearance", METRICS[0]]

@@ -52,7 +52,7 @@ def test_one_set(files: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> 
     printed = capsys.readouterr().out
     rows = [line.split() for line in printed.splitlines()]
     assert ["mug", "3", "-", "0", "-", "1.000", "36.7"] in rows  # 10, 10 and 90 mm
-    assert ["x", "3", "0.037", "0.000", "0.001", "0.010", "0.091", "0.100"] in rows
+    assert ["x", "(mm)", "3", "36.7", "0", "1", "10", "91", "100"] in rows
     assert "A and B" not in printed
 
 
@@ -121,6 +121,27 @@ def test_objects_under_other_names(files: tuple[str, str], tmp_path: Path) -> No
     assert stats(*paths, tmp_path=tmp_path)["comparison"]["overall"]["coverage"]["count"] == 0
     renamed = stats(*paths, "--grasps-object", "025_mug=mug", tmp_path=tmp_path)
     assert renamed["comparison"]["overall"]["coverage"]["count"] == 2
+
+
+def test_a_name_that_no_set_has_is_refused(
+    files: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["grasps", "stats", *files, "--rename", "mog=cup"]) == 2
+    error = capsys.readouterr().err
+    assert "no grasps are of object 'mog'; did you mean 'mug'? Known: mug" in error
+
+
+def test_collisions_count_as_bad(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(tmp_path / "grasps.h5")
+    known = line(0.0, 100.0).with_columns(friction_needed=[0.1, 0.1])
+    known.with_columns(clearance=[0.01, -0.01]).save(path)
+    (ranking,) = stats(path, "--ap", "friction_needed", tmp_path=tmp_path)["rankings"]
+    assert (ranking["good"], ranking["colliding"]) == ([1] * 6, 1)
+    assert "\n1 collide, counted as bad.\n" in capsys.readouterr().out
+    known.save(path)
+    (ranking,) = stats(path, "--ap", "friction_needed", tmp_path=tmp_path)["rankings"]
+    assert (ranking["good"], ranking["colliding"]) == ([2] * 6, None)
+    assert "Collisions unknown, not counted" in capsys.readouterr().out
 
 
 def test_names_with_brackets_are_printed_as_they_are(

@@ -222,7 +222,7 @@ TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
         ({"X_OG": "1 0 0 0.1"}, f"X_OG has 4 numbers; {TWELVE}"),
         ({"X_OG": "1 0 0 x"}, f"X_OG has 'x' in it; {TWELVE}"),
         ({"outcome": "liftd"}, "outcome 'liftd' is not known to this release; did you mean 'lif"),
-        ({"stage": "dreamt"}, "stage 'dreamt' is not known to this release; Known: clear, exec"),
+        ({"stage": "dreamt"}, "stage 'dreamt' is not known to this release; known: clear, exec"),
     ],
 )
 def test_a_damaged_row_is_refused(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write, writable_folder
+from burg_drake.core.files import atomic_write, require_writable, writable_folder
 
 
 def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):
@@ -57,6 +57,17 @@ def test_unwritable_places_are_named(tmp_path: Path):
     with pytest.raises(InvalidInputError, match="Is a directory"):
         atomic_write(tmp_path, "x")
     assert file.read_text() == "in the way"
+
+
+def test_a_file_that_could_be_written_is_not_made(tmp_path: Path):
+    (tmp_path / "file").write_text("in the way")
+    require_writable(tmp_path / "new" / "x.csv")
+    require_writable(tmp_path / "file")
+    for path in (tmp_path / "file" / "x.csv", tmp_path / "file" / "deep" / "x.csv", tmp_path):
+        with pytest.raises(InvalidInputError, match=r"^cannot write .*choose a writable place$"):
+            require_writable(path)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "in the way"
 
 
 def test_writable_folder_is_made_and_left_empty(tmp_path: Path):

@@ -186,6 +186,12 @@ def test_columns_are_added_replaced_and_found():
         g.with_columns(rank=[1, None, "x"])
 
 
+def test_a_set_introduces_itself_in_a_line():
+    g = grasps(3).select([0, 1])
+    assert repr(GraspSet.create(poses(2), object="mug")) == "GraspSet(2 grasps of mug)"
+    assert repr(g).endswith("; columns clearance, rank, closed, instance)")
+
+
 def test_the_canonical_form_is_the_same_for_both_places_of_the_fingers():
     g = grasps()
     swapped = GraspSet.create(swap_fingers(g.X_OG), object=g.object, width=g.width)
@@ -259,6 +265,12 @@ def test_files_that_are_no_grasp_set(tmp_path: Path):
     np.savez(tmp_path / "other.npz", grasps=poses(3))
     for name in ("burg.npy", "other.npz", "other.h5", "torn.h5"):
         assert "is not a grasp set" in message(tmp_path / name)
+    with h5py.File(tmp_path / "kinds.h5", "w") as file:
+        file.attrs.update(format="burg_drake.grasps", version=2, provenance="{}")
+        file.update({"X_OG": poses(3), "width": np.ones(3), "score": np.ones(3)})
+        file.update({"id": np.ones(3), "object": np.ones(3)})
+        file.create_group("columns")
+    assert "id has values of type float64" in message(tmp_path / "kinds.h5")
     (tmp_path / "cut.h5").write_bytes(tree[: len(tree) // 2])
     assert "truncated" in message(tmp_path / "cut.h5")
     missing = tmp_path / "missing.npz"

@@ -58,7 +58,7 @@ def test_messages_list_what_exists(root: Path, tmp_path: Path):
         "tabletop_sx does not exist; did you mean 'tabletop_six'? Known: close_six, tabletop_six"
     )
     assert message("lib", "models", tmp_path) == (
-        f"lib does not exist (relative to {tmp_path}); Known: household"
+        f"lib does not exist (relative to {tmp_path}); known: household"
     )
     assert message("nowhere/file.obj") == "nowhere/file.obj does not exist"
     assert message("package://burg_drake/models/none.sdf") == (

@@ -80,7 +80,7 @@ def test_grasps_of_several_objects(scene: Scene, tmp_path: Path) -> None:
     }
     with pytest.raises(InvalidInputError, match=r"of 3 objects \(a, b, bar\); say which is which"):
         read_grasps(scene, tmp_path / "a.h5", objects={"": "cube"})
-    with pytest.raises(UnknownNameError, match="no grasps of object 'c'; Known: a, b, bar"):
+    with pytest.raises(UnknownNameError, match="no grasps of object 'c'; known: a, b, bar"):
         read_grasps(scene, tmp_path / "a.h5", objects={"c": "cube"})
 
 

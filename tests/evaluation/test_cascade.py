@@ -194,6 +194,17 @@ def test_given_grasps_are_reproduced_from_the_run(
     assert evaluate(scene, station, run.path, grasps=back, progress=False).complete  # the same run
 
 
+def test_a_set_goes_to_its_instances_or_else_to_all_of_its_object(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    cubes = GraspSet.create(make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]]), object="cube")
+    everywhere = evaluate(scene, station, tmp_path / "a", grasps=cubes, workers=1, progress=False)
+    assert everywhere.candidates.instance.tolist() == ["left", "left", "right", "right"]
+    told = cubes.with_columns(instance=["right", "left"])
+    run = evaluate(scene, station, tmp_path / "b", grasps=told, workers=1, progress=False)
+    assert set(run.candidates.id) == {f"right-{cubes.id[0]}", f"left-{cubes.id[1]}"}
+
+
 @pytest.mark.parametrize("name", ["scene.yaml", "station.yaml", "grasps.npz", "results.csv"])
 def test_own_files_are_not_overwritten(
     name: str, scene: Scene, station: Station, tmp_path: Path, known_judge: None

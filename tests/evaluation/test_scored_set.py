@@ -10,10 +10,12 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.scored_set import scored_set
+from burg_drake.evaluation.run_document import software_versions
+from burg_drake.evaluation.scored_set import SCENE_COLUMNS, scored_set
 from burg_drake.grasping.antipodal import sample_antipodal
+from burg_drake.grasping.clearances import CLEARANCE_VERSION
 from burg_drake.grasping.jaws import PANDA_JAWS
-from burg_drake.grasping.quality import METRICS, Payload, grasp_quality
+from burg_drake.grasping.quality import METRICS, QUALITY_VERSION, Payload, grasp_quality
 from burg_drake.grasping.surface import Surface
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.scene import Scene, load_scene
@@ -109,6 +111,50 @@ def test_clearance_is_of_the_open_hand_in_the_scene(
     assert 0.0 < scored.column("clearance")[0] < 0.02
     assert scored.column("nearest")[0] == "can"
     assert scored.column("clearance")[1] < -0.03
+    assert scored.column("screened").tolist()[0] == "clear"
+    assert scored.column("screened")[1].startswith("collision_")
+    assert scored.column("collides_with").tolist() == ["", scored.column("nearest")[1]]
+
+
+def test_what_decided_a_collision(library: ObjectLibrary, station: Station, scene: Scene) -> None:
+    """Hands in the air, in the board beside the can, and in the box 0.2 m from it."""
+    down = rotation_from_rpy((np.pi, 0, 0))
+    places = make_pose(down, [(0, 0, 0.3), (0, -0.15, -0.06), (0.2, 0, 0)])
+    scored = scored_set(GraspSet.create(places, object="can"), library, station, scene)
+    outcomes = ["clear", "collision_table", "collision_clutter"]
+    assert scored.column("screened").tolist() == outcomes
+    assert scored.column("collides_with").tolist() == ["", "table", "box"]
+
+
+def test_provenance_tells_what_a_set_was_scored_with(
+    library: ObjectLibrary, station: Station, scene: Scene
+) -> None:
+    how = scored_set(mixed(library), library, station, scene).provenance["quality"]
+    assert how["scene"] == str(scene.path.resolve())
+    assert how["station"] == str(station.path.resolve())
+    assert how["content"] == {
+        "scene": scene.content,
+        "station": station.content,
+        "objects": {name: library.entry(name).build for name in ("box", "can")},
+    }
+    assert how["versions"] == software_versions()
+    assert (how["version"], how["clearance_version"]) == (QUALITY_VERSION, CLEARANCE_VERSION)
+    alone = scored_set(mixed(library), library, station).provenance["quality"]
+    assert alone["library"] == str(library.root.resolve())
+    assert not {"scene", "clearance_version"} & {*alone, *alone["content"]}
+
+
+def test_without_a_scene_nothing_is_left_of_an_earlier_one(
+    library: ObjectLibrary, station: Station, scene: Scene
+) -> None:
+    grasps = mixed(library).with_columns(label=np.arange(16.0))
+    placed = scored_set(grasps, library, station, scene)
+    assert set(SCENE_COLUMNS) <= set(placed.columns)
+    again = scored_set(placed, library, station)
+    assert not set(SCENE_COLUMNS) & set(again.columns)
+    assert np.isnan(again.column("gravity_margin")).all()
+    np.testing.assert_array_equal(again.column("label"), grasps.column("label"))
+    assert "scene" not in again.provenance["quality"]
 
 
 def test_what_cannot_be_scored(library: ObjectLibrary, station: Station, scene: Scene) -> None:

@@ -182,7 +182,7 @@ def test_unknown_keys_are_left_aside_with_a_note(tmp_path: Path) -> None:
     assert library.objects[0].friction is None
     path = library.path
     assert library.notes == (
-        f"{path}:5: key 'author' was left aside; Known: description, name, objects,"
+        f"{path}:5: key 'author' was left aside; known: description, name, objects,"
         " yaml_file_type, yaml_file_version",
         f"{path}:9: objects[0]: key 'friction_coef' was left aside; did you mean 'friction_coeff'?"
         " Known: friction_coeff, identifier, mass, mesh_fn, name, scale, stable_poses,"

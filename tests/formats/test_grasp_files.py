@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import itertools
+import re
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
+import burg_drake.formats
+from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, rotation_angle
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats.grasp_files import (
@@ -24,7 +27,7 @@ from burg_drake.formats.grasp_files import (
 from burg_drake.formats.grasp_format import PANDA, Gripper, GripperJoint
 
 SINGLE_PRECISION = ("graspnet", "burg")
-WITH_WIDTH = ("burg_drake", "acronym", "isaac_grasp", "graspnet", "vgn")
+WITH_WIDTH = ("burg_drake", "acronym", "isaac_grasp", "vgn")
 WITH_SCORE = ("burg_drake", "acronym", "isaac_grasp", "graspgen", "graspgen_yaml", "graspnet")
 WITH_OBJECT = ("burg_drake", "acronym", "isaac_grasp", "graspgen")
 
@@ -149,6 +152,77 @@ def test_a_file_cut_anywhere_is_an_error_or_holds_the_grasps_before_the_cut(
             continue
         whole = len(found) - 1  # of text, the last line may be cut within a number
         assert_same_poses(found.X_OG[:whole], grasps.X_OG[:whole], name)
+
+
+def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+    """With some bytes changed, missing or added."""
+    result = bytearray(content)
+    at = int(rng.integers(len(content)))
+    kind = rng.integers(4)
+    if kind == 0:
+        for i in rng.integers(len(content), size=4):
+            result[i] = int(rng.integers(256))
+    elif kind == 1:
+        del result[at : at + int(rng.integers(1, 20))]
+    elif kind == 2:
+        result[at:at] = rng.choice([b"nan", b"[]", b"{}", b"-", b"1e999", b"\n", b'"', b"(", b"*a"])
+    else:  # in the beginning, where headers are
+        result[at % 512 % len(content)] = int(rng.integers(256))
+    return bytes(result)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", FORMATS)
+def test_damaged_files_are_one_clear_error_or_hold_grasps(
+    name: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
+) -> None:
+    grasps = random_grasps(5, 16, success=True).with_columns(slip=np.arange(5.0))
+    content = written(grasps, name, tmp_path).read_bytes()
+    rng, path, refused = np.random.default_rng(17), tmp_path / "damaged.dat", 0
+    for _ in range(250):
+        path.write_bytes(damaged(content, rng))
+        for format in (name, None):
+            try:
+                read_grasp_file(path, format)
+            except BurgError as error:
+                assert "\n" not in str(error)
+                refused += 1
+    assert refused > 50
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("header", ["{'descr': '<f4', 'shape': (", "{'descr': '<f4'", "(" * 300])
+def test_headers_of_numpy_that_are_no_python(header: str, tmp_path: Path) -> None:
+    text = header.encode().ljust(117) + b"\n"
+    path = tmp_path / "a.npy"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64))
+    for name in ("graspnet", "burg"):
+        assert not FORMATS[name].recognises(path)
+        with pytest.raises(InvalidInputError, match=r"a\.npy is not a \.npy file of numbers: ."):
+            read_grasp_file(path, name)
+
+
+@pytest.mark.parametrize("start", [b"format: isaac_grasp\n", b'{"a": [', b"x,y,", b"PK\x03\x04"])
+def test_large_files_are_not_read_to_tell_their_format(tmp_path: Path, start: bytes) -> None:
+    path = tmp_path / "large.dat"
+    with path.open("wb") as stream:
+        stream.write(start)
+        stream.truncate(1 << 26)
+    for format in FORMATS.values():
+        format.recognises(path)  # whatever it imports is not counted below
+    tracemalloc.start()
+    for format in FORMATS.values():
+        format.recognises(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1 << 22
+
+
+def test_messages_of_formats_do_not_name_options() -> None:
+    """They are read by those who call them from Python, too, and not every verb has each."""
+    options = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+    for path in (Path(burg_drake.formats.__file__).parent).glob("*.py"):
+        assert not options.findall(path.read_text(encoding="utf-8")), path.name
 
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:

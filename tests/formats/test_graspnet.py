@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.formats.grasp_files import read_grasp_file, write_grasp_file
 from burg_drake.formats.grasp_format import PANDA, Gripper
 from burg_drake.formats.graspnet import FORMAT, X_FG
+from burg_drake.grasping.antipodal import sample_antipodal
 
 DOWN_THE_CAMERA = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
 """Approach along the camera's z, closing along its y: columns are x, y, z of their grasp frame."""
@@ -50,7 +53,8 @@ def test_a_cube_below_the_camera(
     looking_down = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.5))
     assert_grips_the_cube(np.round(looking_down @ grasps.X_OG[0], 7))  # single precision
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0, 0, 0.49 - 0.0095], atol=1e-7)
-    np.testing.assert_allclose(grasps.width, [0.06, 0.08], rtol=1e-7)
+    np.testing.assert_allclose(grasps.column("pregrasp_width"), [0.06, 0.08], rtol=1e-7)
+    assert np.isnan(grasps.width).all()  # where the contacts are is not told
     np.testing.assert_allclose(grasps.score, [0.7, 0.3], rtol=1e-7)
     np.testing.assert_allclose(grasps.column("height"), 0.02, rtol=1e-7)
     np.testing.assert_allclose(grasps.column("depth"), [0.0295, 0.01], rtol=1e-7)
@@ -59,11 +63,12 @@ def test_a_cube_below_the_camera(
 
 
 def test_their_finger_tips_are_ours(random_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
-    grasps = random_grasps(50, 0).with_columns(depth=np.linspace(0.0, 0.04, 50))
+    opening = np.linspace(0.03, 0.08, 50)
+    grasps = random_grasps(50, 0).with_columns(
+        depth=np.linspace(0.0, 0.04, 50), pregrasp_width=opening
+    )
     FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
-    for row, X_CG, width in zip(
-        np.load(tmp_path / "a.npy"), grasps.X_OG, grasps.width, strict=True
-    ):
+    for row, X_CG, width in zip(np.load(tmp_path / "a.npy"), grasps.X_OG, opening, strict=True):
         along, approach = X_CG[:3, 0], X_CG[:3, 2]
         tip = X_CG[:3, 3] + 0.0095 * approach
         expected = np.array([tip - width / 2 * along, tip + width / 2 * along])
@@ -74,15 +79,18 @@ def test_their_finger_tips_are_ours(random_grasps: Callable[..., GraspSet], tmp_
 def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     grasps = random_grasps(200, seed).with_columns(
-        depth=rng.uniform(0.01, 0.04, 200), height=0.02, object_id=rng.integers(-1, 80, 200)
+        pregrasp_width=rng.uniform(0.0, 0.08, 200),
+        depth=rng.uniform(0.01, 0.04, 200),
+        height=0.02,
+        object_id=rng.integers(-1, 80, 200),
     )
     notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
-    assert notes == ("GraspNet-1Billion has no place for object.",)
+    assert notes == ("GraspNet-1Billion has no place for width, object.",)
     assert np.load(tmp_path / "a.npy").dtype == np.float32
     assert FORMAT.recognises(tmp_path / "a.npy")
     back = FORMAT.read(tmp_path / "a.npy", PANDA).grasps
     np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-6)
-    for name in ("width", "score", "depth", "height", "object_id"):
+    for name in ("pregrasp_width", "score", "depth", "height", "object_id"):
         np.testing.assert_allclose(back.column(name), grasps.column(name), rtol=1e-6)
 
 
@@ -106,6 +114,72 @@ def test_what_is_not_known_gets_what_networks_write(tmp_path: Path) -> None:
     rows = np.load(tmp_path / "a.npy").astype(float)
     np.testing.assert_allclose(rows[:, :4], [[0, 0.08, 0.02, 0.02]] * 2, rtol=1e-6)
     assert rows[:, 16].tolist() == [-1, -1]
+
+
+def collides(rows: Array, surface: trimesh.Trimesh) -> np.ndarray:
+    """(N,) whether points of a surface are in the hand of a row.
+
+    The hand is that of `collision_detection` in graspnetAPI/utils/eval_utils.py, with its figures:
+    fingers 10 mm thick from +-width/2 on, from 20 mm behind the origin to `depth` beyond it, and a
+    base of 10 mm behind them.
+    """
+    points = trimesh.sample.sample_surface(surface, 5000, seed=1)[0]
+    height, finger, base = 0.02, 0.01, 0.02
+    width, depth = rows[:, 1, None], rows[:, 3, None]
+    p = (points - rows[:, None, 13:16]) @ rows[:, 4:13].reshape(-1, 3, 3)
+    x, y, z = np.moveaxis(p, -1, 0)
+    level = np.abs(z) < height / 2
+    beside = (np.abs(y) > width / 2) & (np.abs(y) < width / 2 + finger) & (x > -base) & (x < depth)
+    behind = (np.abs(y) < width / 2 + finger) & (x > -base - finger) & (x < -base)
+    return (level & (beside | behind)).any(axis=1)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [trimesh.creation.icosphere(4, 0.025), trimesh.creation.box((0.04, 0.06, 0.02))],
+    ids=["sphere", "box"],
+)
+def test_sampled_grasps_do_not_collide_by_their_rules(
+    surface: trimesh.Trimesh, tmp_path: Path
+) -> None:
+    sampled = sample_antipodal(surface, 200, np.random.default_rng(0), object="thing")
+    notes = FORMAT.write(sampled, tmp_path / "a.npy", PANDA)
+    assert notes[1].endswith(
+        "200 grasps got the distance of their contacts and 20 mm, at most 0.08 m."
+    )
+    rows = np.load(tmp_path / "a.npy").astype(float)
+    open_wide = rows.copy()
+    open_wide[:, 1] = 0.08
+    # what hits the hand open wide hits the fingers' insides or the base, whatever is written
+    np.testing.assert_array_equal(collides(rows, surface), collides(open_wide, surface))
+    assert collides(rows, surface).mean() < 0.5
+    at_the_contacts = rows.copy()
+    at_the_contacts[:, 1] = sampled.width
+    assert collides(at_the_contacts, surface).mean() > 0.9
+
+
+def test_the_opening_of_a_network_is_not_taken_for_a_closed_hand(tmp_path: Path) -> None:
+    path = grasp_group(tmp_path / "a.npy", (0.7, 0.08, 0.02, 0.02, np.eye(3), (0, 0, 0), -1))
+    read = FORMAT.read(path, PANDA).grasps
+    mug = GraspSet.create(read.X_OG, object="mug", width=read.width, columns=read.columns)
+    write_grasp_file(mug, tmp_path / "a.yaml", "isaac_grasp")
+    back = read_grasp_file(tmp_path / "a.yaml").grasps
+    assert np.isnan(back.width[0])
+    assert back.column("pregrasp_width")[0] == pytest.approx(0.08)
+
+
+def test_openings_are_given_known_or_assumed(tmp_path: Path) -> None:
+    grasps = GraspSet.create(
+        make_pose(p_AB=np.zeros((4, 3))), object="", width=[0.03, 0.03, 0.07, np.nan], score=1.0
+    ).with_columns(pregrasp_width=[0.06, np.nan, np.nan, np.nan])
+    notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    np.testing.assert_allclose(np.load(tmp_path / "a.npy")[:, 1], [0.06, 0.05, 0.08, 0.08])
+    assert notes == (
+        "GraspNet-1Billion has no place for width.",
+        "width is the opening on arrival there: 2 grasps got the distance of their contacts and"
+        " 20 mm, at most 0.08 m.",
+        "1 grasps of unknown width got the hand's opening of 0.08 m.",
+    )
 
 
 def test_no_grasps(tmp_path: Path) -> None:

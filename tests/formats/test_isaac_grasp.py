@@ -68,7 +68,7 @@ def load_from_isaac_grasp_format(path: Path) -> tuple[Array, Array]:
 
 
 def test_the_manual_s_example(file: Callable[[str], Path]) -> None:
-    read = isaac_grasp.read(file(MANUAL), PANDA)
+    read = isaac_grasp.FORMAT.read(file(MANUAL), PANDA)
     grasps = read.grasps
     assert (read.frame, len(grasps), grasps.object[0], grasps.score[0]) == ("object", 1, "mug", 1.0)
     assert grasps.width[0] == pytest.approx(2 * 0.00943)
@@ -85,15 +85,15 @@ def test_a_grasp_on_a_cube_written_by_hand(
     file: Callable[[str], Path], assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
     path = file(CUBE)
-    assert isaac_grasp.recognises(path) and not graspgen_yaml.recognises(path)
-    assert_grips_the_cube(isaac_grasp.read(path, PANDA).grasps.X_OG[0])
+    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
+    assert_grips_the_cube(isaac_grasp.FORMAT.read(path, PANDA).grasps.X_OG[0])
 
 
 def test_isaac_ros_names_frames_and_versions_its_own_way(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("_frame_link", "_frame").replace("1.0\n\n", '"1.0"\n\n')
     path = file(text.replace("grasp_0:", '"grasp_0":'))
-    assert isaac_grasp.recognises(path)
-    assert isaac_grasp.read(path, PANDA).grasps.object[0] == "mug"
+    assert isaac_grasp.FORMAT.recognises(path)
+    assert isaac_grasp.FORMAT.read(path, PANDA).grasps.object[0] == "mug"
 
 
 def test_files_of_grasp_data_gen(file: Callable[[str], Path], random_grasps: Any) -> None:
@@ -126,7 +126,7 @@ def test_files_of_grasp_data_gen(file: Callable[[str], Path], random_grasps: Any
             "pregrasp_bite_point": [0.0, 0.0, 0.1],
             "group": i,
         }
-    read = isaac_grasp.read(file(yaml.safe_dump(document, sort_keys=False)), PANDA)
+    read = isaac_grasp.FORMAT.read(file(yaml.safe_dump(document, sort_keys=False)), PANDA)
     np.testing.assert_allclose(read.grasps.width, [0.0, 0.02, 0.04, 0.06], atol=1e-12)
     np.testing.assert_array_equal(read.grasps.score, [0, 1, 0, 1])
     np.testing.assert_array_equal(read.grasps.columns["group"], range(4))
@@ -149,8 +149,8 @@ def test_predictions_of_graspgen_close_along_x(
     }
     data = {"format": "isaac_grasp", "format_version": 1.0, "grasps": {"grasp_0": grasp}}
     path = file(yaml.dump(data, default_flow_style=False, sort_keys=False))
-    assert graspgen_yaml.recognises(path) and not isaac_grasp.recognises(path)
-    read = graspgen_yaml.read(path, PANDA)
+    assert graspgen_yaml.FORMAT.recognises(path) and not isaac_grasp.FORMAT.recognises(path)
+    read = graspgen_yaml.FORMAT.read(path, PANDA)
     assert_grips_the_cube(read.grasps.X_OG[0])
     assert read.grasps.object[0] == "grasps"  # the file's name: nothing else names the object
 
@@ -165,8 +165,8 @@ grasps:
     orientation: { w: 0.3234007, xyz: [0.7127000, 0.5170539, 0.3465920] }
 """
     path = file(text)
-    assert graspgen_yaml.recognises(path)
-    read = graspgen_yaml.read(path, PANDA)
+    assert graspgen_yaml.FORMAT.recognises(path)
+    read = graspgen_yaml.FORMAT.read(path, PANDA)
     assert read.grasps.score[0] == 0.9679833054542542
     assert any("no gripper frame; fingers were taken to close along its x" in n for n in read.notes)
 
@@ -175,8 +175,8 @@ def test_grasps_for_grasp_data_gen_may_name_a_file_instead_of_a_frame(
     file: Callable[[str], Path], assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
     path = file(CUBE.replace("gripper_frame_link: /World/", "gripper_file: bots/"))
-    assert isaac_grasp.recognises(path) and not graspgen_yaml.recognises(path)
-    read = isaac_grasp.read(path, PANDA)
+    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
+    read = isaac_grasp.FORMAT.read(path, PANDA)
     assert_grips_the_cube(read.grasps.X_OG[0])
     assert any("no gripper frame; fingers were taken to close along its y" in n for n in read.notes)
 
@@ -190,7 +190,7 @@ def test_written_files_are_read_by_graspgen_s_reader(
     tiny[0] = np.eye(4)
     tiny[0, :3, 3] = [1e-5, -2e-17, 3e-9]  # numbers that YAML 1.1 can take for text
     grasps = GraspSet.create(tiny, object="mug", width=grasps.width, score=grasps.score)
-    module.write(grasps, tmp_path / "out.yaml", PANDA)
+    module.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
     X_OF, confidence = load_from_isaac_grasp_format(tmp_path / "out.yaml")
     np.testing.assert_array_equal(confidence, grasps.score)
     np.testing.assert_allclose(
@@ -204,7 +204,7 @@ def test_written_joints_are_those_of_each_finger(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(3, 5)
-    assert isaac_grasp.write(grasps, tmp_path / "out.yaml", PANDA) == ()
+    assert isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA) == ()
     data = yaml.safe_load((tmp_path / "out.yaml").read_text())
     assert data["object_frame_link"] == "/World/mug"
     assert data["gripper_frame_link"] == "/World/panda_hand"
@@ -216,26 +216,63 @@ def test_written_joints_are_those_of_each_finger(
 
 def test_unknown_widths_and_scores_are_left_out(tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="mug")
-    notes = isaac_grasp.write(grasps, tmp_path / "out.yaml", PANDA)
+    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
     assert any("without a score" in note for note in notes)
-    back = isaac_grasp.read(tmp_path / "out.yaml", PANDA).grasps
+    back = isaac_grasp.FORMAT.read(tmp_path / "out.yaml", PANDA).grasps
     assert np.isnan(back.width[0]) and np.isnan(back.score[0])
 
 
 def test_scores_beyond_1_and_further_columns_are_said(tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="mug", score=3.0, columns={"epsilon": [0.1]})
-    notes = isaac_grasp.write(grasps, tmp_path / "out.yaml", PANDA)
+    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
     assert any("from 0 to 1" in note for note in notes)
     assert any("epsilon" in note for note in notes)
+
+
+def test_widths_that_the_hand_does_not_have_are_said(tmp_path: Path) -> None:
+    four = GraspSet.create(np.repeat(np.eye(4)[None], 4, 0), object="mug", score=1.0)
+    wide = GraspSet.create(four.X_OG, object="mug", score=1.0, width=[0.02, 0.12, -0.01, 0.08])
+    expected = (
+        "widths of 2 grasps are beyond the opening of hand 'panda_hand', 0 to 0.08 m; so are their"
+        " joints.",
+    )
+    assert isaac_grasp.FORMAT.write(wide, tmp_path / "a.yaml", PANDA) == expected
+    on_arrival = four.with_columns(pregrasp_width=[0.02, 0.12, -0.01, float(np.float32(0.08))])
+    assert isaac_grasp.FORMAT.write(on_arrival, tmp_path / "b.yaml", PANDA) == expected
+    back = isaac_grasp.FORMAT.read(tmp_path / "a.yaml", PANDA).grasps
+    np.testing.assert_allclose(back.width, wide.width, atol=1e-12)
+
+
+@pytest.mark.parametrize("module", [isaac_grasp, graspgen_yaml])
+def test_each_format_says_its_own_name(module: Any, tmp_path: Path) -> None:
+    grasps = GraspSet.create(np.eye(4), object="mug", score=1.0, columns={"epsilon": [0.1]})
+    (note,) = [n for n in module.FORMAT.write(grasps, tmp_path / "a.yaml", PANDA) if "epsilon" in n]
+    assert note.startswith(f"{module.FORMAT.title} has no place for ")
+    read = module.FORMAT.read(tmp_path / "a.yaml", PANDA)
+    assert read.grasps.provenance["format"] == module.FORMAT.name
+
+
+def test_a_gripper_named_at_the_end_of_a_long_file_is_seen(file: Callable[[str], Path]) -> None:
+    """As when keys are written in the order of the alphabet, and there are no joints."""
+    many = {
+        f"grasp_{i}": {"position": [0.0, 0.0, 1e-4 * i], "orientation": {"w": 1, "xyz": [0, 0, 0]}}
+        for i in range(2000)
+    }
+    document = {"format": "isaac_grasp", "grasps": many, "gripper_frame_link": "panda_hand"}
+    path = file(yaml.dump(document, Dumper=yaml.CSafeDumper))
+    assert path.stat().st_size > 1 << 17
+    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
 
 
 def test_names_survive_if_they_differ(tmp_path: Path) -> None:
     odd = ["null", 'a "b": c', "1e3"]
     grasps = GraspSet.create(np.repeat(np.eye(4)[None], 3, 0), object="mug", columns={"name": odd})
-    isaac_grasp.write(grasps, tmp_path / "a.yaml", PANDA)
-    assert isaac_grasp.read(tmp_path / "a.yaml", PANDA).grasps.columns["name"].tolist() == odd
-    isaac_grasp.write(grasps.with_columns(name=["a", "a", "b"]), tmp_path / "b.yaml", PANDA)
-    names = isaac_grasp.read(tmp_path / "b.yaml", PANDA).grasps.columns["name"].tolist()
+    isaac_grasp.FORMAT.write(grasps, tmp_path / "a.yaml", PANDA)
+    assert (
+        isaac_grasp.FORMAT.read(tmp_path / "a.yaml", PANDA).grasps.columns["name"].tolist() == odd
+    )
+    isaac_grasp.FORMAT.write(grasps.with_columns(name=["a", "a", "b"]), tmp_path / "b.yaml", PANDA)
+    names = isaac_grasp.FORMAT.read(tmp_path / "b.yaml", PANDA).grasps.columns["name"].tolist()
     assert names == ["grasp_0", "grasp_1", "grasp_2"]
 
 
@@ -243,27 +280,27 @@ def test_anchors_are_followed(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("position: [-", "position: &p [-")
     second = MANUAL.split("grasps:\n")[1].replace("grasp_0", "grasp_1")
     second = second.replace("[-0.04346, 0.06759, 0.19895]", "*p")
-    grasps = isaac_grasp.read(file(text + second), PANDA).grasps
+    grasps = isaac_grasp.FORMAT.read(file(text + second), PANDA).grasps
     np.testing.assert_array_equal(grasps.X_OG[0], grasps.X_OG[1])
 
 
 def test_a_gripper_by_another_name_needs_to_be_named(file: Callable[[str], Path]) -> None:
     path = file(MANUAL.replace("/World/panda_hand", "/World/fr3_hand"))
-    with pytest.raises(InvalidInputError, match=r"gripper_frame_link.*fr3_hand.*--gripper-link"):
-        isaac_grasp.read(path, PANDA)
-    named = isaac_grasp.read(path, dataclasses.replace(PANDA, body="fr3_hand"))
+    with pytest.raises(InvalidInputError, match=r"gripper_frame_link.*name 'fr3_hand' as the g"):
+        isaac_grasp.FORMAT.read(path, PANDA)
+    named = isaac_grasp.FORMAT.read(path, dataclasses.replace(PANDA, body="fr3_hand"))
     assert len(named.grasps) == 1
 
 
 def test_joints_of_another_hand_are_said(file: Callable[[str], Path]) -> None:
-    read = isaac_grasp.read(file(MANUAL.replace("panda_finger_joint1", "fr3_joint")), PANDA)
+    read = isaac_grasp.FORMAT.read(file(MANUAL.replace("panda_finger_joint1", "fr3_joint")), PANDA)
     assert np.isnan(read.grasps.width[0])
     assert any("fr3_joint" in note for note in read.notes)
 
 
 def test_values_by_the_names_of_our_own_columns_are_left_aside(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("confidence: 1.0", "confidence: 1.0\n      width: 7\n      group: left")
-    read = isaac_grasp.read(file(text), PANDA)
+    read = isaac_grasp.FORMAT.read(file(text), PANDA)
     assert read.grasps.width[0] == pytest.approx(2 * 0.00943)
     assert read.grasps.columns["group"].tolist() == ["left"]
     assert any("Left aside: width" in note for note in read.notes)
@@ -271,7 +308,7 @@ def test_values_by_the_names_of_our_own_columns_are_left_aside(file: Callable[[s
 
 def test_no_grasps_are_no_error(file: Callable[[str], Path]) -> None:
     path = file(MANUAL.split("grasps:")[0] + "grasps: {}\n")
-    assert len(isaac_grasp.read(path, PANDA).grasps) == 0
+    assert len(isaac_grasp.FORMAT.read(path, PANDA).grasps) == 0
 
 
 TWICE = MANUAL + MANUAL.split("grasps:\n")[1]
@@ -325,16 +362,16 @@ QUATERNION = "{w: 0.00332, xyz: [0.98453, 0.16837, 0.04837]}"
 def test_malformed_files_say_where(file: Callable[[str], Path], text: str, said: str) -> None:
     path = file(text)
     with pytest.raises(InvalidInputError, match=said) as caught:
-        isaac_grasp.read(path, PANDA)
+        isaac_grasp.FORMAT.read(path, PANDA)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_binary_files_are_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_bytes(b"\x00\xff\xfe" * 50)
-    assert not isaac_grasp.recognises(path)
+    assert not isaac_grasp.FORMAT.recognises(path)
     with pytest.raises(InvalidInputError, match="not a text file"):
-        isaac_grasp.read(path, PANDA)
+        isaac_grasp.FORMAT.read(path, PANDA)
 
 
 def test_every_line_of_a_file_can_be_the_last(file: Callable[[str], Path]) -> None:
@@ -342,6 +379,6 @@ def test_every_line_of_a_file_can_be_the_last(file: Callable[[str], Path]) -> No
     for n in range(len(lines)):
         path = file("\n".join(lines[:n]))
         try:
-            assert len(isaac_grasp.read(path, PANDA).grasps) == 1
+            assert len(isaac_grasp.FORMAT.read(path, PANDA).grasps) == 1
         except InvalidInputError as error:
             assert str(path) in str(error)

@@ -10,8 +10,16 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome
+from burg_drake.formats.conversion import with_objects_renamed
 from burg_drake.formats.grasp_format import PANDA
-from burg_drake.formats.one_object import check_hand, description_of, object_name, success_of
+from burg_drake.formats.one_object import (
+    LIBRARY_MESHES,
+    check_hand,
+    description_of,
+    object_name,
+    success_of,
+)
+from burg_drake.pipeline.geometry import MESH_FILE, SURFACE_FILE
 
 THREE = np.repeat(np.eye(4)[None], 3, axis=0)
 
@@ -27,10 +35,31 @@ THREE = np.repeat(np.eye(4)[None], 3, axis=0)
         ("v1.0", "v1.0"),
         ("000074a334c541878360457c672b6c2e", "000074a334c541878360457c672b6c2e"),
         (".obj", ".obj"),
+        ("/libraries/household/mug/mesh.obj", "mug"),
+        ("mug\\surface.obj", "mug"),
+        ("mesh.obj", "mesh"),
+        ("/mesh.obj", "mesh"),
     ],
 )
 def test_objects_are_called_after_their_files(file: str, name: str) -> None:
     assert object_name(file) == name
+
+
+def test_meshes_of_libraries_are_called_as_here() -> None:
+    assert LIBRARY_MESHES == (MESH_FILE, SURFACE_FILE)
+
+
+@pytest.mark.parametrize("parts", ["list", "mapping"])
+def test_descriptions_are_found_in_parts_of_either_kind(parts: str) -> None:
+    mug = {"file": "mug.obj", "scale": 0.5}
+    told: list[dict[str, object]] = [{"seed": 1}, {"object_files": {"mug": mug}}]
+    by_name = dict(zip(("left", "right"), told, strict=True))
+    provenance = {"parts": told if parts == "list" else by_name}
+    grasps = GraspSet.create(THREE, object="mug", provenance=provenance)
+    assert description_of(grasps, "mug") == mug
+    renamed = with_objects_renamed(grasps, {"mug": "cup"})
+    assert description_of(renamed, "cup") == mug
+    assert description_of(renamed, "mug") == {}
 
 
 def test_descriptions_are_found_in_joined_sets() -> None:

@@ -40,11 +40,12 @@ def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Arra
         f"7f1c,{DOWN},0.1,0.2,0.3,0.08,0",
     )
     imported = FORMAT.read(path, PANDA)
-    assert (imported.frame, imported.notes) == ("world", ())
+    assert imported.frame == "world"
+    assert imported.notes == ("width was left aside of 1 failures: it is the open hand's.",)
     grasps = imported.grasps
     assert_grips_the_cube(grasps.X_OG[0])
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.2595], atol=1e-15)
-    assert grasps.width.tolist() == [0.04, 0.08]
+    np.testing.assert_array_equal(grasps.width, [0.04, np.nan])
     assert grasps.column("label").tolist() == [1.0, 0.0]
     assert grasps.column("scene_id").tolist() == ["7f1c", "7f1c"]
     assert np.isnan(grasps.score).all()
@@ -66,11 +67,16 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
         label=rng.integers(0, 2, 100), scene_id=rng.choice(["a1", "b2"], 100)
     )
     path = tmp_path / "grasps.csv"
-    assert FORMAT.write(grasps, path, PANDA) == ("VGN and GIGA has no place for object, score.",)
+    failed = grasps.column("label") == 0
+    assert FORMAT.write(grasps, path, PANDA) == (
+        "VGN and GIGA has no place for object, score.",
+        f"{failed.sum()} failures got the hand's opening of 0.08 m as width.",
+    )
     assert FORMAT.recognises(path)
     back = FORMAT.read(path, PANDA).grasps
     np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-14)
-    for name in ("width", "label", "scene_id"):
+    np.testing.assert_array_equal(back.width, np.where(failed, np.nan, grasps.width))
+    for name in ("label", "scene_id"):
         np.testing.assert_array_equal(back.column(name), grasps.column(name))
     with path.open() as file:
         rows = list(csv.DictReader(file))
@@ -78,6 +84,7 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
     np.testing.assert_allclose([finger_tip(row) for row in rows], tips, atol=1e-14)
     assert path.read_text().splitlines()[0] == HEADER
     assert {row["label"] for row in rows} == {"0", "1"}
+    assert {row["width"] for row in rows if row["label"] == "0"} == {"0.08"}
 
 
 def test_each_grasp_is_read_alike_alone(
@@ -94,7 +101,10 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2], [0, 0, 0.3]])
     grasps = GraspSet.create(X_OG, object="").with_columns(outcome=["lifted", "no_contact", ""])
     notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
-    assert notes == ("3 grasps have no width; empty cells.",)
+    assert notes == (
+        "1 failures got the hand's opening of 0.08 m as width.",
+        "2 grasps have no width; empty cells.",
+    )
     back = FORMAT.read(tmp_path / "scene_7.csv", PANDA).grasps
     np.testing.assert_array_equal(back.column("label"), [1.0, 0.0, np.nan])
     assert np.isnan(back.width).all()
@@ -138,6 +148,28 @@ def test_malformed(header: str, line: str, message: str, tmp_path: Path) -> None
     with pytest.raises(InvalidInputError) as error:
         FORMAT.read(path, PANDA)
     assert str(error.value).startswith(f"{path}{message}")
+
+
+def test_empty_lines_are_passed_over_and_counted(tmp_path: Path) -> None:
+    good = f"a,{DOWN},0,0,0.1,0.08,1"
+    path = grasps_csv(tmp_path / "a.csv", "", good, "", good.replace("0.1,", "high,"))
+    with pytest.raises(InvalidInputError, match=r"a\.csv:5: z is 'high', not a number"):
+        FORMAT.read(path, PANDA)
+    path = grasps_csv(tmp_path / "a.csv", "", good, "", "a,1,1,0,0,0,0,0.1,0.08,1")
+    with pytest.raises(InvalidInputError, match=r"a\.csv:5: qx, qy, qz, qw have length"):
+        FORMAT.read(path, PANDA)
+    path = grasps_csv(tmp_path / "a.csv", "", good, "", "a,1")
+    with pytest.raises(InvalidInputError, match=r"a\.csv:5: has 2 cells"):
+        FORMAT.read(path, PANDA)
+    assert len(FORMAT.read(grasps_csv(path, "", good, "", good), PANDA).grasps) == 2
+
+
+def test_a_table_of_results_is_not_taken_for_one(tmp_path: Path) -> None:
+    header = "id,outcome,x,y,z,qw,qx,qy,qz,X_OG"
+    path = tmp_path / "results.csv"
+    for name, expected in ((header.removesuffix(",X_OG"), True), (header, False)):
+        path.write_text(name + "\n")
+        assert FORMAT.recognises(path) == expected
 
 
 def test_other_files(tmp_path: Path) -> None:

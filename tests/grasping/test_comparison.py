@@ -13,7 +13,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.comparison import QUANTILES, compare, distribution, summarize
 from burg_drake.grasping.coverage import Share, coverage, precision
 from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.similarity import METRICS_VERSION
+from burg_drake.grasping.similarity import DISTANCE_VERSION
 
 NAN = math.nan
 
@@ -67,7 +67,7 @@ def test_summary_by_hand() -> None:
     assert summary.texts["outcome"] == {"lifted": 3, "": 1, "slipped": 1}
     assert list(summary.texts["outcome"]) == ["lifted", "", "slipped"]
     assert set(summary.texts) == {"instance", "outcome"}
-    assert summary.version == METRICS_VERSION
+    assert summary.version == DISTANCE_VERSION
 
 
 def test_duplicates_count_in_either_finger_form() -> None:

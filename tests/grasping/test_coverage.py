@@ -12,7 +12,7 @@ from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.coverage import Share, coverage, nearest_grasps, precision
 from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.similarity import LEVER, METRICS_VERSION, pose_distances
+from burg_drake.grasping.similarity import DISTANCE_VERSION, LEVER, pose_distances
 
 STEP = 1 / 128
 """[m]; a binary fraction, so that grasps lie exactly on a bound."""
@@ -142,7 +142,7 @@ def test_nearest_grasps_by_brute_force() -> None:
 def test_results_say_what_they_are() -> None:
     result = coverage(one(0, 0, 0), one(0, 0, 0), translation=0.01)
     assert result.tolerance == Tolerance(translation=0.01)
-    assert result.version == nearest_grasps(one(0, 0, 0), one(0, 0, 0)).version == METRICS_VERSION
+    assert result.version == nearest_grasps(one(0, 0, 0), one(0, 0, 0)).version == DISTANCE_VERSION
     assert result.tolerance.lever == LEVER
 
 

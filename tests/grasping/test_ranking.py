@@ -32,6 +32,38 @@ def test_friction_needed() -> None:
     assert ranking.top.ap == graspnet_ap(grasps, needed).ap
 
 
+@pytest.mark.parametrize(
+    ("columns", "colliding"),
+    [
+        ({"clearance": [0.01, -0.002, math.nan, 0.0]}, 1),
+        ({"screened": ["clear", "collision_table", "", "clear"]}, 1),
+        ({"outcome": ["lifted", "collision_target", "slipped", "no_ik"]}, 1),
+        ({"clearance": [0.01, -0.002, 0.1, 0.0], "outcome": ["collision_clutter", "", "", ""]}, 2),
+        ({"clearance": [math.nan] * 4, "screened": [""] * 4}, None),
+        ({"clearance": ["near", "far", "", ""], "outcome": [1, 0, 0, 1]}, None),
+        ({}, None),
+    ],
+)
+def test_what_collides_is_bad_at_any_friction(
+    columns: dict[str, ArrayLike], colliding: int | None
+) -> None:
+    """graspnetAPI marks what collides like what holds at no friction: -1, never good."""
+    needed = np.array([0.1, 0.1, 0.1, 1.1])
+    grasps = with_column([3, 4, 2, 1], friction_needed=needed, **columns)
+    ranking = rank_by(grasps, "friction_needed")
+    assert ranking.colliding == colliding
+    bad = [k for k, of in ((0, 2), (1, 1)) if (colliding or 0) >= of]
+    needed[bad] = math.inf
+    assert ranking.top.ap == graspnet_ap(grasps, needed).ap
+    assert ranking.good[-1] == 4 - len(bad)
+
+
+def test_labels_judge_alone() -> None:
+    grasps = with_column([2, 1], label=[1, 0], clearance=[-0.01, 0.01])
+    ranking = rank_by(grasps, "label")
+    assert (ranking.colliding, ranking.good) == (None, (1,))
+
+
 def test_outcomes() -> None:
     outcome = ["slipped", "lifted", "", "lifted_disturbed"]
     ranking = rank_by(with_column([4, 3, 2, 1], outcome=outcome), "outcome")

@@ -133,7 +133,7 @@ def one(lines: str) -> str:
 
 
 KNOWN = (
-    "Known: center_of_mass, contact, decomposition, density, description, friction, inertia, mass,"
+    "center_of_mass, contact, decomposition, density, description, friction, inertia, mass,"
     " mesh, openings, rgba, scale, unit, wall_thickness"
 )
 
@@ -165,9 +165,9 @@ KNOWN = (
          "FILE:3: objects: '---' is no object name; use a-z, 0-9 and underscores"),
         ("version: 1\nobjects:\n  a: {mesh: a.obj}\n  a: {mesh: b.obj}\n",
          "FILE:4: objects: key 'a' is given twice"),
-        (one("    freight: 0.4\n"), f"FILE:5: objects.mug: unknown key 'freight'; {KNOWN}"),
+        (one("    freight: 0.4\n"), f"FILE:5: objects.mug: unknown key 'freight'; known: {KNOWN}"),
         (one("    masses: 0.4\n"),
-         f"FILE:5: objects.mug: unknown key 'masses'; did you mean 'mass'? {KNOWN}"),
+         f"FILE:5: objects.mug: unknown key 'masses'; did you mean 'mass'? Known: {KNOWN}"),
         (one("    mass: 100 g\n"), "FILE:5: objects.mug.mass: '100 g' is not a finite number"),
         (one("    mass: 0\n"), "FILE:4: objects.mug: mass is 0 kg; it must be above 0"),
         (one("    density: -1\n"), "FILE:4: objects.mug: density is -1 kg/m^3; it must be above 0"),
@@ -186,7 +186,7 @@ KNOWN = (
          "FILE:5: objects.mug.openings: 'closed' is not valid; did you mean 'close'? Known: close,"
          " wall"),
         (one("    contact: hull\n"),
-         "FILE:5: objects.mug.contact: 'hull' is not valid; Known: compliant_pieces, mesh, pieces,"
+         "FILE:5: objects.mug.contact: 'hull' is not valid; known: compliant_pieces, mesh, pieces,"
          " primitive"),
         (one("    center_of_mass: [0, 0]\n"),
          "FILE:5: objects.mug.center_of_mass: has 2 entries; expected 3"),
@@ -203,7 +203,7 @@ KNOWN = (
         (one("    decomposition: {seed: 0.5}\n"),
          "FILE:5: objects.mug.decomposition.seed: '0.5' is not a whole number"),
         ("version: 1\ndefaults: {mass: 1}\n" + one("")[11:],
-         "FILE:2: defaults: unknown key 'mass'; Known: contact, decomposition, density, friction,"
+         "FILE:2: defaults: unknown key 'mass'; known: contact, decomposition, density, friction,"
          " openings, rgba, scale, unit, wall_thickness"),
         ("version: 1\ndefaults:\n  unit: mm\n  scale: 1\n" + one("")[11:],
          "FILE:3: defaults: give unit or scale, not both"),
