@@ -79,7 +79,7 @@ def patch(name, value):
     module, _, attribute = name.rpartition(".")
     __import__(module)
     setattr(sys.modules[module], attribute, value)
-known_judge.install(patch, Path(sys.argv[2]), pause=0.02)
+known_judge.install(patch, Path(sys.argv[2]), pause=0.1)
 from burg_drake.evaluation.cascade import evaluate
 evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, workers=2)
 """
