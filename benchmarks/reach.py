@@ -3,9 +3,9 @@
     python benchmarks/reach.py [SCENE] [--station S] [--grasps N] [--checks N] [--baseline N]
 
 Samples grasps on every object of the scene, keeps those that the open hand is clear for, and judges
-them. The exhaustive search starts the inverse kinematics from over 3,000 postures. The baseline is
-what Drake's tutorials suggest: `InverseKinematics` with SNOPT, restarted at random, and Drake's
-collision checker.
+them: by the closed form, by the numeric search that serves other arms, and exhaustively by one that
+starts from over 3,000 postures. The baseline is what Drake's tutorials suggest: `InverseKinematics`
+with SNOPT, restarted at random, and Drake's collision checker.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station, load_station
 
-EXHAUSTIVE = ReachSettings(starts=(32, 64, 128, 1024, 2048), postures=16384, iterations=25)
+EXHAUSTIVE = ReachSettings(
+    closed_form=False, starts=(32, 64, 128, 1024, 2048), postures=16384, iterations=25
+)
+NUMERIC = ReachSettings(closed_form=False)
 BASELINE_STARTS = 10
 """Restarts of the baseline for each way to put the fingers."""
 
@@ -57,6 +60,8 @@ def main() -> None:
     arm = ArmReach(scene, station)
     print(f"set-up {time.process_time() - start:.2f} s")
     found = report("reach", arm.check, grasps)
+    numeric = ArmReach(scene, station, settings=NUMERIC)
+    compare("numeric", found, report("numeric", numeric.check, grasps))
     exhaustive = ArmReach(scene, station, settings=EXHAUSTIVE)
     compare("exhaustive", found, report("exhaustive", exhaustive.check, grasps))
     few = grasps[: arguments.baseline]

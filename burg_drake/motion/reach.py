@@ -1,8 +1,7 @@
 """Whether the arm reaches a grasp: collision-free configurations at grasp and pregrasp.
 
-Both ways to put the fingers are tried, as they are the same grasp. The starts of the inverse
-kinematics come from a fixed table of postures, so that a verdict depends on the grasp alone: not
-on its neighbours, their order, or a random stream.
+Both ways to put the fingers are tried, as they are the same grasp. A verdict depends on the grasp
+alone: not on its neighbours, their order, or a random stream.
 """
 
 from __future__ import annotations
@@ -10,57 +9,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from burg_drake.core.content import rng_from
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, check_pose, inverse, pregrasp, swap_fingers
 from burg_drake.core.outcome import Outcome
 from burg_drake.motion.collision import ArmCollision, Overlap
-from burg_drake.motion.ik import ArmKinematics, solve_ik
+from burg_drake.motion.ik import ArmKinematics
+from burg_drake.motion.postures import Posture, posture_search
+from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import Scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station
 
-LENGTH_SCALE = 0.3
-"""Distance [m] that counts as much as one radian when postures near a pose are looked up."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReachSettings:
-    """How thoroughly to look for arm configurations.
-
-    Attributes:
-        standoff: distance from pregrasp to grasp along the approach direction [m].
-        starts: starts of the inverse kinematics, round by round; a next round is made if the one
-            before found nothing.
-        postures: size of the table that starts are taken from.
-        iterations: most steps from a start.
-        tolerance: largest error of a solution [m and rad].
-        limit_margin: distance to keep from the joint limits [rad].
-        joint_travel: most that a joint may move between pregrasp and grasp [rad]; with more, the
-            two lie on different branches, and the hand could not go straight from one to the
-            other.
-    """
-
-    standoff: float = 0.10
-    starts: tuple[int, ...] = (32, 64, 128)
-    postures: int = 4096
-    iterations: int = 15
-    tolerance: float = 1e-6
-    limit_margin: float = 0.01
-    joint_travel: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.standoff < 0.0 or self.limit_margin < 0.0 or self.joint_travel <= 0.0:
-            raise InvalidInputError(
-                "standoff and limit_margin must be at least 0, joint_travel above 0"
-            )
-        if not self.starts or not 0 < sum(self.starts) <= 2 * self.postures:
-            raise InvalidInputError(
-                f"starts {list(self.starts)} must be whole numbers above 0, in all at most twice"
-                f" the number of postures, {self.postures}"
-            )
+EXPLAINED = 16
+"""Configurations, of either way to put the fingers, of which it is asked what is in the way: to
+measure that costs several times as much as to see that something is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +34,9 @@ class Reach:
     Attributes:
         outcome: `NO_IK`, `ARM_COLLISION`, or None if the arm reaches grasp and pregrasp.
         q_grasp, q_pregrasp: (n,) arm positions [rad]; None if not reached.
-        blocker: of the configuration that came closest, what was in the way of which link, such as
-            `panda_link5 vs mug`; empty if nothing was.
+        blocker: what was in the way of which link, such as `panda_link5 vs mug`, of the
+            configuration that came closest, among the `EXPLAINED` nearest to home; empty if
+            nothing was.
     """
 
     outcome: Outcome | None
@@ -113,9 +78,9 @@ class ArmReach:
         )
         self._hand = station.hand
         self._X_AW = inverse(arm.X_WA.matrix())
-        self._home = np.array(arm.home)
-        self._postures = _PostureTable(self.kinematics, self._home, self.settings)
-        at_home = self.collision.overlaps(self._home)
+        home = np.array(arm.home)
+        self._search = posture_search(self.kinematics, home, self.settings)
+        at_home = self.collision.overlaps(home)
         if at_home:
             pairs = ", ".join(dict.fromkeys(f"{o.link} with {o.other}" for o in at_home))
             raise InvalidInputError(
@@ -135,52 +100,14 @@ class ArmReach:
         X_AG = _same_for_both(self._X_AW @ check_pose(X_WG, "X_WG"))
         X_AH = self._hand.X_AH(X_AG)
         X_AH_before = self._hand.X_AH(pregrasp(X_AG, self.settings.standoff))
-        search = _Search(self.collision)
-        used = 0
-        for starts in self.settings.starts:
-            way, start = self._postures.nearest(X_AH, used, starts)
-            used += starts
-            for k, q, q_before in self._configurations(X_AH, X_AH_before, way, start):
-                if search.is_free(k, q, q_before):
-                    return Reach(None, q, q_before)
-            if search.is_hopeless:
+        attempt = _Attempt(self.collision)
+        for postures in self._search.rounds(X_AH, X_AH_before):
+            for posture in postures:
+                if attempt.is_free(posture):
+                    return Reach(None, posture.q, posture.q_before)
+            if attempt.is_hopeless:
                 break
-        return search.verdict()
-
-    def _configurations(
-        self, X_AH: Array, X_AH_before: Array, way: NDArray[np.int_], start: Array
-    ) -> list[tuple[int, Array, Array]]:
-        """Inverse kinematics at the grasp, and from there at the pregrasp.
-
-        Args:
-            X_AH, X_AH_before: (2, 4, 4) hand poses of the two ways to put the fingers.
-            way: (N,) which of the two a start is meant for.
-            start: (N, n) arm positions.
-
-        Returns:
-            Way, grasp and pregrasp configuration where both exist; closest to home first.
-        """
-        settings = self.settings
-
-        def solve(goal: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
-            return solve_ik(
-                self.kinematics,
-                goal,
-                start,
-                iterations=settings.iterations,
-                tolerance=settings.tolerance,
-                margin=settings.limit_margin,
-            )
-
-        q, met = solve(X_AH[way], start)
-        way, q = way[met], q[met]
-        if not len(q):
-            return []
-        q_before, met = solve(X_AH_before[way], q)
-        met &= np.abs(q_before - q).max(axis=1) <= settings.joint_travel
-        distance = np.abs(q_before - self._home).max(axis=1)
-        order = [i for i in np.argsort(distance, kind="stable") if met[i]]
-        return [(int(way[i]), q[i], q_before[i]) for i in order]
+        return attempt.verdict()
 
 
 def _same_for_both(X_AG: Array) -> Array:
@@ -190,63 +117,35 @@ def _same_for_both(X_AG: Array) -> Array:
     return np.array(twins if closing[np.abs(closing).argmax()] > 0.0 else twins[::-1])
 
 
-class _PostureTable:
-    """Arm configurations spread over the joint ranges, to be looked up by hand pose."""
-
-    def __init__(self, arm: ArmKinematics, home: Array, settings: ReachSettings) -> None:
-        lower, upper = arm.lower + settings.limit_margin, arm.upper - settings.limit_margin
-        rng = rng_from("burg_drake postures", settings.postures)
-        q = rng.uniform(lower, upper, (settings.postures, len(lower)))
-        q[0] = home
-        X_AH, _ = arm.forward(q)
-        self._q = q
-        self._p = X_AH[:, :3, 3].copy()
-        self._R = X_AH[:, :3, :3].reshape(-1, 9)
-
-    def nearest(self, X_AH: Array, skip: int, count: int) -> tuple[NDArray[np.int_], Array]:
-        """The postures with hand poses closest to two wanted ones.
-
-        Args:
-            X_AH: (2, 4, 4) wanted hand poses.
-            skip: how many of the closest to leave out, over both.
-            count: how many to return, over both.
-
-        Returns:
-            (count,) index of the pose and (count, n) arm positions.
-        """
-        cosine = 0.5 * (X_AH[:, :3, :3].reshape(2, 9) @ self._R.T - 1.0)
-        offset = self._p - X_AH[0, :3, 3]  # swapping the fingers leaves the hand's origin in place
-        squared = (
-            np.arccos(np.clip(cosine, -1.0, 1.0)) ** 2 + (offset**2).sum(axis=1) / LENGTH_SCALE**2
-        )
-        order = np.argsort(squared, axis=None, kind="stable")[skip : skip + count]
-        return order // len(self._q), self._q[order % len(self._q)]
-
-
-class _Search:
+class _Attempt:
     """Collision checks of one grasp, and what they say when all have failed."""
 
     def __init__(self, collision: ArmCollision) -> None:
         self._collision = collision
         self._blocked: set[int] = set()
+        self._explained = [0, 0]
         self._least: Overlap | None = None
 
-    def is_free(self, way: int, q: Array, q_before: Array) -> bool:
+    def is_free(self, posture: Posture) -> bool:
         """Whether the arm collides neither at the grasp nor at the pregrasp.
 
         A way to put the fingers is given up once the hand itself is found in collision, as no
         other configuration can help.
         """
-        if way in self._blocked:
+        if posture.way in self._blocked:
             return False
-        overlaps = [*self._collision.overlaps(q), *self._collision.overlaps(q_before)]
-        if not overlaps:
-            return self._collision.is_free(q) and self._collision.is_free(q_before)
+        both = (posture.q, posture.q_before)
+        if all(self._collision.is_free(q) for q in both):
+            return True
+        if self._explained[posture.way] == EXPLAINED:
+            return False
+        self._explained[posture.way] += 1
+        overlaps = [overlap for q in both for overlap in self._collision.overlaps(q)]
         if any(overlap.carried for overlap in overlaps):
-            self._blocked.add(way)
+            self._blocked.add(posture.way)
             overlaps = [overlap for overlap in overlaps if overlap.carried]
-        worst = max(overlaps, key=lambda overlap: overlap.depth)
-        if self._least is None or worst.depth < self._least.depth:
+        worst = max(overlaps, key=lambda overlap: overlap.depth, default=None)
+        if worst is not None and (self._least is None or worst.depth < self._least.depth):
             self._least = worst
         return False
 
