@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import Parser
+from burg_drake.apps.arguments import DEFAULT_STATION, Parser
 
 if TYPE_CHECKING:
     from burg_drake.formats.grasp_format import Gripper
@@ -89,6 +89,35 @@ def gripper_for(
 
         gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
     return replace(gripper, body=arguments.gripper_link) if arguments.gripper_link else gripper
+
+
+def add_told_station(parser: Parser) -> None:
+    """The option --station, of verbs whose files may name one."""
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        help="station file or built-in name (default: what the file names, else"
+        f" {DEFAULT_STATION})",
+    )
+
+
+def station_for(arguments: argparse.Namespace, path: str) -> Station:
+    """The station that --station names, or else a file or a run, or else the default.
+
+    Raises:
+        UnknownNameError: it is not there.
+    """
+    from burg_drake.core.errors import UnknownNameError
+    from burg_drake.evaluation.grasp_input import station_reference
+    from burg_drake.station.station import load_station
+
+    if arguments.station is not None:
+        return load_station(arguments.station)
+    told = station_reference(path)
+    try:
+        return load_station(told or DEFAULT_STATION)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
 
 
 def named_gripper(hand: str) -> Gripper:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_renaming, add_station, add_verb, friction
+from burg_drake.apps.arguments import add_renaming, add_verb, friction
 from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.core.errors import InvalidInputError
 
@@ -18,7 +18,7 @@ DEFAULT_METRIC = "load_margin"
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    from burg_drake.apps.grasp_file import add_file_options
+    from burg_drake.apps.grasp_file import add_file_options, add_told_station
     from burg_drake.apps.grasp_source import add_source
 
     parser = add_verb(
@@ -51,7 +51,7 @@ def add_to(group: Any) -> None:
     )
     add_format(parser)
     add_source(parser)
-    add_station(parser)
+    add_told_station(parser)
     parser.add_argument(
         "--by",
         metavar="METRIC",
@@ -72,17 +72,16 @@ def add_to(group: Any) -> None:
 
 def run_score(arguments: argparse.Namespace) -> int:
     """Scores, prints a table and writes a file."""
-    from burg_drake.apps.grasp_file import gripper_for
+    from burg_drake.apps.grasp_file import gripper_for, station_for
     from burg_drake.apps.grasp_source import source_of
     from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.evaluation.scored_set import scored_set
     from burg_drake.formats.conversion import with_objects_renamed
-    from burg_drake.station.station import load_station
 
     output = None
     if arguments.output is not None:
         output = output_of(arguments.output, arguments.target, frame="object")
-    station = load_station(arguments.station)
+    station = station_for(arguments, arguments.file)
     gripper = gripper_for(arguments, station)
     imported = read_input(arguments.file, arguments.source, gripper)
     if imported.frame != "object":

@@ -9,14 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
-    DEFAULT_STATION,
     add_renaming,
     add_verb,
     add_view,
     number,
     positive_int,
 )
-from burg_drake.apps.grasp_file import add_file_options, gripper_for
+from burg_drake.apps.grasp_file import (
+    add_file_options,
+    add_told_station,
+    gripper_for,
+    station_for,
+)
 from burg_drake.apps.grasp_source import Source, add_source, source_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome
@@ -47,12 +51,7 @@ def add_to(group: Any) -> None:
     show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
     add_file_options(show)
     add_source(show)
-    show.add_argument(
-        "--station",
-        metavar="STATION",
-        help="where the scene of a grasp file is (default: what the file names, else"
-        f" {DEFAULT_STATION})",
-    )
+    add_told_station(show)
     add_renaming(show)
     _add_choice(show)
     show.add_argument(
@@ -144,19 +143,15 @@ def _content(arguments: argparse.Namespace) -> Content:
     from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.formats.conversion import with_objects_renamed
     from burg_drake.scene.scene import load_scene
-    from burg_drake.station.station import load_station
 
     path = Path(arguments.file)
     if path.is_dir():
         return _content_of_run(arguments)
-    station = load_station(arguments.station or DEFAULT_STATION)
+    station = station_for(arguments, arguments.file)
     gripper, format = gripper_for(arguments, station), arguments.source
     objects = dict(arguments.rename)
     imported = read_input(path, format, gripper)
     grasps = imported.grasps
-    told = grasps.provenance.get("station")
-    if arguments.station is None and isinstance(told, str):
-        station = load_station(told)
     if len(grasps) == 0:
         raise InvalidInputError(f"{path} has no grasps")
     if imported.frame == "object":

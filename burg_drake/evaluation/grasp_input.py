@@ -89,11 +89,27 @@ def hand_reference(path: str | Path) -> str | None:
     hand: dict[str, str] | None
     if path.is_dir():
         hand = run_documents(load_run(path)).get("hand")
-    elif FORMATS[OURS].recognises(path):
-        hand = hand_of(GraspSet.load(path))
     else:
-        return None
+        grasps = _ours(path)
+        hand = None if grasps is None else hand_of(grasps)
     if hand is None:
         return None
     document = hand.get("document")
     return document if document and Path(document).is_file() else hand["name"]
+
+
+def station_reference(path: str | Path) -> str | None:
+    """Document of the station of a run, or of the one that a file of ours was sampled for; None if
+    neither tells it."""
+    path = Path(path)
+    if path.is_dir():
+        return str(run_documents(load_run(path))["station"])
+    grasps = _ours(path)
+    station = None if grasps is None else grasps.provenance.get("station")
+    return station if isinstance(station, str) else None
+
+
+def _ours(path: Path) -> GraspSet | None:
+    """The grasps of a file of ours."""
+    is_ours = path.is_file() and FORMATS[OURS].recognises(path)
+    return GraspSet.load(path) if is_ours else None

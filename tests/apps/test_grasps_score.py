@@ -74,11 +74,23 @@ def test_another_hand_is_said(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "wsg.h5"
     options = ["--object", "can", "-n", "3", "--station", "panda_wsg", "-o", str(path)]
     assert main(["grasps", "sample", "household", *options]) == 0
-    for station, said in (("panda_tabletop", True), ("panda_wsg", False)):
+    told = ((), ("--station", "panda_tabletop"), ("--station", "panda_wsg"))
+    for station, said in zip(told, (False, True, False), strict=True):
         capsys.readouterr()
-        assert score(path, "--station", station) == 0
+        assert score(path, *station) == 0
         note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
         assert (note in capsys.readouterr().out) == said
+
+
+def test_a_station_that_is_gone_is_said(grasp_file: Path, tmp_path: Path, capsys: Capture) -> None:
+    grasps = GraspSet.load(grasp_file)
+    provenance = {**grasps.provenance, "station": str(tmp_path / "gone.yaml")}
+    path = tmp_path / "moved.h5"
+    GraspSet.create(grasps.X_OG, object=grasps.object, provenance=provenance).save(path)
+    assert score(path) == 2
+    said = capsys.readouterr().err
+    assert "moved.h5 names a station: " in said and said.endswith("; give --station\n")
+    assert score(path, "--station", "panda_tabletop", "--library", "household") == 0
 
 
 def test_millimetres_are_refused(grasp_file: Path, tmp_path: Path, capsys: Capture) -> None:
