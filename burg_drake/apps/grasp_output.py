@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,9 +59,11 @@ class Output:
             return
         written = write_each_object(grasps, self.path, self.format, gripper)
         print(said)
-        for path, notes in written.items():
-            print(path)
-            print_notes(notes)
+        print(f"  {listing([path.name for path in written])}")
+        for note, paths in _by_note(written).items():
+            if len(paths) < len(written):
+                note = f"{listing([path.name for path in paths])}: {note}"
+            print_notes([note])
 
 
 def add_format(parser: Parser) -> None:
@@ -106,6 +108,15 @@ def output_of(path: str, target: str | None, *, frame: str | None = None) -> Out
 def named(format: GraspFormat) -> str:
     """A format's name and title."""
     return format.name if format.title == format.name else f"{format.name} ({format.title})"
+
+
+def _by_note(written: Mapping[Path, Sequence[str]]) -> dict[str, list[Path]]:
+    """The files that each note is about."""
+    found: dict[str, list[Path]] = {}
+    for path, notes in written.items():
+        for note in notes:
+            found.setdefault(note, []).append(path)
+    return found
 
 
 def print_notes(notes: Sequence[str]) -> None:

@@ -57,5 +57,5 @@ class SamplingSettings:
             raise InvalidInputError(f"margin is {self.margin} m; give a clearance of 0 or more")
         if (self.margin or self.conservative) and not self.clear:
             raise InvalidInputError(
-                "margin and conservative are of the test for clear grasps; ask for clear ones, too"
+                "margin and conservative are about clear grasps; ask for these, too (--clear)"
             )

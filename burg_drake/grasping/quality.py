@@ -1,9 +1,9 @@
 """Analytic quality of grasps: what two compliant pads with Coulomb friction can bear.
 
 Every metric is of the patches that `contacts` finds, with the object as it comes to lie between the
-pads, and of the wrench space that `wrench_space` describes. `friction_needed` and `antipodal_angle`
-are those of the grasp as it was given; all others, of the object where it comes to rest in the hand
-after `sliding`. The hand's own body, the table and other objects do not enter.
+pads, and of the wrench space that `wrench_space` describes. `force_closure`, `friction_needed` and
+`antipodal_angle` are those of the grasp as it was given; all others, of the object where it comes
+to rest in the hand after `sliding`. The hand's body, the table and other objects do not enter.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from burg_drake.grasping.wrench_margins import ANY_FORCE, ANY_WRENCH, force_alon
 from burg_drake.grasping.wrench_space import WrenchSpace, hull_volume
 from burg_drake.objects.entry import ObjectEntry
 
-QUALITY_VERSION = 2
+QUALITY_VERSION = 3
 """Raised when the same grasps begin to get other figures."""
 
 GRAVITY = 9.81
@@ -92,23 +92,22 @@ class Quality:
 
     Attributes:
         force_closure: whether the line between the contacts lies strictly within both friction
-            cones (Nguyen, "Constructing force-closure grasps", IJRR 1988) where the object comes to
-            rest; torsional friction of the patches then resists turning about that line. Where
-            `slide` is 0, that is where it was grasped.
-        friction_needed: tangent of the larger angle between that line and the inward normals where
-            it was grasped: the object slides unless there is more friction than this. Infinite from
-            90 degrees.
+            cones (Nguyen, "Constructing force-closure grasps", IJRR 1988), that is, whether less
+            friction is needed than there is; torsional friction of the patches then resists turning
+            about that line. Where it is false the object slides, and may be held elsewhere.
+        friction_needed: tangent of the larger angle between that line and the inward normals.
+            Infinite from 90 degrees.
         antipodal_angle: larger of the angles between the closing direction of the grasp, before the
-            object turns, and the inward normals where it was grasped [rad].
-        slide: how far the object slides in the hand until it is in force closure [m]; infinite
-            where it never is, see `sliding`.
+            object turns, and the inward normals [rad].
+        slide: how far the object slides in the hand until it is in force closure [m]: 0 where it is
+            so at once, infinite where it never is, see `sliding`.
         epsilon: radius of the largest ball about the origin within the wrench space [-] (Ferrari
             and Canny, ICRA 1992): soft-finger contacts, normal forces that add up to one, torques
-            about the centre of mass over the largest distance between it and the surface. 0 without
-            force closure. Found by a search whose result is never too small; see
+            about the centre of mass over the largest distance between it and the surface. 0 where
+            the pads never hold it. Found by a search whose result is never too small; see
             `wrench_margins`.
         volume: of the wrench space [-] (Miller and Allen, "Examples of 3D grasp quality
-            computations", ICRA 1999); 0 without force closure. Coarser than epsilon: friction is
+            computations", ICRA 1999); 0 where they never hold it. Coarser than epsilon: friction is
             within a polytope of the ellipsoid's volume with 80 faces.
         load_margin: how many times the object's weight the grip bears as a force on its centre of
             mass in the worst direction, with Coulomb friction and torsion of the patches and pad
@@ -216,21 +215,21 @@ def grasp_quality(
     given = grasp_contacts(surface, X_OG, jaws)
     com, mu = np.array(payload.center_of_mass), payload.friction
     contacts, slide = slide_to_rest(surface, X_OG, jaws, mu, given)
-    closure = np.isfinite(slide)
+    held = np.isfinite(slide)
     length = float(np.linalg.norm(surface.triangles.reshape(-1, 3) - com, axis=1).max())
-    space = WrenchSpace.of(contacts.select(closure), mu, com, length, X_OG[closure, :3, 1])
-    goals = [ANY_WRENCH, ANY_FORCE, *([] if up_O is None else [force_along(up_O[closure])])]
+    space = WrenchSpace.of(contacts.select(held), mu, com, length, X_OG[held, :3, 1])
+    goals = [ANY_WRENCH, ANY_FORCE, *([] if up_O is None else [force_along(up_O[held])])]
     reach = reaches(space, goals)
     weights = 2.0 * jaws.force / (payload.mass * GRAVITY)
     unknown = np.full(len(X_OG), np.nan)
 
     def spread(values: Array) -> Array:
         column = np.where(contacts.touching, 0.0, np.nan)
-        column[closure] = values
+        column[held] = values
         return column
 
     return Quality(
-        force_closure=closure,
+        force_closure=slide == 0.0,
         friction_needed=friction_needed(given),
         antipodal_angle=largest_angle(given.normal, -X_OG[:, :3, 0]),
         slide=slide,

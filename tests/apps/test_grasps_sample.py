@@ -192,7 +192,7 @@ def test_an_object_without_grasps_is_said(
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read weights no.npy"),
         (
             ["household", "--margin-mm", "3", "-o", "x.h5"],
-            "margin and conservative are of the test for clear grasps; ask for clear ones, too",
+            "margin and conservative are about clear grasps; ask for these, too (--clear)",
         ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],
