@@ -1,0 +1,1 @@
+"""Generator of `models/ur5e`: `python -m tools.ur5e_model`."""
