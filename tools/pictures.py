@@ -1,7 +1,7 @@
 """`python -m tools.pictures [station] [pages]`: makes pictures for the documentation.
 
-`station` renders those of the station and the built-in objects by Drake. `pages` takes those of
-grasps by a column and of frames from the pages that the commands write with --html, by a Chromium
+`station` renders those of stations and the built-in objects by Drake. `pages` takes those of grasps
+by a column, of frames and of a reachability map from the pages that the commands write with --html, by a Chromium
 that runs without a display. The others of Meshcat and of the report are screenshots by hand.
 """
 
@@ -110,6 +110,9 @@ def pages() -> None:
         photograph(page, "grasp_quality.png", (1200, 760))
         burg_drake(["frames", "--html", str(page)])
         photograph(page, "frames.png", (1200, 780))
+        show = ["station", "show", "panda_bin", "--scene", "tabletop_six", "--html", str(page)]
+        burg_drake(show)
+        photograph(page, "reachability.png", (1200, 760))
 
 
 def station() -> None:
@@ -120,6 +123,8 @@ def station() -> None:
     render(load_scene("tabletop_six"), panda, portrait, "arm", "station.png")
     nearer = dataclasses.replace(portrait, focal=(1350.0, 1350.0))
     render(load_scene("tabletop_six"), load_station("panda_wsg"), nearer, "arm", "wsg.png")
+    ur5e = load_station("ur5e_tabletop")
+    render(load_scene("tabletop_six"), ur5e, portrait, "arm", "ur5e.png")
     # seen from the front of the board, 40 degrees from above
     X_WC = Pose((-0.31, 0.0, 0.82), rpy_deg=(-134.0, 0.0, -90.0))
     close = Camera(X_WC=X_WC, width=960, height=720, focal=(1150.0, 1150.0))

@@ -32,7 +32,7 @@ LIBRARY = "household"
 STATION = "panda_tabletop"
 
 Layout = tuple[tuple[str, float, float, float], ...]
-"""Object, x and y of the middle of its footprint [m], heading [degrees]."""
+"""Object (`_2` for a second one), x and y of the middle of its footprint [m], heading [degrees]."""
 
 SCENES: dict[str, tuple[str, Layout]] = {
     "tabletop_six": (
@@ -55,6 +55,23 @@ SCENES: dict[str, tuple[str, Layout]] = {
             ("screwdriver", 0.275, 0.366, 4.0),
             ("bowl", 0.318, 0.264, 0.0),
             ("banana", 0.442, 0.270, 75.0),
+        ),
+    ),
+    "tabletop_twelve": (
+        "Twelve household objects, of some of them two, that fill the board",
+        (
+            ("mug", 0.080, 0.075, 140.0),
+            ("bottle", 0.205, 0.070, 20.0),
+            ("box", 0.335, 0.065, 80.0),
+            ("can", 0.470, 0.070, 0.0),
+            ("bottle_2", 0.555, 0.130, 90.0),
+            ("screwdriver", 0.125, 0.185, -12.0),
+            ("bowl", 0.325, 0.215, 0.0),
+            ("can_2", 0.460, 0.190, 0.0),
+            ("mug_2", 0.525, 0.255, 100.0),
+            ("scissors", 0.115, 0.325, 5.0),
+            ("banana", 0.320, 0.362, 10.0),
+            ("box_2", 0.500, 0.365, 75.0),
         ),
     ),
 }
@@ -87,13 +104,15 @@ def main() -> None:
 def lay_out(library: ObjectLibrary, name: str, x: float, y: float, heading: float) -> Instance:
     """An object as its mesh stands, turned by a heading [degrees], with its lowest collision
     piece on the board and the middle of its footprint at x, y [m]."""
-    entry = library.entry(name)
+    object_name = name.removesuffix("_2")
+    entry = library.entry(object_name)
     pieces = np.concatenate([read_vertices(library.path(p)) for p in entry.pieces])
     R_SO = rot_z(np.deg2rad(heading))
     points = read_vertices(library.path(entry.mesh)) @ R_SO.T
     middle = (points.min(axis=0) + points.max(axis=0))[:2] / 2
     return Instance(
-        object=name,
+        name="" if name == object_name else name,
+        object=object_name,
         X_SO=rounded(make_pose(R_SO, (x - middle[0], y - middle[1], -pieces[:, 2].min()))),
     )
 

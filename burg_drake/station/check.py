@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
@@ -30,17 +32,12 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
             issues.append(issue)
     robot: Robot = "arm" if station.document.arm is not None else "none"
     station_diagram = build_station_diagram(scene, station, robot=robot)
+    parts = _robot_parts(station_diagram)
     for (a, b), depth in overlaps(station_diagram).items():
         if depth <= TOUCH_TOLERANCE or (b == "table" and a in buried):
             continue
-        issues.append(
-            SceneIssue(
-                instance=a,
-                kind="overlap",
-                amount=depth,
-                message=f"{a!r} and {b!r} overlap by {depth * 1e3:.1f} mm; move them apart",
-            )
-        )
+        message = _overlap(a, b, depth, parts, station.path)
+        issues.append(SceneIssue(instance=a, kind="overlap", amount=depth, message=message))
     return tuple(issues)
 
 
@@ -77,6 +74,31 @@ def overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:
         if a in order:
             found[a, b] = max(found.get((a, b), 0.0), pair.depth)
     return dict(sorted(found.items(), key=lambda item: order[item[0][0]]))
+
+
+def _robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
+    """Of each body of the robot, by name: what to say of it, and what of the station puts it
+    there."""
+    arm, plant = station_diagram.station.document.arm, station_diagram.plant
+    if arm is None:
+        return {}
+    base = plant.GetFrameByName(arm.base, plant.GetModelInstanceByName("arm")).body()
+    still = {body.index() for body in plant.GetBodiesWeldedTo(base)}
+    return {
+        plant.get_body(index).name(): ("where the arm stands", "arm.X_WA")
+        if index in still
+        else ("of the arm in its home posture", "arm.home")
+        for index in station_diagram.robot_bodies
+    }
+
+
+def _overlap(a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path) -> str:
+    """One line about two bodies that overlap; a is an instance."""
+    by = f"by {depth * 1e3:.1f} mm"
+    if b not in parts:
+        return f"{a!r} and {b!r} overlap {by}; move them apart"
+    what, key = parts[b]
+    return f"{a!r} overlaps {b!r} {what} {by}; move {a!r}, or change {key} in {path}"
 
 
 def _names(station_diagram: StationDiagram) -> dict[BodyIndex, str]:

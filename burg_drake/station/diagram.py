@@ -3,12 +3,15 @@
 Ports of the diagram (MODEL is `hand`, `arm` or `lift`):
 
     inputs   MODEL.desired_state      positions and velocities for the joint servos
+             MODEL.feedforward        what the servos add to it [Nm, N]; nothing if not connected
              applied_forces           list of ExternallyAppliedSpatialForce
-    outputs  MODEL.state, state, contact_results, body_poses, geometry_query,
+    outputs  MODEL.actuation          what the joints got, within the model's effort limits [Nm, N]
+             MODEL.state, state, contact_results, body_poses, geometry_query,
              camera.NAME.color_image, .depth_image, .label_image (with cameras=True)
 
-An input that is not connected leaves its joints without actuation, and bodies without applied
-forces. Gravity does not pull the robot: a real one compensates its own weight.
+Connect the `desired_state` of all models, or of none, which leaves the joints without actuation:
+with some of them, Drake ends the process. The other inputs may be left out. Gravity does not pull
+the robot: a real one compensates its own weight.
 """
 
 from __future__ import annotations
@@ -19,7 +22,14 @@ from typing import TYPE_CHECKING, get_args
 from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, Joint, ModelInstanceIndex, RigidBody
+from pydrake.multibody.tree import (
+    BodyIndex,
+    FixedOffsetFrame,
+    Joint,
+    ModelInstanceIndex,
+    PrismaticJoint,
+    RigidBody,
+)
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
@@ -29,6 +39,7 @@ from burg_drake.scene.scene import Scene
 from burg_drake.station.cameras import add_cameras
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.hollow import is_mesh, sdf_by_pieces
+from burg_drake.station.model_file import add_models
 from burg_drake.station.robot import (
     ROBOT_MODELS,
     Robot,
@@ -41,6 +52,9 @@ from burg_drake.station.surroundings import add_board, add_obstacles, add_table
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, SceneGraph
+
+RISE = "rise"
+"""The joint of an object that can only be lifted off [m], see `build_station_diagram`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +137,9 @@ def build_station_diagram(
         engine: time step and contact settings.
         meshcat: where to show the diagram live, if anywhere.
         cameras: add the station's cameras; needs the renderer's system libraries.
-        weld_objects: fix the free objects where they stand, for a plant of the robot alone that is
-            not simulated; in it rigid meshes are replaced by pieces (see `station.hollow`).
+        weld_objects: for a plant of the robot alone that is not simulated: what would be free
+            stands where it is placed, and can only be lifted off, by a joint `RISE` of its model
+            along world z; rigid meshes are replaced by pieces (see `station.hollow`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -151,9 +166,11 @@ def build_station_diagram(
     add_board(plant, scene.board, station)
     free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
     fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
-    for name, body in {**fixed, **(free if weld_objects else {})}.items():
+    for name, body in fixed.items():
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
+    for name, body in (free if weld_objects else {}).items():
+        _add_rise(plant, body, RigidTransform(instance_pose(scene, station, name)))
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot)
 
@@ -218,7 +235,7 @@ def _add_instance(
         if by_pieces and is_mesh(scene, name):
             (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
         else:
-            (model,) = parser.AddModels(str(path))
+            (model,) = add_models(parser, path)
     except RuntimeError as error:
         raise InvalidInputError(
             f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"
@@ -228,11 +245,21 @@ def _add_instance(
     return plant.GetBodyByName("body", model)
 
 
+def _add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
+    """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
+    model = body.model_instance()
+    place = plant.AddFrame(FixedOffsetFrame("place", plant.world_frame(), X_WO, model))
+    up_O = X_WO.rotation().matrix()[2]
+    plant.AddJoint(PrismaticJoint(RISE, place, body.body_frame(), up_O))
+
+
 def _export_ports(builder: RobotDiagramBuilder, models: dict[str, ModelInstanceIndex]) -> None:
     plant, system = builder.plant(), builder.builder()
     for role, model in models.items():
         system.ExportInput(plant.get_desired_state_input_port(model), f"{role}.desired_state")
+        system.ExportInput(plant.get_actuation_input_port(model), f"{role}.feedforward")
         system.ExportOutput(plant.get_state_output_port(model), f"{role}.state")
+        system.ExportOutput(plant.get_net_actuation_output_port(model), f"{role}.actuation")
     system.ExportInput(plant.get_applied_spatial_force_input_port(), "applied_forces")
     system.ExportOutput(plant.get_state_output_port(), "state")
     system.ExportOutput(plant.get_contact_results_output_port(), "contact_results")

@@ -19,6 +19,7 @@ from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError, nearest
 from burg_drake.station.hand import Finger, Hand
+from burg_drake.station.model_file import add_models
 
 STALL = 1.25
 """Force that a finger's servo asks for when it stands still, over the force of the grip. A velocity
@@ -58,7 +59,7 @@ def add_hand(builder: RobotDiagramBuilder, hand: Hand, path: Path) -> HandModel:
     plant = builder.plant()
     constraints = plant.num_constraints()
     try:
-        (instance,) = builder.parser().AddModels(str(path))
+        (instance,) = add_models(builder.parser(), path)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"

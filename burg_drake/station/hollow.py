@@ -16,6 +16,7 @@ from pydrake.systems.framework import Context
 
 from burg_drake.objects.sdf import model_sdf
 from burg_drake.scene.scene import Scene
+from burg_drake.station.model_file import file_uri
 
 if TYPE_CHECKING:
     from burg_drake.station.diagram import StationDiagram
@@ -48,8 +49,8 @@ def mesh_by_pieces(station_diagram: StationDiagram, context: Context) -> None:
 def sdf_by_pieces(scene: Scene, name: str) -> str:
     """The model of an instance with pieces, for a diagram that is never simulated."""
     library, entry = scene.library, scene.entry(name)
-    pieces = [library.path(path).resolve().as_uri() for path in entry.pieces]
-    visual = library.path(entry.mesh).resolve().as_uri()
+    pieces = [file_uri(library.path(path)) for path in entry.pieces]
+    visual = file_uri(library.path(entry.mesh))
     return model_sdf(name, entry.mass_properties, entry.friction, visual, pieces)
 
 

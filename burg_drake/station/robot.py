@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    Frame,
     JointActuator,
     ModelInstanceIndex,
     PdControllerGains,
@@ -17,7 +18,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.station.hand_check import check_hand
 from burg_drake.station.hand_model import add_hand
@@ -29,10 +30,13 @@ ROBOT_MODELS = ("hand", "arm", "lift")
 """Names of the robot's model instances in every plant."""
 LIFT_DAMPING = 1e6
 """Velocity gain of the floating hand's lift joint [N s/m]; holds a speed to 1e-5 m/s."""
-ARM_STIFFNESS = np.array([4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 1000.0])
-"""Position gains of a seven-joint arm [Nm/rad], falling towards the wrist."""
+ARM_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
+"""Position gains of an arm's joints [Nm/rad]: the joint impedance to which libfranka's examples set
+a Panda (`setJointImpedance` in examples_common.cpp)."""
 ARM_DAMPING_TIME = 0.05
 """Velocity gain over position gain [s]."""
+JOINT_FRAMES = ("_parent", "_child")
+"""Endings of frames that Drake's parser adds to a model for each joint."""
 HOVER = 0.5
 """Height of the floating hand above the origin of the board in the default context [m]."""
 
@@ -46,8 +50,9 @@ def add_robot(
         Model instances by role: `hand`, and `arm` or `lift`.
 
     Raises:
-        InvalidInputError: the hand's document does not fit its model, the station has no arm, or
-            its home posture is not one of this arm.
+        InvalidInputError: the hand's document does not fit its model, the station has no arm, its
+            model cannot be loaded, or its home posture is not one of this arm.
+        UnknownNameError: the arm has no such base or flange.
     """
     if robot == "none":
         return {}
@@ -92,13 +97,30 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
             " or use the hand alone"
         )
     plant = builder.plant()
-    (model,) = builder.parser().AddModels(str(station.arm_model))
+    try:
+        (model,) = builder.parser().AddModels(str(station.arm_model))
+    except (RuntimeError, ValueError) as error:
+        raise InvalidInputError(
+            f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"
+            f" ({' '.join(str(error).split())})"
+        ) from error
     plant.RenameModelInstance(model, "arm")
-    base = plant.GetFrameByName(arm.base, model)
+    base = _frame(plant, model, station, "base", arm.base)
     plant.WeldFrames(plant.world_frame(), base, RigidTransform(arm.X_WA.matrix()))
-    flange = plant.GetFrameByName(arm.flange, model)
+    flange = _frame(plant, model, station, "flange", arm.flange)
     plant.WeldFrames(flange, hand.body_frame(), RigidTransform(arm.X_FH.matrix()))
     actuators = joint_actuators(plant, model)
+    driven = {actuator.joint().index() for actuator in actuators}
+    idle = [
+        joint.name()
+        for joint in map(plant.get_joint, plant.GetJointIndices(model))
+        if joint.index() not in driven and joint.type_name() != "weld"
+    ]
+    if idle:
+        raise InvalidInputError(
+            f"{station.arm_model}: {', '.join(idle)} cannot be driven; a URDF needs a"
+            " <transmission> for each joint of the arm, an SDF an effort limit"
+        )
     if len(arm.home) != len(actuators):
         raise InvalidInputError(
             f"{station.path}: arm.home has {len(arm.home)} joint angles; the arm has"
@@ -108,6 +130,20 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
     for actuator, p in zip(actuators, stiffness, strict=True):
         actuator.set_controller_gains(PdControllerGains(p=p, d=ARM_DAMPING_TIME * p))
     return model
+
+
+def _frame(
+    plant: MultibodyPlant, arm: ModelInstanceIndex, station: Station, key: str, name: str
+) -> Frame:
+    """The frame of the arm that a key of the station names."""
+    if not plant.HasFrameNamed(name, arm):
+        frames = [plant.get_frame(index).name() for index in plant.GetFrameIndices(arm)]
+        frames = [f for f in frames if not f.startswith("__") and not f.endswith(JOINT_FRAMES)]
+        raise UnknownNameError(
+            f"{station.path}: arm.{key}: {station.arm_model} has no frame {name!r};"
+            f" {nearest(name, frames)}"
+        )
+    return plant.GetFrameByName(name, arm)
 
 
 def joint_actuators(plant: MultibodyPlant, model: ModelInstanceIndex) -> list[JointActuator]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError
+from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document
 from burg_drake.station.hand import Hand, locate_hand
@@ -28,6 +29,8 @@ class Arm:
         X_FH: hand body in the flange frame.
         X_WA: arm base in the world.
         home: joint positions of the home posture [rad].
+        velocity, acceleration, jerk: limits of each joint [rad/s, rad/s^2, rad/s^3], in place of
+            those that `motion.limits` finds in the model or knows of the Panda.
     """
 
     model: str = "package://burg_drake/models/panda/panda_arm.sdf"
@@ -36,6 +39,14 @@ class Arm:
     X_FH: Pose = Pose(rpy_deg=(0.0, 0.0, -45.0))
     X_WA: Pose = Pose()
     home: tuple[float, ...]
+    velocity: tuple[float, ...] | None = None
+    acceleration: tuple[float, ...] | None = None
+    jerk: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("velocity", "acceleration", "jerk"):
+            if min(getattr(self, name) or (1.0,)) <= 0.0:
+                raise FieldError(f"arm {name} limits must be above 0", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,8 +147,8 @@ class StationDocument:
         (cx, cy), (sx, sy, _) = self.table.center, self.table.size
         if z < 0.0 and abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2:
             raise FieldError(
-                f"arm.X_WA puts the arm's base {-z:g} m below the table top; z has to be at least"
-                " 0 over the table",
+                f"arm.X_WA puts the arm's base {-1e3 * z:.0f} mm deep into 'table'; move the base"
+                " or what is in its place",
                 *("arm", "X_WA"),
             )
 
@@ -166,6 +177,20 @@ class Station:
     def name(self) -> str:
         """The station's name."""
         return self.document.name
+
+    def camera(self, name: str) -> Camera:
+        """A camera of the station.
+
+        Raises:
+            UnknownNameError: there is no such camera.
+        """
+        known = self.document.cameras
+        if name not in known:
+            raise UnknownNameError(
+                f"station {self.name!r} ({self.path}) has no camera {name!r};"
+                f" {nearest(name, known)}"
+            )
+        return known[name]
 
     @property
     def content(self) -> str:
@@ -201,8 +226,19 @@ def load_station(reference: str | Path) -> Station:
     """
     path = resolve(reference, "stations")
     document = load_document(path, StationDocument)
-    hand, hand_model, hand_path = locate_hand(document.hand, path.parent)
+    with _named(path, "hand"):
+        hand, hand_model, hand_path = locate_hand(document.hand, path.parent)
     arm_model = None
     if document.arm is not None:
-        arm_model = resolve(document.arm.model, base=path.parent)
+        with _named(path, "arm.model"):
+            arm_model = resolve(document.arm.model, base=path.parent)
     return Station(document, hand, hand_model, arm_model, path, hand_path)
+
+
+@contextlib.contextmanager
+def _named(path: Path, key: str) -> Iterator[None]:
+    """Says which key of the station names something that is not there."""
+    try:
+        yield
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path}: {key}: {error}") from error

@@ -90,8 +90,9 @@ def test_label_and_depth_by_the_pinhole_model(
 def test_every_camera_of_the_built_in_station(empty: Scene) -> None:
     station = load_station("panda_tabletop")
     built = build_station_diagram(empty, station, cameras=True)
-    names = [built.diagram.get_output_port(i).get_name() for i in range(12)]
-    assert names[6:] == [
+    ports = built.diagram.num_output_ports()
+    names = [built.diagram.get_output_port(i).get_name() for i in range(ports)]
+    assert [name for name in names if name.startswith("camera.")] == [
         f"camera.{camera}.{kind}_image"
         for camera in ("overview", "board")
         for kind in ("color", "depth", "label")

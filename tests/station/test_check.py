@@ -8,12 +8,14 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import inverse
 from burg_drake.core.schema import Pose
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.scene.validate import SceneIssue
 from burg_drake.station.check import check_scene, require_sound_scene
+from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
 
 EDGE = 0.06
@@ -100,8 +102,27 @@ def test_beside_the_table(library: Path, panda: Station, tmp_path: Path) -> None
 def test_the_arm_at_home_is_in_the_way(library: Path, panda: Station, tmp_path: Path) -> None:
     # The arm's base is at the world's origin, behind the board's lower edge: out of bounds, too.
     x, y = panda.document.X_WS.translation[1], -panda.document.X_WS.translation[0]
-    kinds = {i.kind for i in check_scene(scene_of(library, tmp_path, (x, y, HEIGHT)), panda)}
-    assert kinds == {"out_of_bounds", "overlap"}
+    issues = check_scene(scene_of(library, tmp_path, (x, y, HEIGHT)), panda)
+    assert {issue.kind for issue in issues} == {"out_of_bounds", "overlap"}
+    (message,) = (i.message for i in issues if i.kind == "overlap" and "panda_link0" in i.message)
+    assert message.startswith("'cube_0' overlaps 'panda_link0' where the arm stands by ")
+    assert message.endswith(f" mm; move 'cube_0', or change arm.X_WA in {panda.path}")
+
+
+def test_the_arm_at_home_is_said_to_be(library: Path, panda: Station, tmp_path: Path) -> None:
+    """A cube that floats in the hand."""
+    scene = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT))
+    built = build_station_diagram(scene, panda, robot="arm")
+    context = built.plant.CreateDefaultContext()
+    X_WH = built.plant.GetBodyByName(panda.hand.body).EvalPoseInWorld(context).GetAsMatrix4()
+    p_SH = (inverse(panda.document.X_WS.matrix()) @ X_WH)[:3, 3]
+    issues = check_scene(scene_of(library, tmp_path, tuple(p_SH.tolist())), panda)
+    messages = {i.message.split("'")[3]: i.message for i in issues if i.kind == "overlap"}
+    assert set(messages) == {"panda_hand", "panda_link7"}
+    for link, message in messages.items():
+        start, _, end = message.partition(" mm; ")
+        assert start.startswith(f"'cube_0' overlaps '{link}' of the arm in its home posture by ")
+        assert end == f"move 'cube_0', or change arm.home in {panda.path}"
 
 
 def test_require_sound_scene(library: Path, panda: Station, tmp_path: Path) -> None:

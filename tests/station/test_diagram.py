@@ -67,7 +67,7 @@ def hold_still(built: StationDiagram, context: Context) -> None:
     """Commands the robot to stay where it is."""
     for i in range(built.diagram.num_input_ports()):
         port = built.diagram.get_input_port(i)
-        if port.get_name() == "applied_forces":
+        if not port.get_name().endswith(".desired_state"):
             continue
         model = built.plant.GetModelInstanceByName(port.get_name().split(".")[0])
         state = built.plant.GetPositionsAndVelocities(plant_context(built, context), model)
@@ -81,9 +81,10 @@ def test_ports(built: dict[str, StationDiagram], robot: str, models: list[str]) 
     diagram = built[robot].diagram
     inputs = [diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())]
     outputs = [diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())]
-    assert inputs == [*(f"{model}.desired_state" for model in models), "applied_forces"]
+    of_models = [f"{model}.{name}" for model in models for name in ("desired_state", "feedforward")]
+    assert inputs == [*of_models, "applied_forces"]
     assert outputs == [
-        *(f"{model}.state" for model in models),
+        *(f"{model}.{name}" for model in models for name in ("state", "actuation")),
         *("state", "contact_results", "body_poses", "geometry_query"),
     ]
     context = diagram.CreateDefaultContext()

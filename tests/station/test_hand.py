@@ -206,7 +206,7 @@ def test_the_file_is_named_through_a_station_too(
     with pytest.raises(BurgError) as other:
         station = load_station(tmp_path / "station.yaml")
         add_robot(RobotDiagramBuilder(time_step=0.001), station, "hand")
-    assert str(other.value) == str(error.value)
+    assert str(other.value).endswith(str(error.value))
 
 
 MIMIC = '<drake:mimic joint="panda_finger_joint1" multiplier="1" offset="0"/>'

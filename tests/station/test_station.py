@@ -64,7 +64,8 @@ def test_the_sheet_is_in_front_of_the_arm(builtin: Station) -> None:
         return
     X_WA = builtin.document.arm.X_WA.matrix()
     centre = inverse(X_WA) @ [*board_corners(builtin).mean(axis=0), 1.0]
-    assert 0.4 < centre[0] < 0.55 and abs(centre[1]) < 0.2
+    assert 0.4 < np.hypot(*centre[:2]) < 0.55
+    assert np.abs(centre[:2]).min() < 0.2
 
 
 def test_cameras_see_the_whole_sheet(builtin: Station) -> None:
@@ -125,12 +126,16 @@ def test_principal_point() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("hand: panda_hand", "hand: panda_hnd", r"panda_hnd .*did you mean 'panda_hand'"),
+        (
+            "hand: panda_hand",
+            "hand: panda_hnd",
+            r"mine\.yaml: hand: panda_hnd .*did you mean 'panda_hand'",
+        ),
         ("table:", "tabel:", r"mine\.yaml:7: unknown key 'tabel'; did you mean 'table'"),
         (
             "X_WA: {translation: [0.0, 0.0, 0.0]}",
             "X_WA: {translation: [0.0, 0.0, -0.05]}",
-            r"mine\.yaml:\d+: arm\.X_WA puts the arm's base 0\.05 m below the table top; z has",
+            r"mine\.yaml:\d+: arm\.X_WA puts the arm's base 50 mm deep into 'table'; move",
         ),
         ("size: [1.2, 1.4, 0.1]", "size: [1.2, 0.0, 0.1]", r"mine\.yaml:7: .*table size must be p"),
         ("size: [0.02", "size: [-0.02", r"mine\.yaml:11: background\.wall: obstacle size \[-0"),
@@ -143,7 +148,7 @@ def test_principal_point() -> None:
         (
             "X_WA: {translation",
             "model: package://burg_drake/models/panda/ur5.urdf\n  X_WA: {translation",
-            r"package://burg_drake/models/panda/ur5\.urdf does not exist",
+            r"mine\.yaml: arm\.model: package://burg_drake/models/panda/ur5\.urdf does not exist",
         ),
     ],
 )
@@ -155,6 +160,22 @@ def test_what_does_not_fit_is_named(tmp_path: Path, old: str, new: str, message:
 def test_a_base_beside_the_table_may_be_lower(tmp_path: Path) -> None:
     low = ("X_WA: {translation: [0.0, 0.0, 0.0]}", "X_WA: {translation: [-0.5, 0.0, -0.2]}")
     assert load_station(station_file(tmp_path, low)).document.arm is not None
+
+
+def test_a_base_may_stand_on_an_obstacle(tmp_path: Path) -> None:
+    for height in (0.4, 0.3995):  # the wall's upper edge, and what rounding makes of it
+        on_top = ("{translation: [0.0, 0.0, 0.0]}", f"{{translation: [0.9, 0.0, {height}]}}")
+        assert load_station(station_file(tmp_path, on_top)).document.arm is not None
+
+
+def test_unknown_camera(tmp_path: Path) -> None:
+    station = load_station(station_file(tmp_path))
+    assert station.camera("top") is station.document.cameras["top"]
+    with pytest.raises(UnknownNameError) as error:
+        station.camera("tpo")
+    assert str(error.value) == (
+        f"station 'mine' ({station.path}) has no camera 'tpo'; did you mean 'top'? Known: top"
+    )
 
 
 def test_unknown_station() -> None:

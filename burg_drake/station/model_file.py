@@ -1,0 +1,42 @@
+"""Adds models of SDF files to a plant.
+
+Drake's parser reads SDFormat's own description again for each file that it opens, which takes 25 ms
+(drake 1.51), but only once for texts. So files are handed over as texts.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.sax.saxutils import escape
+
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.tree import ModelInstanceIndex
+
+PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
+"""A file that is named by its path, from the folder of the model on if it is not absolute."""
+
+
+def add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+    """As `parser.AddModels(path)`, sooner.
+
+    Raises:
+        RuntimeError, ValueError: those of `AddModels`.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        text = ""
+    if path.suffix != ".sdf" or not text or "<include" in text:
+        return list(parser.AddModels(str(path)))
+    folder = Path(escape(str(path.parent.resolve())))
+    whole = PATH.sub(lambda found: f"<uri>file://{folder / found[1]}</uri>", text)
+    try:
+        return list(parser.AddModelsFromString(whole, "sdf"))
+    except (RuntimeError, ValueError) as error:
+        raise type(error)(str(error).replace("<literal-string>.sdf", str(path))) from error
+
+
+def file_uri(path: Path) -> str:
+    """The URI of a file as Drake reads it: it does not decode `%20`."""
+    return f"file://{path.resolve()}"
