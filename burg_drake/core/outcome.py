@@ -13,6 +13,7 @@ class Stage(StrEnum):
 
     CLEAR = "clear"
     REACHABLE = "reachable"
+    PLANNED = "planned"
     EXECUTED = "executed"
 
 
@@ -27,10 +28,24 @@ class Outcome(StrEnum):
     """The open hand overlaps another object of the scene."""
     COLLISION_BACKGROUND = "collision_background"
     """The open hand overlaps a fixed body of the scene or station."""
+    HAND_COLLISION_APPROACH = "hand_collision_approach"
+    """On the straight way from pregrasp to grasp the open hand overlaps something."""
+    HAND_COLLISION_LIFT = "hand_collision_lift"
+    """On the straight way up the hand, or the target in it, overlaps something."""
     NO_IK = "no_ik"
-    """No arm configuration puts the hand at the grasp and at the pregrasp."""
+    """No arm configuration puts the hand at the grasp and at the pregrasp, whatever the joint
+    limits."""
+    JOINT_LIMIT = "joint_limit"
+    """Configurations exist, but each is beyond a joint limit."""
     ARM_COLLISION = "arm_collision"
     """Configurations exist, but in each found the arm collides."""
+    APPROACH_LINE = "approach_line"
+    """Grasp and pregrasp are reached, but the arm cannot take the hand straight from one to the
+    other."""
+    LIFT_LINE = "lift_line"
+    """The arm cannot take the hand straight up from the grasp."""
+    NO_PATH = "no_path"
+    """No collision-free path from the home posture to a pregrasp was found."""
     NO_CONTACT = "no_contact"
     """The fingers closed and never touched the target."""
     ONE_FINGER = "one_finger"
@@ -49,6 +64,8 @@ class Outcome(StrEnum):
     """Both fingers still hold the target at the end, but another object was moved on the way."""
     SIMULATION_FAILED = "simulation_failed"
     """Drake could not step the trial; the reason is stored with the result."""
+    REACHABLE = "reachable"
+    """The arm can execute the grasp, and no trial was asked for."""
 
     @property
     def held(self) -> bool:
@@ -60,6 +77,22 @@ class Outcome(StrEnum):
         """The stage that decides this outcome."""
         if self.value.startswith("collision_"):
             return Stage.CLEAR
-        if self in (Outcome.NO_IK, Outcome.ARM_COLLISION):
+        if self in _REACHABLE:
             return Stage.REACHABLE
+        if self in _PLANNED:
+            return Stage.PLANNED
         return Stage.EXECUTED
+
+
+_REACHABLE = (
+    Outcome.HAND_COLLISION_APPROACH,
+    Outcome.HAND_COLLISION_LIFT,
+    Outcome.NO_IK,
+    Outcome.JOINT_LIMIT,
+    Outcome.ARM_COLLISION,
+)
+"""Whether the hand can come to a grasp and away, and the arm be there."""
+_PLANNED = (Outcome.APPROACH_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH, Outcome.REACHABLE)
+"""Whether the arm can move there, straight in and straight up."""
+UNTRIED = ("", Outcome.REACHABLE.value)
+"""Texts in a column of outcomes that tell nothing of a trial."""

@@ -5,13 +5,19 @@ from burg_drake.core.outcome import Outcome, Stage
 
 def test_stored_values_never_change():
     """Results files hold these texts; add new ones, do not rename."""
-    assert [str(outcome) for outcome in Outcome][:15] == [
+    assert {str(outcome) for outcome in Outcome} == {
         "collision_target",
         "collision_table",
         "collision_clutter",
         "collision_background",
+        "hand_collision_approach",
+        "hand_collision_lift",
         "no_ik",
+        "joint_limit",
         "arm_collision",
+        "approach_line",
+        "lift_line",
+        "no_path",
         "no_contact",
         "one_finger",
         "closed_empty",
@@ -21,8 +27,9 @@ def test_stored_values_never_change():
         "lifted",
         "lifted_disturbed",
         "simulation_failed",
-    ]
-    assert [str(stage) for stage in Stage][:3] == ["clear", "reachable", "executed"]
+        "reachable",
+    }
+    assert [str(stage) for stage in Stage] == ["clear", "reachable", "planned", "executed"]
 
 
 def test_each_outcome_is_decided_by_one_stage():
@@ -33,6 +40,18 @@ def test_each_outcome_is_decided_by_one_stage():
         Outcome.COLLISION_CLUTTER,
         Outcome.COLLISION_BACKGROUND,
     }
-    assert by_stage[Stage.REACHABLE] == {Outcome.NO_IK, Outcome.ARM_COLLISION}
+    assert by_stage[Stage.REACHABLE] == {
+        Outcome.HAND_COLLISION_APPROACH,
+        Outcome.HAND_COLLISION_LIFT,
+        Outcome.NO_IK,
+        Outcome.JOINT_LIMIT,
+        Outcome.ARM_COLLISION,
+    }
+    assert by_stage[Stage.PLANNED] == {
+        Outcome.APPROACH_LINE,
+        Outcome.LIFT_LINE,
+        Outcome.NO_PATH,
+        Outcome.REACHABLE,
+    }
     assert sum(map(len, by_stage.values())) == len(Outcome)
     assert Outcome.LIFTED in by_stage[Stage.EXECUTED]
