@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ COPLANAR = 1e-9
 PRISM_SIDES = 128
 """Sides of the prism within a cylinder, where no exact form is at hand: 0.01 mm inside of one of
 34 mm radius."""
+
+KEPT = 2048
+"""Hulls that are kept, as one object is read for several purposes: the latest ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,30 +48,7 @@ class Polytope:
         Raises:
             scipy.spatial.QhullError: the points lie in a plane.
         """
-        hull = convex_hull(points)
-        planes, face = np.unique(
-            (hull.equations / COPLANAR).round(), axis=0, return_index=False, return_inverse=True
-        )
-        face = face.reshape(-1)
-        first = np.unique(face, return_index=True)[1]
-        assert len(first) == len(planes)
-        edges = {}
-        for triangle, neighbors in enumerate(hull.neighbors):
-            for corner, neighbor in enumerate(neighbors):  # across the edge opposite to the corner
-                if face[triangle] != face[neighbor]:
-                    ends = np.sort(np.delete(hull.simplices[triangle], corner))
-                    edges[tuple(ends.tolist())] = sorted((face[triangle], face[neighbor]))
-        vertices = points[hull.vertices]
-        place = np.full(len(points), -1)
-        place[hull.vertices] = np.arange(len(vertices))
-        normals = hull.equations[first, :3]
-        return cls(
-            vertices,
-            normals,
-            (vertices @ normals.T).max(axis=0),
-            np.array(list(edges.values()), dtype=np.intp),
-            place[np.array(list(edges), dtype=np.intp)],
-        )
+        return _hull(np.asarray(points, dtype=float).tobytes())
 
     @classmethod
     def box(cls, half: Array) -> Polytope:
@@ -111,3 +92,30 @@ class Polytope:
         low, high = (f(self.vertices @ X[:3, :3], axis=0) for f in (np.min, np.max))
         X[:3, 3] = X[:3, :3] @ (low + high) / 2
         return X, (high - low) / 2
+
+
+@lru_cache(maxsize=KEPT)
+def _hull(data: bytes) -> Polytope:
+    """The convex hull of points, given as the bytes of (N, 3)."""
+    points = np.frombuffer(data).reshape(-1, 3)
+    hull = convex_hull(points)
+    planes, face = np.unique(
+        (hull.equations / COPLANAR).round(), axis=0, return_index=False, return_inverse=True
+    )
+    face = face.reshape(-1)
+    first = np.unique(face, return_index=True)[1]
+    assert len(first) == len(planes)
+    # Across the edge opposite to each corner of a triangle lies a neighbour.
+    faces = np.sort(np.stack(np.broadcast_arrays(face[:, None], face[hull.neighbors])), axis=0)
+    ends = np.sort(hull.simplices[:, [[1, 2], [0, 2], [0, 1]]], axis=-1)
+    is_edge = faces[0] != faces[1]
+    ends, faces = ends[is_edge], faces[:, is_edge].T
+    once = np.sort(np.unique(ends @ (len(points), 1), return_index=True)[1])
+    place = np.full(len(points), -1)
+    place[hull.vertices] = np.arange(len(hull.vertices))
+    vertices, normals = points[hull.vertices], hull.equations[first, :3]
+    offsets = (vertices @ normals.T).max(axis=0)
+    polytope = Polytope(vertices, normals, offsets, faces[once], place[ends[once]])
+    for array in vars(polytope).values():
+        array.flags.writeable = False
+    return polytope

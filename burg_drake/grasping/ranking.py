@@ -59,8 +59,8 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
         grasps: with scores; of equal scores none is better.
         column: `friction_needed`, judged at several coefficients, where what collides is bad (a
             negative `clearance`, or so `screened` or `outcome`); outcomes, of which `lifted` is
-            good, and grasps without an outcome are left out; or truth values or 0 and 1, where
-            NaN is left out, too.
+            good, or `reachable` where there were no trials, and grasps without an outcome are left
+            out; or truth values or 0 and 1, where NaN is left out, too.
 
     Raises:
         UnknownNameError: there is no such column.
@@ -109,7 +109,9 @@ def _judge(
         return (name,), np.full(len(values), True), values[:, None]
     if values.dtype.kind == "U":
         if set(values.tolist()) <= {*Outcome, ""}:
-            return (Outcome.LIFTED.value,), values != "", (values == Outcome.LIFTED)[:, None]
+            tried = Outcome.REACHABLE not in values
+            best = Outcome.LIFTED if tried else Outcome.REACHABLE
+            return (best.value,), values != "", (values == best)[:, None]
     elif name == FRICTION_NEEDED:
         names = tuple(f"mu {mu:g}" for mu in FRICTIONS)
         return names, np.full(len(values), True), values[:, None] <= np.array(FRICTIONS)

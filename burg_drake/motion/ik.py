@@ -8,7 +8,7 @@ chapter 4); no plant is needed after that.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,10 +18,15 @@ from pydrake.multibody.tree import Frame, Joint, PrismaticJoint, RevoluteJoint
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
+from burg_drake.station.diagram import StationDiagram
 
 DAMPING = 1e-2
 """Damping of the normal equations over the squared error: short steps far from the goal, Newton's
 steps near it."""
+ENDLESS = 2.0 * np.pi
+"""Limits of joints without limits, such as `continuous` ones of a URDF [rad or m]."""
+HALF_TURN = np.pi + 0.5
+"""Farthest from home that a joint is moved on the way to a grasp [rad]; lines go a little on."""
 FLOOR = 1e-12
 """Smallest damping, for singular postures."""
 
@@ -75,9 +80,61 @@ class ArmKinematics:
             axis=np.array([X[:3, :3] @ a for X, a in zip(X_AF, axis_F, strict=True)]),
             p_AJ=np.array([X[:3, 3] for X in X_AF]),
             X_AH0=hand.CalcPose(context, base).GetAsMatrix4(),
-            lower=np.array([j.position_lower_limits()[0] for j in joints]),
-            upper=np.array([j.position_upper_limits()[0] for j in joints]),
+            lower=np.array([max(j.position_lower_limits()[0], -ENDLESS) for j in joints]),
+            upper=np.array([min(j.position_upper_limits()[0], ENDLESS) for j in joints]),
         )
+
+    @classmethod
+    def of(cls, station_diagram: StationDiagram) -> ArmKinematics:
+        """Reads the arm of a diagram built with `robot="arm"`, with the hand that it carries."""
+        plant, station = station_diagram.plant, station_diagram.station
+        arm, hand = (plant.GetModelInstanceByName(name) for name in ("arm", "hand"))
+        assert station.document.arm is not None
+        return cls.from_plant(
+            plant,
+            station_diagram.arm_joints,
+            base=plant.GetFrameByName(station.document.arm.base, arm),
+            hand=plant.GetFrameByName(station.hand.body, hand),
+        )
+
+    def unlimited(self) -> ArmKinematics:
+        """The same arm without joint limits."""
+        infinite = np.full(len(self.lower), np.inf)
+        return replace(self, lower=-infinite, upper=infinite)
+
+    def turn_around(self, posture: Array, margin: float) -> tuple[Array, Array]:
+        """Limits for planning.
+
+        Args:
+            posture: (n,) joint positions.
+            margin: distance to keep from the joint limits [rad or m].
+
+        Returns:
+            (n,) least and (n,) largest positions: the joint limits, but for joints that turn by a
+            whole turn or more, no farther from `posture` than somewhat more than half a turn, as
+            what is beyond is there a second time.
+        """
+        wide = (self.turns == 1.0) & (self.upper - self.lower >= 2.0 * np.pi - 1e-6)
+        half = np.where(wide, HALF_TURN, np.inf)
+        lower, upper = self.lower + margin, self.upper - margin
+        return np.maximum(lower, posture - half), np.minimum(upper, posture + half)
+
+    def turned_near(self, q: Array, posture: Array) -> Array:
+        """Turns revolute joints by whole turns.
+
+        Args:
+            q: (N, n) joint positions.
+            posture: (n,) joint positions within the limits.
+
+        Returns:
+            (N, n) the same hand poses with each joint within its limits where that is possible, and
+            as near to `posture` as it is then.
+        """
+        turn = 2.0 * np.pi
+        near = posture + (q - posture + np.pi) % turn - np.pi
+        near = np.where((near > self.upper) & (near - turn >= self.lower), near - turn, near)
+        near = np.where((near < self.lower) & (near + turn <= self.upper), near + turn, near)
+        return np.where(self.turns == 1.0, near, q)
 
     @cached_property
     def _generators(self) -> tuple[Array, Array, Array]:
@@ -143,18 +200,23 @@ def solve_ik(
         (N, n) joint positions, and (N,) whether they meet the goal.
     """
     lower, upper = arm.lower + margin, arm.upper - margin
-    q = np.clip(start, lower, upper)
-    error, J = _error(arm, X_AH, q)
-    for _ in range(iterations):
-        if (np.abs(error) < tolerance).all():
+    found = np.clip(start, lower, upper)
+    met = np.zeros(len(found), dtype=bool)
+    left = np.arange(len(found))  # whoever has arrived stays there, whatever the others do
+    q = found.copy()
+    for step in range(iterations + 1):
+        error, J = _error(arm, X_AH[left], q)
+        done = (np.abs(error) < tolerance).all(axis=-1)
+        found[left], met[left] = q, done
+        if done.any():
+            left, q, error, J = left[~done], q[~done], error[~done], J[~done]
+        if not len(left) or step == iterations:
             break
         damping = FLOOR + DAMPING * (error**2).sum(axis=-1)
         transposed = J.swapaxes(-1, -2)
         A = J @ transposed + damping[:, None, None] * np.eye(6)
-        step = transposed @ np.linalg.solve(A, error[..., None])
-        q = np.clip(q + step[..., 0], lower, upper)
-        error, J = _error(arm, X_AH, q)
-    return q, np.asarray((np.abs(error) < tolerance).all(axis=-1))
+        q = np.clip(q + (transposed @ np.linalg.solve(A, error[..., None]))[..., 0], lower, upper)
+    return found, met
 
 
 def _error(arm: ArmKinematics, X_AH: Array, q: Array) -> tuple[Array, Array]:

@@ -19,14 +19,14 @@ solution does not depend on what else is in the batch.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, check_pose, inverse, make_pose
+from burg_drake.core.frames import Array, check_pose, inverse
 from burg_drake.grasping.poses import Poses
 from burg_drake.motion.ik import ArmKinematics
 
@@ -99,6 +99,10 @@ class PandaIk:
         if np.abs(X_FH - X_FH[0]).max() > SAME:
             return None
         return cls(X_FH[0], arm.lower, arm.upper)
+
+    def within(self, margin: float) -> PandaIk:
+        """The same arm with joint limits that are closer by a margin [rad]."""
+        return replace(self, lower=self.lower + margin, upper=self.upper - margin)
 
     def solve(self, X_AH: ArrayLike, q7: ArrayLike) -> Postures:
         """All configurations within the limits.
@@ -281,11 +285,16 @@ LINKS = (
 
 def panda_forward(q: ArrayLike) -> Array:
     """Flange poses `X_AF` (N, 4, 4) of joint positions (N, 7) [rad], by the table of links."""
-    positions = np.asarray(q, dtype=float)
-    X = np.broadcast_to(np.eye(4), (len(positions), 4, 4))
-    for (a, d, alpha), angle in zip(LINKS, positions.T, strict=True):
-        c, s, ca, sa = np.cos(angle), np.sin(angle), np.cos(alpha), np.sin(alpha)
-        zero = np.zeros_like(c)
-        R = np.stack([c, -s, zero, s * ca, c * ca, zero - sa, s * sa, c * sa, zero + ca], axis=-1)
-        X = X @ make_pose(R.reshape(-1, 3, 3), (a, -sa * d, ca * d))
-    return np.asarray(X @ make_pose(p_AB=(0.0, 0.0, FLANGE)))
+    positions = np.asarray(q, dtype=float).T
+    cosines, sines = np.cos(positions), np.sin(positions)
+    x, y, z = np.repeat(np.eye(3)[:, :, None], positions.shape[1], axis=2)
+    p = np.zeros_like(x)
+    for (a, d, alpha), c, s in zip(LINKS, cosines, sines, strict=True):
+        y, z = np.cos(alpha) * y + np.sin(alpha) * z, np.cos(alpha) * z - np.sin(alpha) * y
+        p = p + a * x + d * z
+        x, y = c * x + s * y, c * y - s * x
+    X = np.zeros((positions.shape[1], 4, 4))
+    for k, column in enumerate((x, y, z, p + FLANGE * z)):
+        X[:, :3, k] = column.T
+    X[:, 3, 3] = 1.0
+    return X

@@ -1,161 +1,224 @@
-"""Whether the arm reaches a grasp: collision-free configurations at grasp and pregrasp.
+"""Whether the arm can execute a grasp, all the way: from home to the pregrasp, straight to the
+grasp, and straight up with the target in the hand.
 
-Both ways to put the fingers are tried, as they are the same grasp. A verdict depends on the grasp
-alone: not on its neighbours, their order, or a random stream.
+A yes carries the whole motion, and Drake's own collision checker has seen it; a no says what failed
+first and what was in the way. Both ways to put the fingers are tried, as they are the same grasp. A
+verdict depends on the grasp alone: not on its neighbours, their order, or a random stream.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, check_pose, inverse, pregrasp, swap_fingers
+from burg_drake.core.frames import Array, check_pose, inverse, swap_fingers
 from burg_drake.core.outcome import Outcome
-from burg_drake.motion.collision import ArmCollision, Overlap
+from burg_drake.grasping.body import TOUCHING
+from burg_drake.motion.attempt import Attempt, Task
+from burg_drake.motion.closed_form_lines import ClosedFormLines
+from burg_drake.motion.collision import ArmCollision
+from burg_drake.motion.edges import Edges
+from burg_drake.motion.focus import postures_over_objects
+from burg_drake.motion.hand_sweep import HandSweep
+from burg_drake.motion.home_check import require_free_home
+from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.postures import Posture, posture_search
+from burg_drake.motion.ik_routine import IkRoutine, RoutineSolutions
+from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_search import LineSearch
+from burg_drake.motion.numeric_lines import NumericLines
+from burg_drake.motion.panda_ik import PandaIk
+from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.scene.scene import Scene
+from burg_drake.motion.verdict import Reach as Reach
+from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station
+from burg_drake.station.station import Station, load_station
 
-EXPLAINED = 16
-"""Configurations, of either way to put the fingers, of which it is asked what is in the way: to
-measure that costs several times as much as to see that something is."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reach:
-    """What the arm can do with a grasp.
-
-    Attributes:
-        outcome: `NO_IK`, `ARM_COLLISION`, or None if the arm reaches grasp and pregrasp.
-        q_grasp, q_pregrasp: (n,) arm positions [rad]; None if not reached.
-        blocker: what was in the way of which link, such as `panda_link5 vs mug`, of the
-            configuration that came closest, among the `EXPLAINED` nearest to home; empty if
-            nothing was.
-    """
-
-    outcome: Outcome | None
-    q_grasp: Array | None = None
-    q_pregrasp: Array | None = None
-    blocker: str = ""
+BATCH = 128
+"""Grasps whose motions are looked for together: enough that more would hardly be cheaper each."""
+APPROACH, LIFT = Outcome.HAND_COLLISION_APPROACH, Outcome.HAND_COLLISION_LIFT
 
 
 class ArmReach:
-    """Judges grasps of one scene; objects stand where the document places them, the hand is open.
+    """Judges grasps of one scene; objects stand where the document places them.
 
     Attributes:
+        settings: how thoroughly it looks.
         kinematics: the arm on its own.
-        collision: the arm in the scene.
+        diagram: the station diagram of the checks.
+        collision: the arm in the scene, by Drake's checker.
+        proximity: bounds of the arm's clearance.
+        edges: collision checks of motions.
+        tree: paths from home.
     """
 
     def __init__(
-        self, scene: Scene, station: Station, *, settings: ReachSettings | None = None
+        self,
+        scene: Scene | str | Path,
+        station: Station | str | Path,
+        *,
+        settings: ReachSettings | None = None,
+        ik: IkRoutine | None = None,
     ) -> None:
-        """Builds the diagram that all checks share.
+        """Builds the diagrams that all checks share.
+
+        Args:
+            scene, station: what stands where: as loaded, or references for `load_scene` and
+                `load_station`.
+            settings: how thoroughly to look, if not as usual.
+            ik: inverse kinematics of one's own for an arm without a closed form here.
 
         Raises:
             InvalidInputError: the station has no arm, or in its home posture something collides.
         """
         self.settings = settings or ReachSettings()
+        scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        station = station if isinstance(station, Station) else load_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         arm = station.document.arm
         assert arm is not None  # build_station_diagram has seen to it
-        self.collision = ArmCollision(diagram)
-        self.kinematics = ArmKinematics.from_plant(
-            diagram.plant,
-            diagram.arm_joints,
-            base=diagram.plant.GetFrameByName(
-                arm.base, diagram.plant.GetModelInstanceByName("arm")
-            ),
-            hand=diagram.plant.GetFrameByName(
-                station.hand.body, diagram.plant.GetModelInstanceByName("hand")
-            ),
-        )
-        self._hand = station.hand
-        self._X_AW = inverse(arm.X_WA.matrix())
+        self.diagram = diagram
+        self.proximity = ArmProximity(diagram)
+        self.collision = ArmCollision(diagram, apart=self.proximity.apart)
+        require_free_home(diagram, self.collision)
+        self.kinematics = ArmKinematics.of(diagram)
+        self.edges = Edges(self.proximity, self.collision, exact=self.settings.exact)
         home = np.array(arm.home)
-        self._search = posture_search(self.kinematics, home, self.settings)
-        at_home = self.collision.overlaps(home)
-        if at_home:
-            pairs = ", ".join(dict.fromkeys(f"{o.link} with {o.other}" for o in at_home))
-            raise InvalidInputError(
-                f"{station.path}: arm.home collides in scene {scene.name!r}: {pairs}; change the"
-                " posture or move what is in the way"
-            )
+        lower, upper = self.kinematics.turn_around(home, self.settings.limit_margin)
+        focus = postures_over_objects(diagram, self.proximity.links, home, lower, upper)
+        self.tree = HomeTree(self.edges, home, lower, upper, focus=focus)
+        self._sweep = HandSweep(
+            scene, station, standoff=self.settings.standoff, lift=self.settings.lift_height
+        )
+        X_WA = arm.X_WA.matrix()
+        self._X_AW = inverse(X_WA)
+        lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3])
+        self._search = _line_search(self, lines, home, ik)
 
-    def check(self, X_WG: ArrayLike) -> Reach:
-        """Looks for arm configurations at grasp and pregrasp.
+    def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
+        """Judges one grasp: as in a batch.
 
         Args:
-            X_WG: (4, 4) grasp in the world.
+            instance: the target's name in the scene.
+            X_WG: (4, 4) grasp in the world, at which the open hand is clear.
+            width: distance between the pads that hold the target [m]; NaN if it is not known, and
+                the hand is lifted as wide as it is open then.
 
         Returns:
             The verdict; the same for a grasp and for the one with its fingers swapped.
+
+        Raises:
+            InvalidInputError: `X_WG` is not a pose.
+            UnknownNameError: the scene has no such instance.
         """
-        X_AG = _same_for_both(self._X_AW @ check_pose(X_WG, "X_WG"))
-        X_AH = self._hand.X_AH(X_AG)
-        X_AH_before = self._hand.X_AH(pregrasp(X_AG, self.settings.standoff))
-        attempt = _Attempt(self.collision)
-        for postures in self._search.rounds(X_AH, X_AH_before):
-            for posture in postures:
-                if attempt.is_free(posture):
-                    return Reach(None, posture.q, posture.q_before)
-            if attempt.is_hopeless:
-                break
-        return attempt.verdict()
+        X = check_pose(X_WG, "X_WG")
+        return self.check_all([instance], X[None], np.array([width]))[0]
 
+    def check_all(
+        self, instances: Sequence[str], X_WG: ArrayLike, width: ArrayLike | None = None
+    ) -> list[Reach]:
+        """Judges N grasps.
 
-def _same_for_both(X_AG: Array) -> Array:
-    """(2, 4, 4) the grasp and its twin with swapped fingers, in the same order for either."""
-    closing = X_AG[:3, 0]
-    twins = [X_AG, swap_fingers(X_AG)]
-    return np.array(twins if closing[np.abs(closing).argmax()] > 0.0 else twins[::-1])
+        Args:
+            instances: N names of the targets.
+            X_WG: (N, 4, 4) grasps in the world.
+            width: (N,) as for `check`; unknown if None.
 
+        Returns:
+            N verdicts, which do not depend on each other.
 
-class _Attempt:
-    """Collision checks of one grasp, and what they say when all have failed."""
-
-    def __init__(self, collision: ArmCollision) -> None:
-        self._collision = collision
-        self._blocked: set[int] = set()
-        self._explained = [0, 0]
-        self._least: Overlap | None = None
-
-    def is_free(self, posture: Posture) -> bool:
-        """Whether the arm collides neither at the grasp nor at the pregrasp.
-
-        A way to put the fingers is given up once the hand itself is found in collision, as no
-        other configuration can help.
+        Raises:
+            InvalidInputError: `X_WG` are not poses, or the numbers differ.
+            UnknownNameError: the scene has no such instance.
         """
-        if posture.way in self._blocked:
-            return False
-        both = (posture.q, posture.q_before)
-        if all(self._collision.is_free(q) for q in both):
-            return True
-        if self._explained[posture.way] == EXPLAINED:
-            return False
-        self._explained[posture.way] += 1
-        overlaps = [overlap for q in both for overlap in self._collision.overlaps(q)]
-        if any(overlap.carried for overlap in overlaps):
-            self._blocked.add(posture.way)
-            overlaps = [overlap for overlap in overlaps if overlap.carried]
-        worst = max(overlaps, key=lambda overlap: overlap.depth, default=None)
-        if worst is not None and (self._least is None or worst.depth < self._least.depth):
-            self._least = worst
-        return False
+        X = check_pose(X_WG, "X_WG")
+        widths = np.full(len(X), np.nan) if width is None else np.asarray(width, dtype=float)
+        if X.ndim != 3 or not len(X) == len(instances) == len(widths):
+            raise InvalidInputError(
+                f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)} widths;"
+                " give as many poses (N, 4, 4)"
+            )
+        X_both = _both(X, self._X_AW)
+        found, clearance = self._swept(np.array(instances, dtype=object), X_both, widths)
+        left = np.flatnonzero([verdict is None for verdict in found])
+        for k in range(0, len(left), BATCH):
+            part = left[k : k + BATCH]
+            lines = self._search.begin(self._X_AW @ X_both[part], clearance[part])
+            task = Task([instances[i] for i in part], X_both[part], widths[part], clearance[part])
+            verdicts = Attempt(task, lines, self.tree, self.settings).run()
+            for index, verdict in zip(part, verdicts, strict=True):
+                found[index] = verdict
+        return [verdict for verdict in found if verdict is not None]
 
-    @property
-    def is_hopeless(self) -> bool:
-        """Whether the hand is in collision either way."""
-        return len(self._blocked) == 2
+    def _swept(
+        self, names: NDArray[np.object_], X_both: Array, width: Array
+    ) -> tuple[list[Reach | None], Array]:
+        """What the hand's way decides.
 
-    def verdict(self) -> Reach:
-        """The outcome after the last configuration."""
-        if self._least is None:
-            return Reach(Outcome.NO_IK)
-        return Reach(Outcome.ARM_COLLISION, blocker=str(self._least))
+        Args:
+            names: (N,) of the targets.
+            X_both: (N, 2, 4, 4) grasps in the world with their fingers either way.
+            width: (N,) distances between the pads [m].
+
+        Returns:
+            N verdicts, None where the hand is free with its fingers either way; and (N, 2) its
+            clearance on the way, negative where it is not free [m].
+        """
+        found: list[Reach | None] = [None] * len(X_both)
+        clearance = np.full(X_both.shape[:2], np.inf)
+        ways = (0,) if self._sweep.symmetric else (0, 1)
+        for name in dict.fromkeys(names.tolist()):
+            every = np.flatnonzero(names == name)
+            said: dict[int, Reach] = {}
+            for way in ways:
+                for outcome in (APPROACH, LIFT):
+                    at = every[clearance[every, way] >= 0.0]
+                    if outcome is APPROACH:
+                        sweep = self._sweep.approach(name, X_both[at, way])
+                    else:
+                        sweep = self._sweep.lift(name, X_both[at, way], width[at])
+                    blocked = np.minimum(sweep.clearance, -TOUCHING)
+                    room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
+                    clearance[at, way] = np.minimum(clearance[at, way], room)
+                    for k in np.flatnonzero(~sweep.free):
+                        no = Reach(outcome, str(sweep.blocker[k]), float(sweep.clearance[k]))
+                        said.setdefault(int(at[k]), no)
+            if self._sweep.symmetric:
+                clearance[every, 1] = clearance[every, 0]
+            for k in every[(clearance[every] < 0.0).all(axis=1)]:
+                found[k] = said[int(k)]
+        return found, clearance
+
+
+def _both(X_WG: Array, X_AW: Array) -> Array:
+    """(N, 2, 4, 4) grasps in the world and their twins with swapped fingers, in the same order
+    whichever of the two was given."""
+    twins = np.stack([X_WG, swap_fingers(X_WG)], axis=1)
+    closing_A = (X_AW[:3, :3] @ X_WG[:, :3, :1])[..., 0]
+    largest = np.take_along_axis(closing_A, np.abs(closing_A).argmax(axis=1)[:, None], axis=1)
+    swapped = largest[:, 0] <= 0.0
+    twins[swapped] = twins[swapped][:, ::-1]
+    return twins
+
+
+def _line_search(
+    reach: ArmReach, lines: LinePoses, home: Array, routine: IkRoutine | None
+) -> LineSearch:
+    """By the closed form where the arm has one and it is wanted, else numerically."""
+    arm, settings = reach.kinematics, reach.settings
+    margin = settings.limit_margin
+    if routine is not None:
+        return NumericLines(
+            *(arm, lines, reach.proximity, home, settings),
+            solutions=RoutineSolutions(arm, routine, margin),
+            beyond=RoutineSolutions(arm, routine, margin, limited=False),
+        )
+    ik = PandaIk.of(arm) if settings.closed_form else None
+    if ik is None:
+        return NumericLines(arm, lines, reach.proximity, home, settings)
+    return ClosedFormLines(ik.within(margin), lines, reach.proximity, home, settings)

@@ -70,6 +70,9 @@ def test_outcomes() -> None:
     assert (ranking.criteria, ranking.grasps, ranking.good) == (("lifted",), 3, (1,))
     assert ranking.average_precision == (0.5,)
     assert ranking.top.kept.tolist() == [0, 1, 2]
+    feasible = with_column([4, 3, 2, 1], outcome=["no_ik", "reachable", "", "reachable"])
+    ranking = rank_by(feasible, "outcome")
+    assert (ranking.criteria, ranking.grasps, ranking.good) == (("reachable",), 3, (2,))
 
 
 @pytest.mark.parametrize(

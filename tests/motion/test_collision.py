@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import inverse
 from burg_drake.core.schema import Pose
 from burg_drake.motion.collision import ArmCollision
+from burg_drake.motion.proximity import ArmProximity
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Obstacle, Station, load_station
@@ -33,7 +35,17 @@ def collision(station: Station, *instances: Instance, **background: Obstacle) ->
     document = SceneDocument(name="few", library="household", instances=instances)
     scene = Scene(document, library, Path("few.yaml"))
     changed = replace(station, document=replace(station.document, background=background))
-    return ArmCollision(build_station_diagram(scene, changed))
+    return ArmCollision(build_station_diagram(scene, changed, weld_objects=True))
+
+
+def scene_pose(
+    station: Station,
+    p_WO: tuple[float, float, float],
+    rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Pose:
+    """`X_SO` of what is to stand at a pose in the world."""
+    X_WO = Pose(p_WO, rpy_deg).matrix()
+    return Pose.from_matrix(inverse(station.document.X_WS.matrix()) @ X_WO, quaternion=True)
 
 
 def test_home_is_free(station: Station) -> None:
@@ -41,6 +53,26 @@ def test_home_is_free(station: Station) -> None:
     assert checked.overlaps(HOME) == []
     assert checked.is_free(HOME)
     assert [joint.name() for joint in checked.joints] == [f"panda_joint{i}" for i in range(1, 8)]
+
+
+def test_bodies_left_out_do_not_meet_within_the_joints_limits() -> None:
+    """Drake's plain checker says the same of every configuration, folded ones above all."""
+    station, scene = load_station("panda_tabletop"), load_scene("tabletop_six")
+    diagram = build_station_diagram(scene, station, weld_objects=True)
+    apart = ArmProximity(diagram).apart
+    checked = ArmCollision(diagram, apart=apart)
+    links = {tuple(sorted(diagram.body_names[body] for body in pair)) for pair in apart}
+    assert ("panda_link2", "panda_link4") in links and ("panda_link0", "panda_link4") not in links
+    joints = checked.joints
+    lower = np.array([joint.position_lower_limits()[0] for joint in joints])
+    upper = np.array([joint.position_upper_limits()[0] for joint in joints])
+    rng = np.random.default_rng(8)
+    q = rng.uniform(lower, upper, (600, len(joints)))
+    q[::2] = np.where(rng.uniform(size=q[::2].shape) < 0.5, lower, upper)
+    verdicts = [checked.is_free(row) for row in q]
+    plain = checked.checker
+    assert verdicts == [plain.CheckConfigCollisionFree(checked.configuration(row)) for row in q]
+    assert 50 < sum(verdicts) < 550
 
 
 @pytest.mark.parametrize(("gap", "touching"), [(1e-3, False), (-1e-3, True)])
@@ -99,6 +131,104 @@ def test_both_ways_to_ask_agree(station: Station) -> None:
     answers = [(checked.is_free(q), not checked.overlaps(q)) for q in postures]
     assert all(a == b for a, b in answers)
     assert 40 < sum(a for a, _ in answers) < 390
+
+
+def test_what_is_carried_counts_against_the_links_alone(station: Station) -> None:
+    """A can that reaches into the palm; then lifted into the wrist."""
+    x, y, z = HAND
+    can = Instance(name="can", object="can", X_SO=scene_pose(station, (x, y, z - 0.12)))
+    checked = collision(station, can)
+    assert [str(o) for o in checked.overlaps(HOME)] == ["panda_hand vs can"]
+    assert checked.overlaps(HOME, carried="can") == [] and checked.is_free(HOME, carried="can")
+    overlaps = checked.overlaps(HOME, carried="can", rise=0.15)
+    assert overlaps and not checked.is_free(HOME, carried="can", rise=0.15)
+    assert {(o.link, o.other) for o in overlaps} == {("panda_link7", "can"), ("panda_link6", "can")}
+    assert not checked.is_free(HOME)
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.07, 0.3])
+def test_risen_is_as_if_placed_higher(station: Station, rise: float) -> None:
+    """Two tilted boxes; one is carried, against a diagram in which free ones stand higher."""
+    tilt = (20.0, -30.0, 50.0)
+    low, high = (scene_pose(station, (0.35, 0.1, 0.45 - z), tilt) for z in (rise, 0.0))
+    other = Instance(name="other", object="box", X_SO=scene_pose(station, (0.4, -0.2, 0.4), tilt))
+    checked = collision(station, Instance(name="box", object="box", X_SO=low), other)
+    scene = Scene(
+        SceneDocument(
+            name="higher",
+            library="household",
+            instances=(Instance(name="box", object="box", X_SO=high), other),
+        ),
+        load_scene("tabletop_six").library,
+        Path("higher.yaml"),
+    )
+    oracle = ArmCollision(build_station_diagram(scene, station))
+    hand = ("panda_hand", "panda_leftfinger", "panda_rightfinger")
+    rng, seen = np.random.default_rng(3), set[tuple[bool, bool]]()
+    for q in HOME + rng.uniform(-0.8, 0.8, (150, 7)):
+        every = {(o.link, o.other) for o in oracle.overlaps(q)}
+        counted = {(link, other) for link, other in every if other != "box" or link not in hand}
+        overlaps = checked.overlaps(q, carried="box", rise=rise)
+        assert {(o.link, o.other) for o in overlaps} == counted
+        assert checked.is_free(q, carried="box", rise=rise) is (not counted)
+        seen.add((bool(every), bool(counted)))
+    assert seen == {(False, False), (True, False), (True, True)}
+
+
+@pytest.mark.parametrize("carried", [None, "mug"])
+def test_clones_answer_as_drakes_own_checker_does(station: Station, carried: str | None) -> None:
+    """Also where an object stands in the arm's base, and a post, which cannot be seen, does."""
+    in_base = Instance(name="base", object="can", X_SO=scene_pose(station, (0.0, 0.0, 0.05)))
+    post = Obstacle(X_WB=Pose((-0.1, 0.0, 0.03)), size=(0.04, 0.04, 0.06))
+    mug = Instance(name="mug", object="mug", X_SO=scene_pose(station, (0.4, 0.0, 0.4)))
+    rng = np.random.default_rng(9)
+    for instances in ((mug,), (mug, in_base)):
+        checked = collision(station, *instances, post=post)
+        plain = checked.checker.Clone()
+        if carried:
+            filtered = plain.GetFilteredCollisionMatrix().copy()
+            plant = plain.plant()
+            (held,) = plant.GetBodyIndices(plant.GetModelInstanceByName(carried))
+            for body in plant.GetBodyIndices(plant.GetModelInstanceByName("hand")):
+                filtered[int(held), int(body)] = filtered[int(body), int(held)] = 1
+            plain.SetCollisionFilterMatrix(filtered)
+        rise = 0.1 if carried else 0.0
+        free = []
+        for q in HOME + rng.uniform(-0.9, 0.9, (200, 7)):
+            configuration = checked.configuration(q, carried, rise)
+            free.append(plain.CheckConfigCollisionFree(configuration))
+            assert checked.is_free(q, carried=carried, rise=rise) is free[-1]
+        assert (20 < sum(free) < 180) if instances == (mug,) else not any(free)
+
+
+def test_what_is_carried_does_not_count_against_the_scene(station: Station) -> None:
+    """A can that is sunk into the table, and into a mug and a roof once it is lifted."""
+    can = Instance(name="can", object="can", X_SO=scene_pose(station, (0.4, 0.2, -0.02)))
+    mug = Instance(name="mug", object="mug", X_SO=scene_pose(station, (0.42, 0.2, 0.0)))
+    roof = Obstacle(X_WB=Pose((0.4, 0.2, 0.3)), size=(0.1, 0.1, 0.02))
+    checked = collision(station, can, mug, roof=roof)
+    for rise in (0.0, 0.2, 0.3):
+        assert checked.is_free(HOME, carried="can", rise=rise)
+        assert checked.overlaps(HOME, carried="can", rise=rise) == []
+
+
+def test_nothing_remains_of_what_was_carried(station: Station) -> None:
+    x, y, z = HAND
+    can = Instance(name="can", object="can", X_SO=scene_pose(station, (x, y, z - 0.1)))
+    checked, fresh = collision(station, can), collision(station, can)
+    for q in HOME + np.random.default_rng(5).uniform(-0.5, 0.5, (20, 7)):
+        checked.is_free(q, carried="can", rise=0.2)
+        assert checked.is_free(q) is fresh.is_free(q)
+        assert checked.overlaps(q) == fresh.overlaps(q)
+
+
+def test_what_cannot_be_carried(station: Station) -> None:
+    can = Instance(name="can", object="can", X_SO=Pose((0.3, 0.2, 0.0)))
+    checked = collision(station, can)
+    with pytest.raises(UnknownNameError, match=r"no instance 'cam' that can be carried.*'can'"):
+        checked.is_free(HOME, carried="cam")
+    with pytest.raises(InvalidInputError, match=r"rise is 0\.1 m, but nothing is carried"):
+        checked.overlaps(HOME, rise=0.1)
 
 
 def test_an_arm_is_needed(station: Station) -> None:

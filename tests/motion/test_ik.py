@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +23,9 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.resources import resolve
 from burg_drake.motion.ik import ArmKinematics, rotation_vector, solve_ik
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
 DH = [
@@ -148,3 +153,38 @@ def test_rotation_vector(angle: float) -> None:
 def test_half_a_turn_is_not_taken_for_none() -> None:
     R = np.diag([-1.0, -1.0, 1.0])[None]
     assert np.linalg.norm(rotation_vector(R)) == pytest.approx(pi)
+
+
+def test_joints_without_limits_turn_once_either_way(tmp_path: Path) -> None:
+    """A `continuous` joint of a URDF."""
+    urdf = resolve("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
+    endless = urdf.replace('"wrist_3_joint" type="revolute"', '"wrist_3_joint" type="continuous"')
+    endless = re.sub(r'(continuous".*?)lower="\S+" upper="\S+" ', r"\1", endless, flags=re.DOTALL)
+    (tmp_path / "arm.urdf").write_text(endless, encoding="utf-8")
+    text = load_station("ur5e_tabletop").path.read_text("utf-8")
+    text = text.replace("package://burg_drake/models/ur5e/ur5e.urdf", "arm.urdf")
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    station = load_station(tmp_path / "mine.yaml")
+    arm = ArmKinematics.of(build_station_diagram(load_scene("tabletop_six"), station))
+    assert arm.upper[5] == -arm.lower[5] == 2 * np.pi
+    home = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    lower, upper = arm.turn_around(home, 0.01)
+    assert upper[5] - 1.0 == 1.0 - lower[5] == pytest.approx(np.pi + 0.5)
+    assert upper[2] == -lower[2] == pytest.approx(np.pi - 0.01)
+
+
+def test_whole_turns_towards_a_posture() -> None:
+    limits = np.array([2 * np.pi, 2.9, 0.5])
+    arm = ArmKinematics(
+        turns=np.array([1.0, 1.0, 0.0]),
+        axis=np.eye(3),
+        p_AJ=np.zeros((3, 3)),
+        X_AH0=np.eye(4),
+        lower=-limits,
+        upper=limits,
+    )
+    q = np.array([[3.0, 2.0, 0.4], [-3.0, -2.0, 0.3], [5.0, 2.8, 0.2], [-6.0, 2.0 - 2 * np.pi, 0]])
+    expected = [[3.0, 2.0, 0.4], [2 * np.pi - 3.0, -2.0, 0.3], [5.0, 2.8, 0.2]]
+    expected.append([2 * np.pi - 6.0, 2.0, 0.0])
+    near = arm.turned_near(q, np.array([2.0, -0.5, 0.0]))
+    np.testing.assert_allclose(near, expected, atol=1e-12)

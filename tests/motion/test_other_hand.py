@@ -60,7 +60,7 @@ def test_reach_brings_the_grasp_frame_of_that_hand_to_the_grasp(
 ) -> None:
     wanted = grasp_from_axes((0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.45, 0.0, 0.25))
     for name in (OWN, OTHER):
-        reach = ArmReach(scene, load_station(name)).check(wanted)
+        reach = ArmReach(scene, load_station(name)).check("", wanted)
         assert reach.outcome is None, name
         found = X_WG(arms[name], reach.q_grasp)
         closing = found[:3, 0] @ wanted[:3, 0]

@@ -1,0 +1,227 @@
+"""The search for motions of a batch of grasps: chains are proposed, held against the scene, and
+joined to home; what Drake refuses tells why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.core.frames import Array
+from burg_drake.core.outcome import Outcome
+from burg_drake.motion.collision import ArmCollision, Overlap
+from burg_drake.motion.edges import Edges
+from burg_drake.motion.home_tree import HomeTree
+from burg_drake.motion.line_search import Chain, Failure, Lines
+from burg_drake.motion.reach_settings import ReachSettings
+from burg_drake.motion.verdict import Reach
+from burg_drake.motion.witness import Witness
+
+PROGRESS = (Outcome.ARM_COLLISION, Outcome.APPROACH_LINE, Outcome.LIFT_LINE)
+"""Outcomes by how far a motion got."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Grasps whose hand is free on its way.
+
+    Attributes:
+        instance: N names of the targets; "" without one.
+        X_WG: (N, 2, 4, 4) grasps in the world with their fingers either way.
+        width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
+        clearance: (N, 2) of the hand on its way [m]; negative where it is not free.
+    """
+
+    instance: Sequence[str]
+    X_WG: Array
+    width: Array
+    clearance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """A row of a chain that Drake has refused.
+
+    Attributes:
+        outcome: one of `PROGRESS`: what is said if the search ends here.
+        overlap: the deepest one there; None if what collides lies just before the row.
+    """
+
+    outcome: Outcome
+    overlap: Overlap | None
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """How near to a motion it was: how far it got, and how little was in the way."""
+        depth = np.inf if self.overlap is None else self.overlap.depth
+        return PROGRESS.index(self.outcome), -depth
+
+
+class Attempt:
+    """Looks for motions.
+
+    Args:
+        task: the grasps.
+        lines: the search for chains of these grasps.
+        tree: paths from home.
+        settings: when to give a grasp up.
+    """
+
+    def __init__(self, task: Task, lines: Lines, tree: HomeTree, settings: ReachSettings) -> None:
+        self._task, self._lines, self._tree, self._settings = task, lines, tree, settings
+        self._edges: Edges = tree.edges
+        self._collision: ArmCollision = tree.edges.collision
+        self._refused = np.zeros(len(task.instance), dtype=int)
+        self._unconnected = np.zeros(len(task.instance), dtype=int)
+        self._nearest: dict[int, Refusal] = {}
+        for grasp, way in np.argwhere(task.clearance < 0.0):
+            lines.close(int(grasp), int(way))
+
+    def run(self) -> list[Reach]:
+        """The verdicts."""
+        found: dict[int, Reach] = {}
+        left = list(range(len(self._task.instance)))
+        while left:
+            proposed = dict(zip(left, self._lines.propose(left), strict=True))
+            chains = {grasp: chain for grasp, chain in proposed.items() if chain is not None}
+            found |= self._reached(self._unblocked(chains))
+            for grasp in left:
+                if grasp not in found and (grasp not in chains or self._is_hopeless(grasp)):
+                    found[grasp] = self._no(grasp)
+            left = [grasp for grasp in left if grasp not in found]
+        return [found[grasp] for grasp in range(len(self._task.instance))]
+
+    def _is_hopeless(self, grasp: int) -> bool:
+        """Whether so much has been tried that no more is."""
+        refused = self._refused[grasp] >= self._settings.chains
+        return bool(refused or self._unconnected[grasp] >= self._settings.starts_tried)
+
+    def _unblocked(self, chains: dict[int, Chain]) -> dict[int, Chain]:
+        """The chains that are free; the others are refused."""
+        blocked = {grasp: self._doubtful_blocked(grasp, chain) for grasp, chain in chains.items()}
+        for lift in (False, True):
+            left = {grasp: chains[grasp] for grasp in chains if blocked[grasp] is None}
+            blocked |= self._first_blocked(left, lift=lift)
+        for grasp, row in blocked.items():
+            if row is not None:
+                self._refuse(grasp, chains[grasp], row)
+        return {grasp: chain for grasp, chain in chains.items() if blocked[grasp] is None}
+
+    def _doubtful_blocked(self, grasp: int, chain: Chain) -> int | None:
+        """Row at which the arm collides, among those whose clearance is not known to be positive:
+        what fails, fails soonest there."""
+        if not self._settings.exact:
+            return None
+        doubtful = np.flatnonzero(chain.lower <= 0.0)
+        for row in doubtful[np.argsort(chain.lower[doubtful], kind="stable")]:
+            carried, rise, width = self._load(grasp, chain, row)
+            free = self._collision.is_free(chain.q[row], carried=carried, rise=rise, width=width)
+            if not free:
+                return int(row)
+        return None
+
+    def _load(self, grasp: int, chain: Chain, row: int) -> tuple[str | None, float, float]:
+        """What the hand carries at a row, how far that has risen [m], and its width [m]."""
+        rise = float(chain.rise[row])
+        name = self._task.instance[grasp] if rise > 0.0 else ""
+        width = float(self._task.width[grasp]) if rise > 0.0 else np.nan
+        return (name, rise, width) if name else (None, 0.0, width)
+
+    def _first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
+        """Rows at, or just before, which the arm collides on the approach, or on the lift."""
+        rows = {
+            grasp: slice(chain.at_grasp, len(chain.q)) if lift else slice(0, chain.at_grasp + 1)
+            for grasp, chain in chains.items()
+        }
+        found = self._edges.first_blocked_each(
+            [chain.q[rows[grasp]] for grasp, chain in chains.items()],
+            hand=False,
+            carried=[(self._task.instance[grasp] or None) if lift else None for grasp in chains],
+            rise=[chain.rise[rows[grasp]] for grasp, chain in chains.items()],
+            width=[float(self._task.width[grasp]) if lift else np.nan for grasp in chains],
+            lower=[chain.lower[rows[grasp]] for grasp, chain in chains.items()],
+        )
+        return {
+            grasp: None if row is None else rows[grasp].start + row
+            for grasp, row in zip(chains, found, strict=True)
+        }
+
+    def _refuse(self, grasp: int, chain: Chain, row: int) -> None:
+        """Puts a chain out; where what collides is rigid with the hand, no other posture helps,
+        and all of this way to put the fingers goes with it."""
+        self._refused[grasp] += 1
+        carried, rise, width = self._load(grasp, chain, row)
+        overlaps = self._collision.overlaps(chain.q[row], carried=carried, rise=rise, width=width)
+        with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
+        if with_hand is not None:
+            self._lines.close(grasp, chain.way)
+        else:
+            self._lines.refuse(grasp, chain, row)
+        if row in (0, chain.at_grasp) or with_hand is not None:
+            outcome = Outcome.ARM_COLLISION
+        else:
+            outcome = PROGRESS[1 + (row > chain.at_grasp)]
+        refusal = Refusal(outcome, with_hand or next(iter(overlaps), None))
+        if grasp not in self._nearest or refusal.rank > self._nearest[grasp].rank:
+            self._nearest[grasp] = refusal
+
+    def _reached(self, chains: dict[int, Chain]) -> dict[int, Reach]:
+        """A yes for each of the free chains that a path leads to; the others are refused."""
+        if not chains:
+            return {}
+        ways = self._tree.connect_each(np.array([c.q[0] for c in chains.values()]))
+        found = {}
+        for (grasp, chain), transfer in zip(chains.items(), ways, strict=True):
+            if transfer is None:
+                self._lines.refuse(grasp, chain, None)
+                self._unconnected[grasp] += 1
+                continue
+            at, hand = chain.at_grasp, float(self._task.clearance[grasp, chain.way])
+            witness = Witness(
+                X_WG=self._task.X_WG[grasp, chain.way],
+                transfer=transfer,
+                approach=chain.q[: at + 1],
+                lift=chain.q[at:],
+                clearance=hand,
+            )
+            clearance = max(0.0, min(hand, float(chain.lower.min())))
+            found[grasp] = Reach(None, clearance=clearance, witness=witness)
+        return found
+
+    def _no(self, grasp: int) -> Reach:
+        """Why there is no motion: what kept the best attempt from being one."""
+        if self._unconnected[grasp]:
+            return Reach(Outcome.NO_PATH)
+        failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
+        if refusal is not None and refusal.rank[0] >= _progress(failure.outcome):
+            return _because(refusal.outcome, refusal.overlap)
+        least = self._least(self._task.instance[grasp], float(self._task.width[grasp]), failure)
+        if least is None:
+            return Reach(failure.outcome, excess=failure.excess)
+        return _because(failure.outcome, least)
+
+    def _least(self, instance: str, width: float, failure: Failure) -> Overlap | None:
+        """What is in the way, of the configuration where that is least."""
+        least: Overlap | None = None
+        for q, rise in zip(failure.q, failure.rise, strict=True):
+            carried = instance if rise > 0.0 else ""
+            overlaps = self._collision.overlaps(
+                q,
+                carried=carried or None,
+                rise=float(rise) if carried else 0.0,
+                width=width if rise > 0.0 else np.nan,
+            )
+            if overlaps and (least is None or overlaps[0].depth < least.depth):
+                least = overlaps[0]
+        return least
+
+
+def _progress(outcome: Outcome) -> int:
+    return PROGRESS.index(outcome) if outcome in PROGRESS else -1
+
+
+def _because(outcome: Outcome, overlap: Overlap | None) -> Reach:
+    if overlap is None:
+        return Reach(outcome)
+    return Reach(outcome, str(overlap), -overlap.depth)

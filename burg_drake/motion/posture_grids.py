@@ -1,0 +1,90 @@
+"""Postures of a Panda along the straight parts of grasps' motions: where they are looked for, and
+how near they are to collisions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from burg_drake.core.frames import Array
+from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.panda_ik import PandaIk
+from burg_drake.motion.posture_grid import Booleans, Indices, PostureGrid
+from burg_drake.motion.proximity import LIKELY, ArmProximity, ClearanceBounds
+from burg_drake.motion.reach_settings import ReachSettings
+
+LAYER = 0.05
+"""Distance between two poses at which the redundant joint is swept [m]."""
+CHANGE = 0.38
+"""Most that the redundant joint may change from layer to layer [rad] ..."""
+OFFSETS = 4
+"""... and by how many of its values."""
+START = 0.3
+"""Cost of a start for each radian of the joint that is farthest from home."""
+
+
+class PostureGrids:
+    """Opens grids of postures.
+
+    Args:
+        ik: the inverse kinematics, within the limits that are to be kept.
+        lines: where the hand goes.
+        proximity: bounds of the arm's clearance.
+        home: (7,) home posture; chains that start near it are preferred [rad].
+        settings: how thoroughly to look.
+    """
+
+    def __init__(
+        self,
+        ik: PandaIk,
+        lines: LinePoses,
+        proximity: ArmProximity,
+        home: Array,
+        settings: ReachSettings,
+    ) -> None:
+        self.ik, self.lines, self.proximity = ik, lines, proximity
+        self.home, self.settings = home, settings
+        approach = layers(settings.standoff)
+        lift = layers(settings.lift_height)
+        self.layers = np.concatenate([-approach[:0:-1], lift])
+        self.at_grasp = len(approach) - 1
+
+    def parameters(self, count: int) -> Array:
+        """(count,) values of the redundant joint within its limits [rad]."""
+        low, high = self.ik.lower[-1], self.ik.upper[-1]
+        return np.asarray(low + (np.arange(count) + 0.5) / count * (high - low))
+
+    def grid(self, X_AG: Array, count: int) -> PostureGrid:
+        """Room for the postures of grasps (n, 2, 4, 4)."""
+        X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
+        values = self.parameters(count)
+        offsets = min(OFFSETS, int(CHANGE / (values[1] - values[0]))) if count > 1 else 0
+        return PostureGrid(
+            self.ik, X_AH, values, travel=self.settings.joint_travel, offsets=offsets
+        )
+
+    def measure(self, grid: PostureGrid, poses: Indices, grasps: Indices, wanted: Booleans) -> None:
+        """Measures the wanted postures at some poses of some grasps that have not been measured."""
+        if not len(grasps):
+            return
+        where = np.ix_(poses, grasps)
+        new = wanted[where] & np.isinf(grid.lower[where])
+        if not new.any():
+            return
+        q = np.stack([joint[where][new] for joint in grid.q], axis=-1)
+        bounds = self.proximity.bounds(q, hand=False)
+        lower, upper = grid.lower[where], grid.upper[where]
+        lower[new], upper[new] = bounds.lower, counted(bounds, self.settings.exact)
+        grid.lower[where], grid.upper[where] = lower, upper
+
+
+def layers(length: float) -> Array:
+    """Distances from the grasp, from 0 to `length` [m]; 0 alone if that is 0."""
+    return np.linspace(0.0, length, int(np.ceil(length / LAYER - 1e-9)) + 1)
+
+
+def counted(bounds: ClearanceBounds, exact: bool) -> Array:
+    """What has to be positive for a posture to count (K,): the upper bound where Drake has the last
+    word; otherwise infinite where it is the best guess, too."""
+    if exact:
+        return bounds.upper
+    return np.where(bounds.likely_free, np.inf, np.minimum(bounds.upper, LIKELY))

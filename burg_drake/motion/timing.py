@@ -1,0 +1,143 @@
+"""Time for the motions of a grasp: as fast as the joints may be, and the hand along its lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array
+from burg_drake.motion.corners import IsFree, time_polyline
+from burg_drake.motion.ik import ArmKinematics
+from burg_drake.motion.limits import ArmLimits
+from burg_drake.motion.straight import HandSpeed, time_line
+from burg_drake.motion.timing_settings import TimingSettings
+from burg_drake.motion.trajectory import Motion, Plan, Trajectory
+from burg_drake.motion.witness import Witness
+
+ROUNDING = 1e-6
+"""By how much samples and their differences may exceed a limit, relative to it."""
+MORE = 1.0005
+"""What exceeds a limit is slowed down by this more than its samples say, as they miss the peaks."""
+SLOWED = 20
+"""How often that is done at most."""
+STRAIGHT = 2e-5
+"""Distance of the hand from its line that is always allowed: a witness's is no straighter [m]."""
+NARROW = 2e-4
+"""Clearance of a hand on its lines where nobody has measured it [m]."""
+
+
+@dataclass(frozen=True)
+class PathChecks:
+    """Checks of what leaves the paths of a witness, each of rows (R, n) that the arm moves through
+    straight from row to row.
+
+    Attributes:
+        transfer: with the hand open and empty.
+        approach: the same, near the target.
+        lift: with the target in the hand.
+    """
+
+    transfer: IsFree | None = None
+    approach: IsFree | None = None
+    lift: IsFree | None = None
+
+
+def time_motion(
+    witness: Witness,
+    limits: ArmLimits,
+    kinematics: ArmKinematics,
+    *,
+    settings: TimingSettings | None = None,
+    checks: PathChecks | None = None,
+) -> Plan:
+    """Gives the three motions of a witness their time; each begins and ends at rest.
+
+    Args:
+        witness: the paths.
+        limits: of the joints; none is exceeded.
+        kinematics: the arm, to measure the way of the hand.
+        settings: how fast, how close to the paths.
+        checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
+            at each corner; without one for a line, it keeps to a spline through the waypoints.
+
+    Returns:
+        The plan, sampled at `settings.rate`.
+
+    Raises:
+        InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
+            keep the others.
+    """
+    settings, checks = settings or TimingSettings(), checks or PathChecks()
+    near = NARROW if np.isnan(witness.clearance) else max(0.0, witness.clearance)
+    lines = replace(settings, straightness=max(STRAIGHT, min(settings.straightness, near / 2.0)))
+    gentle = limits.gentle(settings.velocity_share, settings.ramp)
+    transfer = time_polyline(
+        _within(witness.transfer, limits, "transfer"),
+        gentle,
+        deviation=settings.corner_deviation,
+        is_free=checks.transfer,
+    )
+    slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
+    approach = time_line(
+        _within(witness.approach, limits, "approach"),
+        kinematics,
+        gentle,
+        slow,
+        lines,
+        is_free=checks.approach,
+    )
+    lift = time_line(
+        _within(witness.lift, limits, "lift"),
+        kinematics,
+        gentle,
+        _lifting(_way(witness.lift, kinematics), settings),
+        lines,
+        is_free=checks.lift,
+    )
+    return Plan(
+        _sampled(transfer, witness.transfer, limits, settings),
+        _sampled(approach, witness.approach, limits, settings),
+        _sampled(lift, witness.lift, limits, settings),
+    )
+
+
+def _within(q: Array, limits: ArmLimits, name: str) -> Array:
+    outside = ~((q >= limits.lower) & (q <= limits.upper))  # NaN, too
+    if outside.any():
+        row, joint = np.argwhere(outside)[0]
+        raise InvalidInputError(
+            f"{name} of a witness: waypoint {row} has joint {joint + 1} at {q[row, joint]:.4f} rad,"
+            f" outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
+        )
+    return q
+
+
+def _lifting(height: float, settings: TimingSettings) -> HandSpeed:
+    """Half of the time full acceleration, half of it full braking."""
+    time = settings.lift_time
+    return HandSpeed(2.0 * height / time, 4.0 * height / time**2, settings.ramp)
+
+
+def _way(rows: Array, kinematics: ArmKinematics) -> float:
+    """Distance between the ends of a line [m]."""
+    p = kinematics.forward(rows[[0, -1]])[0][:, :3, 3]
+    return float(np.linalg.norm(p[1] - p[0]))
+
+
+def _sampled(
+    motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
+) -> Trajectory:
+    """Samples that keep the limits, by their differences, too."""
+    motion, kept = motion.stretched(1.0 / settings.speed), limits.slowed(settings.speed)
+    for _ in range(SLOWED):
+        trajectory = Trajectory.of(motion, path[0], path[-1], settings.rate)
+        factor = kept.stretch(trajectory.peaks())
+        if factor <= 1.0 + ROUNDING:
+            return trajectory
+        motion = motion.stretched(MORE * factor)
+    raise InvalidInputError(
+        f"a motion still exceeds the arm's limits after it was slowed down {SLOWED} times, to"
+        f" {motion.duration:g} s"
+    )

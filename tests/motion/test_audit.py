@@ -1,0 +1,102 @@
+"""Motions of real grasps, with the target in the hand, in a diagram of a simulation: Drake's own
+filters, no collision checker, nothing of the reach check."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from burg_drake.core.content import rng_from
+from burg_drake.core.schema import Pose
+from burg_drake.grasping.antipodal import sample_antipodal
+from burg_drake.motion.reach import ArmReach
+from burg_drake.motion.witness import Witness
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.station import Obstacle, Station, load_station
+
+SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "reach_audit.py"
+STEP = 0.02
+"""Of the audit here; the benchmark has 5 mm [m]."""
+
+Motion = tuple[str, Witness, float]
+"""Target, motion, width."""
+
+
+@pytest.fixture(scope="module")
+def reach_audit() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("reach_audit", SOURCE)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("tabletop_six")
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station("panda_bin")
+
+
+@pytest.fixture(scope="module")
+def motions(scene: Scene, station: Station) -> list[Motion]:
+    """Two of each of some objects, among them a mug and a bowl that fingers reach into."""
+    reach = ArmReach(scene, station)
+    found = []
+    for name in ("mug", "bottle", "box", "bowl"):
+        mesh = scene.library.surface(scene.instance(name).object)
+        sampled = sample_antipodal(mesh, 300, rng_from("audit", name), friction=0.5)
+        X_WG = reach.diagram.X_WO(name) @ sampled.X_OG
+        above = np.flatnonzero(X_WG[:, 2, 2] < -0.5)[:24]
+        verdicts = reach.check_all([name] * len(above), X_WG[above], sampled.width[above])
+        pairs = zip(verdicts, sampled.width[above].tolist(), strict=True)
+        found += [(name, v.witness, width) for v, width in pairs if v.witness is not None][:2]
+    return found
+
+
+def test_motions_are_free(
+    reach_audit: ModuleType, scene: Scene, station: Station, motions: list[Motion]
+) -> None:
+    assert len({name for name, _, _ in motions}) >= 3 and len(motions) >= 6
+    audit = reach_audit.Audit(scene, station)
+    for name, witness, width in motions:
+        assert not audit.faults(name, witness, width, step=STEP), name
+
+
+def test_what_is_put_in_the_way_is_found(
+    reach_audit: ModuleType, scene: Scene, station: Station, motions: list[Motion]
+) -> None:
+    """By the hand on its way down, and by the target on its way up: a plate over each target that
+    hand and target go through."""
+    name, witness, width = motions[0]
+    x, y, _ = witness.X_WG[:3, 3]
+    plate = Obstacle(X_WB=Pose((float(x), float(y), 0.3)), size=(0.2, 0.2, 0.01))
+    background = {**station.document.background, "plate": plate}
+    other = replace(station, document=replace(station.document, background=background))
+    faults = reach_audit.Audit(scene, other).faults(name, witness, width, step=STEP)
+    met = {(fault.part, *fault.bodies) for fault in faults}
+    assert ("approach", "panda_hand", "plate") in met
+    assert ("lift", name, "plate") in met
+
+
+def test_a_target_pushed_down_is_found(
+    reach_audit: ModuleType, scene: Scene, station: Station, motions: list[Motion]
+) -> None:
+    """The lift runs backwards: the target is taken 30 cm down instead of up."""
+    name, witness, width = motions[0]
+    down = replace(witness, lift=witness.lift[::-1])
+    faults = reach_audit.Audit(scene, station).faults(name, down, width, step=STEP)
+    assert {fault.part for fault in faults} == {"lift"}
+    met = {fault.bodies for fault in faults}
+    assert (name, "table") in met
+    assert not any(name in bodies and "panda_hand" in bodies for bodies in met)

@@ -1,0 +1,137 @@
+"""The search for chains: where they lead, what refusing them does, and why there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from burg_drake.core.frames import Array, grasp_from_axes, swap_fingers
+from burg_drake.core.outcome import Outcome
+from burg_drake.motion.closed_form_lines import ClosedFormLines
+from burg_drake.motion.ik import ArmKinematics
+from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_search import Lines
+from burg_drake.motion.panda_ik import PandaIk, panda_forward
+from burg_drake.motion.proximity import ArmProximity
+from burg_drake.motion.reach_settings import ReachSettings
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import load_station
+
+DOWN = (0.0, 0.0, -1.0)
+STATION = load_station("panda_tabletop")
+ABOVE = grasp_from_axes((0.0, 1.0, 0.0), DOWN, (0.5, 0.1, 0.25))
+HIGH = grasp_from_axes((0.0, 1.0, 0.0), DOWN, (0.45, 0.0, 0.62))
+FAR = grasp_from_axes((0.0, 1.0, 0.0), DOWN, (1.1, 0.0, 0.2))
+
+
+@pytest.fixture(scope="module")
+def search() -> ClosedFormLines:
+    diagram = build_station_diagram(
+        load_scene("tabletop_six"), STATION, robot="arm", weld_objects=True
+    )
+    ik = PandaIk.of(ArmKinematics.of(diagram))
+    assert ik is not None and STATION.document.arm is not None
+    lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3))
+    home = np.array(STATION.document.arm.home)
+    settings = ReachSettings()
+    return ClosedFormLines(ik.within(0.01), lines, ArmProximity(diagram), home, settings)
+
+
+def begin(search: ClosedFormLines, *grasps: Array) -> Lines:
+    X_AG = np.array([[X, swap_fingers(X)] for X in grasps])
+    return search.begin(X_AG, np.full((len(grasps), 2), 1e-3))
+
+
+def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormLines) -> None:
+    (chain,) = begin(search, ABOVE).propose([0])
+    assert chain is not None
+    X = panda_forward(chain.q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
+    goal = (ABOVE, swap_fingers(ABOVE))[chain.way]
+    np.testing.assert_allclose(X[chain.at_grasp], goal, atol=1e-9)
+    np.testing.assert_allclose(X[0, :3, 3], goal[:3, 3] - 0.1 * goal[:3, 2], atol=1e-9)
+    np.testing.assert_allclose(X[-1, :3, 3], goal[:3, 3] + (0.0, 0.0, 0.3), atol=1e-9)
+    assert (chain.rise[: chain.at_grasp + 1] == 0.0).all() and chain.rise[-1] == 0.3
+    np.testing.assert_allclose(np.diff(X[:, 2, 3])[chain.at_grasp :], np.diff(chain.rise)[10:])
+    np.testing.assert_array_less(np.abs(np.diff(chain.q, axis=0)).max(), 0.35)
+
+
+def test_a_refused_chain_does_not_come_back_and_at_last_there_is_none(
+    search: ClosedFormLines,
+) -> None:
+    lines = begin(search, ABOVE)
+    starts: list[Array] = []
+    for _ in range(1000):
+        (chain,) = lines.propose([0])
+        if chain is None:
+            break
+        assert not starts or np.abs(chain.q[0] - starts[-1]).max() > 1e-9
+        starts.append(chain.q[0])
+        lines.refuse(0, chain, None)
+    else:
+        pytest.fail("the search does not end")
+    assert len(starts) > 5
+
+
+def test_refusing_one_grasp_leaves_the_others_alone(search: ClosedFormLines) -> None:
+    lines = begin(search, ABOVE, ABOVE)
+    first, second = lines.propose([0, 1])
+    assert first is not None and second is not None
+    lines.refuse(0, first, 20)
+    other, same = lines.propose([0, 1])
+    assert other is not None and same is not None
+    np.testing.assert_array_equal(same.q, second.q)
+    assert other.q.shape != first.q.shape or not np.array_equal(other.q, first.q)
+
+
+def test_beyond_the_arm_there_is_no_ik(search: ClosedFormLines) -> None:
+    lines = begin(search, FAR, ABOVE)
+    assert lines.propose([0, 1])[0] is None
+    assert lines.failure(0).outcome is Outcome.NO_IK
+
+
+def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_posture(
+    search: ClosedFormLines,
+) -> None:
+    """Postures with a joint beyond its limit; where no other posture is within, that is said."""
+    settings = ReachSettings(standoff=0.0, lift_height=0.0)
+    ends = ClosedFormLines(search.ik, search.lines, search.proximity, search.home, settings)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(search.ik.lower, search.ik.upper, (400, 7))
+    excess = rng.uniform(0.1, 0.5, 400)
+    q[:, 5] = search.ik.lower[5] - excess  # the wrist is folded too far
+    X_AG = panda_forward(q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
+    lines = begin(ends, *X_AG)
+    lines.propose(range(400))
+    failures = [lines.failure(k) for k in range(400)]
+    beyond = [k for k in range(400) if failures[k].outcome is Outcome.JOINT_LIMIT]
+    assert len(beyond) > 5
+    for k in beyond:
+        assert 0.0 < failures[k].excess < excess[k] + 0.07  # the redundant joint has a grid
+
+
+def test_where_the_lift_leads_out_of_reach_the_line_fails(search: ClosedFormLines) -> None:
+    lines = begin(search, HIGH)
+    assert lines.propose([0]) == [None]
+    assert lines.failure(0).outcome is Outcome.LIFT_LINE
+
+
+def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLines) -> None:
+    other = grasp_from_axes((1.0, 0.3, 0.0), (0.3, -0.2, -1.0), (0.42, -0.2, 0.3))
+    together = begin(search, FAR, other, ABOVE).propose([0, 1, 2])[1]
+    (alone,) = begin(search, other).propose([0])
+    assert together is not None and alone is not None
+    np.testing.assert_array_equal(together.q, alone.q)
+    np.testing.assert_array_equal(together.lower, alone.lower)
+
+
+def test_a_way_that_is_closed_is_not_proposed(search: ClosedFormLines) -> None:
+    lines = begin(search, ABOVE, ABOVE)
+    first, second = lines.propose([0, 1])
+    assert first is not None and second is not None
+    lines.close(0, first.way)
+    other, same = lines.propose([0, 1])
+    assert other is not None and same is not None
+    assert other.way != first.way and same.way == second.way
+    lines.close(0, other.way)
+    assert lines.propose([0]) == [None]

@@ -1,0 +1,286 @@
+"""The hand's straight ways against dense samples in Drake, and in scenes with known clearances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import Array, grasp_from_axes, pregrasp, swap_fingers
+from burg_drake.core.schema import Pose
+from burg_drake.grasping.clearance import HandClearance
+from burg_drake.motion.hand_sweep import HandSweep, Sweep
+from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import Obstacle, Station, load_station
+
+STANDOFF, LIFT = 0.10, 0.30
+CAN = Instance(name="can", object="can", X_SO=Pose((0.4, 0.0, 0.0)))
+"""34 mm in radius, 102 mm high."""
+X_WG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, 0.0, 0.09))
+"""From above, over the middle of the can."""
+
+
+def place(*instances: Instance, **background: Obstacle) -> tuple[Scene, Station]:
+    """A scene whose frame is the world."""
+    station = load_station("panda_tabletop")
+    document = replace(station.document, X_WS=Pose(), background=background)
+    few = SceneDocument(name="few", library="household", instances=instances)
+    scene = Scene(few, load_scene("tabletop_six").library, Path("few.yaml"))
+    return scene, replace(station, document=document)
+
+
+def sweep(*instances: Instance, **background: Obstacle) -> HandSweep:
+    return HandSweep(*place(*instances, **background), standoff=STANDOFF, lift=LIFT)
+
+
+def drake(*instances: Instance, **background: Obstacle) -> HandClearance:
+    scene, station = place(*instances, **background)
+    return HandClearance(build_station_diagram(scene, station, robot="hand"))
+
+
+def block(center: tuple[float, float, float], size: tuple[float, float, float]) -> Obstacle:
+    return Obstacle(X_WB=Pose(center), size=size)
+
+
+def both(
+    swept: HandSweep, X: Array, width: float = 0.068, name: str = "can"
+) -> tuple[Sweep, Sweep]:
+    return swept.approach(name, X[None]), swept.lift(name, X[None], np.array([width]))
+
+
+def roof_at(z: float) -> Obstacle:
+    """The lower side at z, far wider than the hand."""
+    return block((0.4, 0.0, z + 0.01), (0.8, 0.8, 0.02))
+
+
+@pytest.fixture(scope="module")
+def hand_top() -> float:
+    """Where the hand ends at the grasp, by Drake [m]."""
+    return 0.5 - drake(CAN, roof=roof_at(0.5)).signed_distances(X_WG)["roof"]
+
+
+@pytest.mark.parametrize("gap", [1e-3, -1e-3])
+def test_a_shelf_over_the_hand(hand_top: float, gap: float) -> None:
+    approach, lift = both(sweep(CAN, roof=roof_at(hand_top + LIFT + gap)), X_WG)
+    assert approach.free.all() and lift.free.all() == (gap > 0)
+    assert lift.clearance[0] == pytest.approx(gap, abs=1e-6)
+    if gap < 0:
+        assert lift.blocker[0] == "roof" and lift.at[0] == LIFT
+
+
+@pytest.mark.parametrize("gap", [2e-3, -2e-3])
+def test_a_tall_neighbour(gap: float) -> None:
+    size = (0.02, 0.02, 0.8)
+    distance = drake(CAN, post=block((0.4, 0.1, 0.4), size)).signed_distances(X_WG)["post"]
+    for swept in both(sweep(CAN, post=block((0.4, 0.1 - distance + gap, 0.4), size)), X_WG):
+        assert swept.free[0] == (gap > 0) and swept.blocker[0] == ("" if gap > 0 else "post")
+        assert swept.clearance[0] == pytest.approx(gap, abs=1e-6)
+        assert np.isnan(swept.at[0]) == (gap > 0)
+
+
+def test_a_bar_that_bridges_the_way(hand_top: float) -> None:
+    """Between the fingers before the approach, above the hand after it."""
+    bar = {"bar": block((0.4, 0.0, hand_top + 0.015), (0.01, 0.5, 0.01))}
+    ends = drake(CAN, **bar)
+    assert [ends.check("can", X).outcome for X in (X_WG, pregrasp(X_WG, STANDOFF))] == [None, None]
+    approach, lift = both(sweep(CAN, **bar), X_WG)
+    assert not approach.free[0] and approach.blocker[0] == "bar"
+    assert 0.01 < approach.at[0] < STANDOFF and approach.clearance[0] < -0.004
+    assert lift.blocker[0] == "bar"
+
+
+def test_the_target_counts_on_the_approach_alone() -> None:
+    low = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, 0.0, 0.05))  # the palm is in the can
+    approach, lift = both(sweep(CAN), low)
+    assert approach.blocker[0] == "can" and approach.at[0] == 0.0
+    assert lift.free[0]
+
+
+def test_fingers_are_lifted_where_they_hold() -> None:
+    """A low post 5 mm within a pad of the open hand, which then moves 7 mm inward."""
+    size = (0.02, 0.02, 0.09)
+    at_finger = block((0.48, 0.0, 0.045), size)
+    distance = drake(CAN, post=at_finger).signed_distances(X_WG)["post"]
+    swept = sweep(CAN, post=block((0.48 - distance - 0.005, 0.0, 0.045), size))
+    held = swept.lift("can", X_WG[None], np.array([0.066]))
+    assert held.free[0] and held.clearance[0] == pytest.approx(0.002, abs=1e-6)
+    for width in (0.08, np.nan, 0.2):
+        lift = swept.lift("can", X_WG[None], np.array([width]))
+        assert lift.blocker[0] == "post" and lift.clearance[0] == pytest.approx(-0.005, abs=1e-4)
+    assert swept.approach("can", X_WG[None]).blocker[0] == "post"
+
+
+@pytest.mark.parametrize(("beside", "hit"), [(0.0, True), (0.041, False)])
+def test_the_target_meets_what_the_hand_does_not(beside: float, hit: bool) -> None:
+    """A box that is gripped at one end, 60 x 158 x 210 mm, under a bar of 20 mm at the other."""
+    box = Instance(name="box", object="box", X_SO=Pose((0.4, 0.0, 0.0)))
+    bar = block((0.4 + beside, 0.05, 0.3), (0.02, 0.02, 0.02))
+    X = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, -0.05, 0.20))
+    approach, lift = both(sweep(box, bar=bar), X, 0.06, "box")
+    assert approach.free[0] and lift.free[0] is np.bool_(not hit)
+    if hit:
+        assert lift.blocker[0] == "bar" and 0.08 < lift.at[0] <= LIFT
+        assert lift.clearance[0] == pytest.approx(-0.039, abs=1e-6)  # out to the near end
+
+
+def test_what_lies_on_the_target_is_in_its_way_and_not_what_it_lies_on() -> None:
+    box = Instance(name="box", object="box", X_SO=Pose((0.4, 0.0, -0.0005)))
+    on_it = Instance(name="can", object="can", X_SO=Pose((0.4, 0.03, 0.209)))
+    swept = sweep(box, on_it)
+    X = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, -0.05, 0.20))
+    assert both(swept, X, 0.06, "box")[1].blocker[0] == "can"
+    X = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, 0.03, 0.30))
+    assert both(swept, X)[1].free[0]
+
+
+def random_grasps(scene: Scene, station: Station, n: int) -> list[tuple[str, Array]]:
+    """n grasps about each instance, from above at up to 50 degrees."""
+    diagram = build_station_diagram(scene, station, robot="none")
+    rng, found = np.random.default_rng(11), []
+    for name in diagram.free:
+        p_WO = diagram.X_WO(name)[:3, 3] + (0.0, 0.0, 0.08)
+        approach = rng.normal(size=(n, 3)) * 0.4 - (0.0, 0.0, 1.0)
+        p_WG = p_WO + rng.uniform(-0.06, 0.06, (n, 3))
+        found.append((name, grasp_from_axes(rng.normal(size=(n, 3)), approach, p_WG)))
+    return found
+
+
+@pytest.fixture(scope="module")
+def shelf() -> tuple[Scene, Station]:
+    """A mug between a wall, a can that lies, a marble, and the edge of a roof, under which a box
+    stands."""
+    return place(
+        Instance(object="mug", X_SO=Pose((0.36, 0.1, 0.0), (0.0, 0.0, 140.0))),
+        Instance(name="lying", object="can", X_SO=Pose((0.45, 0.0, 0.034), (90.0, 0.0, 30.0))),
+        Instance(object="marble", X_SO=Pose((0.4, -0.1, 0.0))),
+        Instance(object="box", X_SO=Pose((0.65, 0.0, 0.0), (0.0, 0.0, 20.0))),
+        roof=block((0.65, 0.0, 0.46), (0.3, 0.6, 0.02)),
+        wall=block((0.25, 0.0, 0.06), (0.02, 0.66, 0.12)),
+    )
+
+
+@pytest.fixture(scope="module")
+def swept(shelf: tuple[Scene, Station]) -> HandSweep:
+    return HandSweep(*shelf, standoff=STANDOFF, lift=LIFT)
+
+
+def overlapped(clearance: HandClearance, path: Array, closed: float) -> set[str]:
+    return {name for X in path for name in clearance.touched(X, closed)}
+
+
+def test_dense_samples_in_drake_agree(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+    clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
+    rng, seen = np.random.default_rng(2), set[tuple[bool, bool]]()
+    for name, X in random_grasps(*shelf, 8):
+        width = rng.uniform(0.0, 0.08, len(X))
+        approach, lift = swept.approach(name, X), swept.lift(name, X, width)
+        for i, X_WG in enumerate(X):
+            back = np.repeat(X_WG[None], 101, axis=0)
+            back[:, :3, 3] -= np.linspace(0.0, STANDOFF, 101)[:, None] * X_WG[:3, 2]
+            met = overlapped(clearance, back, 0.0)
+            assert approach.free[i] == (not met) and (not met or approach.blocker[i] in met)
+            up = np.repeat(X_WG[None], 301, axis=0)
+            up[:, 2, 3] += np.linspace(0.0, LIFT, 301)
+            met = overlapped(clearance, up, 1.0 - width[i] / 0.08) - {name}
+            if name == "box" and not met:  # the box itself meets the roof
+                met = {"roof"}
+            assert lift.free[i] == (not met) and (not met or lift.blocker[i] in met)
+            seen |= {(True, bool(approach.free[i])), (False, bool(lift.free[i]))}
+    assert len(seen) == 4
+
+
+def test_a_bound_below_every_sample(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+    """Signed clearances of the open hand on the way: none below, and one that is nearly it."""
+    clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
+    step, tested = 1e-3, 0
+    for name, X in random_grasps(*shelf, 30):
+        approach = swept.approach(name, X)
+        for i in np.flatnonzero(approach.free)[:5]:
+            back = np.repeat(X[i][None], 101, axis=0)
+            back[:, :3, 3] -= np.linspace(0.0, STANDOFF, 101)[:, None] * X[i][:3, 2]
+            lowest = clearance.measure(name, back).clearance.min()
+            assert lowest - step / 2 <= approach.clearance[i] + 1e-8 <= lowest + 2e-8
+            tested += 1
+    assert tested > 10
+
+
+def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+    name, X = random_grasps(*shelf, 24)[0]
+    width = np.random.default_rng(3).uniform(0.0, 0.08, len(X))
+    order = np.random.default_rng(4).permutation(len(X))
+    for way in ("approach", "lift"):
+        rows = (lambda i: (X[i],)) if way == "approach" else (lambda i: (X[i], width[i]))
+        ask = getattr(HandSweep(*shelf, standoff=STANDOFF, lift=LIFT), way)
+        alone = [ask(name, *rows(np.array([i]))) for i in range(len(X))]
+        for chosen in (np.arange(len(X)), order):
+            batch = getattr(swept, way)(name, *rows(chosen))
+            for field in ("free", "blocker", "clearance", "at"):
+                expected = np.array([getattr(alone[i], field)[0] for i in chosen])
+                np.testing.assert_array_equal(getattr(batch, field), expected)
+        assert 0 < batch.free.sum() < len(X)
+    assert len(swept.approach(name, X[:0])) == len(swept.lift(name, X[:0], width[:0])) == 0
+
+
+def test_ways_of_no_length_are_the_grasp_itself(shelf: tuple[Scene, Station]) -> None:
+    still = HandSweep(*shelf, standoff=0.0, lift=0.0)
+    clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
+    for name, X in random_grasps(*shelf, 10):
+        measured = clearance.measure(name, X)
+        approach, lift = still.approach(name, X), still.lift("", X, np.full(len(X), np.nan))
+        np.testing.assert_array_equal(
+            approach.blocker, np.where(approach.free, "", measured.blocker)
+        )
+        np.testing.assert_array_equal(approach.free, measured.overlap == 0.0)
+        np.testing.assert_allclose(approach.clearance, measured.clearance, atol=1e-8)
+        np.testing.assert_array_equal(lift.free, approach.free)
+        np.testing.assert_allclose(
+            lift.clearance[lift.free], approach.clearance[lift.free], atol=1e-8
+        )
+
+
+def test_an_empty_hand(swept: HandSweep, shelf: tuple[Scene, Station]) -> None:
+    """All bodies count, on either way."""
+    for name, X in random_grasps(*shelf, 10):
+        width = np.full(len(X), 0.05)
+        np.testing.assert_array_equal(swept.approach("", X).free, swept.approach(name, X).free)
+        full, empty = swept.lift(name, X, width), swept.lift("", X, width)
+        at_target = empty.blocker == name
+        others = ~at_target & (full.blocker != "roof")  # which the box, but no hand, meets
+        np.testing.assert_array_equal(empty.blocker[others], full.blocker[others])
+
+
+def test_swapped_fingers_and_a_turned_world(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+    scene, station = shelf
+    turn = Pose((0.1, -0.05, 0.0), (0.0, 0.0, 37.0)).matrix()
+    moved = {
+        name: replace(o, X_WB=Pose.from_matrix(turn @ o.X_WB.matrix(), quaternion=True))
+        for name, o in station.document.background.items()
+    }
+    X_WS = Pose.from_matrix(turn @ station.document.X_WS.matrix(), quaternion=True)
+    document = replace(station.document, X_WS=X_WS, background=moved)
+    turned = HandSweep(scene, replace(station, document=document), standoff=STANDOFF, lift=LIFT)
+    for name, X in random_grasps(scene, station, 8):
+        width = np.full(len(X), 0.05)
+        ways = [
+            (s.approach(name, Y), s.lift(name, Y, width))
+            for s, Y in ((swept, X), (swept, swap_fingers(X)), (turned, turn @ X))
+        ]
+        for one, *others in zip(*ways, strict=True):
+            for other in others:
+                np.testing.assert_array_equal(other.blocker, one.blocker)
+                np.testing.assert_allclose(other.clearance, one.clearance, atol=1e-6)
+
+
+def test_bad_input() -> None:
+    scene, station = place(CAN)
+    with pytest.raises(InvalidInputError, match=r"lift is -0\.1 m; give a length of 0 or more"):
+        HandSweep(scene, station, standoff=STANDOFF, lift=-0.1)
+    swept = HandSweep(scene, station, standoff=STANDOFF, lift=LIFT)
+    with pytest.raises(UnknownNameError, match=r"there is no instance 'cam'.*'can'"):
+        swept.approach("cam", X_WG[None])
+    with pytest.raises(InvalidInputError, match="NaN"):
+        swept.lift("can", np.full((1, 4, 4), np.nan), np.array([0.05]))

@@ -1,0 +1,82 @@
+"""An arm that stands in something, and one that collides at home, by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.motion.collision import ArmCollision
+from burg_drake.motion.home_check import base_overlaps, home_clearance, require_free_home
+from burg_drake.motion.station_check import empty_scene
+from burg_drake.scene.scene import Instance, load_scene
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.station import Obstacle, Station, load_station
+
+TIP = 0.487
+"""Roughly the height of the lowest points of the fingers at home [m]."""
+
+
+def with_box(name: str, x: float, z: float, size: tuple[float, float, float]) -> Station:
+    station = load_station("panda_tabletop")
+    box = Obstacle(X_WB=Pose((x, 0.0, z)), size=size)
+    return replace(station, document=replace(station.document, background={name: box}))
+
+
+def built(station: Station) -> StationDiagram:
+    return build_station_diagram(empty_scene(), station, robot="arm", weld_objects=True)
+
+
+def test_a_box_that_cuts_into_the_base() -> None:
+    """Link 0 reaches 71 mm to the front of its axis."""
+    diagram = built(with_box("post", 0.15, 0.1, (0.2, 0.1, 0.2)))
+    assert set(base_overlaps(diagram)) == {"post"}
+    with pytest.raises(InvalidInputError) as error:
+        require_free_home(diagram, ArmCollision(diagram))
+    depth = 1e3 * base_overlaps(diagram)["post"]
+    assert str(error.value) == (
+        f"{diagram.station.path}: arm.X_WA puts the arm's base {depth:.0f} mm deep into 'post';"
+        " move the base or what is in its place"
+    )
+    assert base_overlaps(built(with_box("post", 0.25, 0.1, (0.2, 0.1, 0.2)))) == {}
+
+
+def test_what_collides_at_home_is_named() -> None:
+    diagram = built(with_box("crate", 0.36, 0.55, (0.1, 0.4, 0.1)))
+    with pytest.raises(InvalidInputError) as error:
+        require_free_home(diagram, ArmCollision(diagram))
+    text = str(error.value)
+    assert text.startswith(f"{diagram.station.path}: arm.home collides in scene 'empty board': ")
+    assert "panda_hand with crate" in text
+    assert text.endswith("; change the posture or move what is in the way")
+
+
+def test_a_tall_object_under_the_hand_is_named() -> None:
+    scene = load_scene("tabletop_six")
+    box = Instance(object="box", X_SO=Pose((0.297, 0.067, 0.4)))
+    scene = replace(scene, document=replace(scene.document, instances=(box,)))
+    station = load_station("panda_tabletop")
+    diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+    with pytest.raises(InvalidInputError, match=r"in scene 'tabletop_six': .* with box"):
+        require_free_home(diagram, ArmCollision(diagram))
+
+
+def test_clearance_at_home_is_that_of_the_nearest_pair() -> None:
+    """A plate under the fingers: nearer by as much as it is higher."""
+    high, low = (
+        home_clearance(built(with_box("plate", 0.307, TIP - gap - 0.005, (0.2, 0.3, 0.01))))
+        for gap in (0.02, 0.025)
+    )
+    assert {high.other, low.other} == {"plate"}
+    assert high.link.endswith("finger") or "finger" in high.link
+    assert low.distance - high.distance == pytest.approx(0.005, abs=1e-6)
+    assert 0.01 < high.distance < 0.03
+
+
+@pytest.mark.parametrize("name", ["panda_bin", "panda_shelf", "panda_pedestal", "ur5e_tabletop"])
+def test_built_in_stations_are_free(name: str) -> None:
+    diagram = built(load_station(name))
+    require_free_home(diagram, ArmCollision(diagram))
+    assert home_clearance(diagram).distance > 0.01

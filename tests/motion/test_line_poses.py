@@ -1,0 +1,38 @@
+"""Where the hand goes, against the frames' own rules."""
+
+import numpy as np
+
+from burg_drake.core.frames import inverse, make_pose, pregrasp, rotation_from_rpy
+from burg_drake.motion.line_poses import LinePoses
+
+X_HG = make_pose(rotation_from_rpy((0.0, 0.0, np.pi / 2)), (0.0, 0.0, 0.1034))
+X_WA = make_pose(rotation_from_rpy((0.4, -0.2, 1.1)), (0.3, -0.1, 0.05))
+X_WG = make_pose(rotation_from_rpy((2.8, 0.3, -0.5)), (0.5, 0.1, 0.12))
+LINES = LinePoses.of(X_HG, X_WA[:3, :3])
+
+
+def grasp_in_world(way: float) -> np.ndarray:
+    X_AH = LINES.X_AH(inverse(X_WA) @ X_WG, np.array(way))
+    return X_WA @ X_AH @ X_HG
+
+
+def test_at_the_grasp_itself() -> None:
+    np.testing.assert_allclose(grasp_in_world(0.0), X_WG, atol=1e-12)
+
+
+def test_before_the_grasp_the_hand_is_back_along_the_approach() -> None:
+    np.testing.assert_allclose(grasp_in_world(-0.1), pregrasp(X_WG, 0.1), atol=1e-12)
+
+
+def test_after_it_the_hand_is_straight_above_whatever_the_base() -> None:
+    risen = X_WG.copy()
+    risen[2, 3] += 0.3
+    np.testing.assert_allclose(grasp_in_world(0.3), risen, atol=1e-12)
+
+
+def test_shapes_broadcast() -> None:
+    X_AG = np.broadcast_to(X_WG, (3, 2, 4, 4))
+    ways = np.linspace(-0.1, 0.3, 5)[:, None, None]
+    X_AH = LINES.X_AH(X_AG[None], ways)
+    assert X_AH.shape == (5, 3, 2, 4, 4)
+    np.testing.assert_array_equal(X_AH[4, 1, 0], LINES.X_AH(X_WG, ways[4, 0, 0]))
