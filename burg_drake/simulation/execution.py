@@ -1,15 +1,17 @@
-"""One trial on its way: close, lift, hold, and the outcome with its margins."""
+"""One trial on its way: approach, close, lift, hold, and the outcome with its margins."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core.frames import Array, inverse, rotation_angle
 from burg_drake.core.outcome import Outcome
+from burg_drake.simulation.carrier import Carrier
 from burg_drake.simulation.contacts import (
     NO_CONTACT,
     Contact,
@@ -17,56 +19,60 @@ from burg_drake.simulation.contacts import (
     reached,
     touched_from_outside,
 )
+from burg_drake.simulation.displacements import Displacements, center_of_mass
 from burg_drake.simulation.result import Margins, TrialResult
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.hand_trial import HandTrial
+    from burg_drake.simulation.trial import Trial
 
 MINIMUM_LIFT = 0.5
 """Share of the lift height that the target must rise by to count as lifted."""
 LEVER = 0.01
-"""Turning counts as the motion of a point at this distance from the grasp [m], which is at the rim
-of a pad."""
+"""Turning counts as the motion of a point so far from the grasp [m], which is at a pad's rim."""
 
 
 class Execution:
     """Runs a trial from a Context that has been brought to its start.
 
-    Objects that are locked are released when something moving touches them, and with them those
-    that stand close to them: the trial goes back to the look before, where they were still apart,
-    and goes on from there.
+    Locked objects are released when something moving touches them, and with them those close to
+    them: the trial goes back to the look before, where they were apart, and goes on from there.
 
     Args:
         trial: the trial.
         target: the grasped body.
-        moving: the free objects that are not locked, the target among them.
+        moving: the free objects that are not locked.
+        carrier: what brings the hand to the grasp and raises it.
 
     Attributes:
         contact: of the fingers with the target at the last look.
     """
 
-    def __init__(self, trial: HandTrial, target: BodyIndex, moving: set[BodyIndex]) -> None:
+    def __init__(
+        self, trial: Trial, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
+    ) -> None:
         diagram = trial.diagram
         self._trial = trial
+        self._carrier = carrier
         self._settings = trial.settings
         self._context = trial.context
         self._plant = diagram.plant
         self._plant_context = self._plant.GetMyContextFromRoot(self._context)
         self._results_port = self._plant.get_contact_results_output_port()
         self._target = self._plant.get_body(target)
-        self._names = {index: name for name, index in diagram.free.items() if index != target}
+        self._itself = {name: index for name, index in diagram.free.items() if index == target}
+        self._others = {name: index for name, index in diagram.free.items() if index != target}
         self._still = set(diagram.free.values()) - moving
-        self._hand = set(diagram.robot_bodies)
-        self._height_start = self._center(self._target)[2]
-        self._others = {i: self._center(self._plant.get_body(i)) for i in self._names}
-        self._others_last = dict(self._others)
-        self._displacements = dict.fromkeys(self._names, 0.0)
+        self._robot = set(diagram.robot_bodies)
+        self._height_start = self._center()[2]
+        self._moved = self._displacements(self._others.values())
+        self._pushed: dict[str, float] = {}
         self.contact = NO_CONTACT
         self._X_GO_last = self.X_GO()
         self._X_GO_grip: Array | None = None
         self._touched = False
         self._blocker = ""
-        self._looks = 0
+        self._steps = 0
+        self._steps_a_look = max(1, round(self._settings.poll / diagram.engine.time_step))
         self._creep: list[float] = []
         self._in_free_air = 0.0
         self._way_blocked = False
@@ -78,17 +84,34 @@ class Execution:
         Raises:
             RuntimeError: the simulation failed.
         """
-        for phase in (self.close, self.lift, self.hold):
+        for phase in (self.approach, self.close, self.lift, self.hold):
             outcome = phase()
             if outcome is not None:
                 return self.result(outcome)
         return self.result(self.held())
 
+    def approach(self) -> Outcome | None:
+        """Brings the hand to the grasp; None if nothing fixed is in its way."""
+        carrier = self._carrier
+        if not carrier.approach_looks:
+            return None
+        target = self._displacements(self._itself.values())
+        carrier.approach()
+        for _ in range(carrier.approach_looks):
+            self.advance(carrier.approach_steps)
+            target.look(self._still)
+            if self._blocker:
+                break
+        self._pushed = self._moved.by_name(self._others) | target.by_name(self._itself)
+        return Outcome.BLOCKED if self._blocker else None
+
     def close(self) -> Outcome | None:
         """Closes until the fingers rest; None if both hold the target then."""
         settings = self._settings
+        self._carrier.close()
         slow_since = math.inf
         timeout = max(settings.close_timeout, 2.0 * self._trial.hand.document.closing_time)
+        timeout += self._context.get_time()
         while self._context.get_time() < timeout:
             now = self.advance()
             if self._trial.hand.finger_speed(self._plant_context) > settings.settled_speed:
@@ -106,21 +129,18 @@ class Execution:
 
     def lift(self) -> Outcome | None:
         """Raises the hand; None if the target is held at the top and has to prove itself there."""
-        settings = self._settings
-        steps = 2 * max(1, round(settings.lift_time / settings.poll / 2))
-        top_speed = 2 * settings.lift_height / (steps * settings.poll)
-        for i in range(steps):
-            speed = top_speed * (1 - abs(2 * i + 1 - steps) / steps)  # of the interval's middle
-            self._trial.command("lift", np.array([0.0, speed]))
+        carrier = self._carrier
+        for look in range(carrier.lift_looks):
+            carrier.lift(look)
             self.advance()
             if self._blocker:
                 return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.SLIPPED
-            if i < steps // 2 and self._is_decided():
+            if carrier.bears_the_most(look) and self._is_decided():
                 return self.held()
-        self._trial.command("lift", np.zeros(2))
-        if self.contact.both and self.risen() >= MINIMUM_LIFT * settings.lift_height:
+        carrier.stop()
+        if self.contact.both and self.risen() >= MINIMUM_LIFT * carrier.lift_height:
             return None
         return Outcome.SLIPPED
 
@@ -133,6 +153,8 @@ class Execution:
         self._creep.clear()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
+            if self._blocker:
+                return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.DROPPED
             if self._sticks() and not self._trial.diagram.engine.whole_trial:
@@ -141,8 +163,7 @@ class Execution:
 
     def held(self) -> Outcome:
         """The outcome of a target that is held to the end."""
-        moved = max(self._displacements.values(), default=0.0)
-        disturbed = moved > self._settings.disturbance
+        disturbed = self._moved.largest > self._settings.disturbance
         return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
 
     def _is_decided(self) -> bool:
@@ -158,12 +179,12 @@ class Execution:
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
-        way = self._settings.lift_height - self._trial.hand.risen(self._plant_context)
-        positions = self._plant.GetPositions(self._plant_context)
-        rise = self._trial.rise(self._target.index())
-        self._way_blocked = not rise.is_free(self._trial.X_WG_start, positions, way)
+        left = self._carrier.lift_height - self._carrier.risen()
+        if self.risen() + left < MINIMUM_LIFT * self._carrier.lift_height:
+            return False
+        self._way_blocked = not self._carrier.is_free_above()
         if not self._way_blocked:
-            self._left_to_rise = way
+            self._left_to_rise = left
         return not self._way_blocked
 
     def _sticks(self) -> bool:
@@ -182,25 +203,29 @@ class Execution:
         settings = self._settings
         n = settings.steady_polls
         before, now = sum(self._creep[-2 * n : -n]), sum(self._creep[-n:])
-        ahead = (settings.lift_time + settings.hold_time) / settings.poll
+        ahead = (self._carrier.lift_time + settings.hold_time) / settings.poll
         enough = len(self._creep) >= 2 * n
         return enough and now <= before and now / n * ahead <= settings.creep_distance
 
-    def advance(self) -> float:
+    def advance(self, steps: int | None = None) -> float:
         """Steps to the next look at the contacts; returns the time [s].
+
+        Args:
+            steps: how many; by default those in `poll`.
 
         Raises:
             RuntimeError: the simulation failed.
         """
-        before, time = self._look_time(self._looks), self._look_time(self._looks + 1)
-        self._looks += 1
+        before = self._time()
+        self._steps += self._steps_a_look if steps is None else steps
+        time = self._time()
         while True:
             state = self._context.get_discrete_state().Clone() if self._still else None
-            self._trial.simulator.AdvanceTo(time)
-            if not math.isfinite(self._center(self._target)[2]):
+            self._carrier.advance_to(time)
+            if not math.isfinite(self._center()[2]):
                 raise RuntimeError(f"the state is not finite at {time:.3f} s")
             contacts = self._trial.contacts.read(self._results_port.Eval(self._plant_context))
-            moving = self._hand | (set(self._trial.diagram.free.values()) - self._still)
+            moving = self._robot | (set(self._trial.diagram.free.values()) - self._still)
             found = reached(contacts, moving, self._still)
             if not found:
                 break
@@ -212,10 +237,9 @@ class Execution:
         self._look(contacts)
         return time
 
-    def _look_time(self, look: int) -> float:
-        """Time of a look [s]: a whole number of steps, rounded as Drake's own steps are."""
-        step = self._trial.diagram.engine.time_step
-        return look * max(1, round(self._settings.poll / step)) * step
+    def _time(self) -> float:
+        """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
+        return self._steps * self._trial.diagram.engine.time_step
 
     def _look(self, contacts: list[Contact]) -> None:
         """Takes down what the contacts and poses say."""
@@ -225,39 +249,30 @@ class Execution:
         X_GO = self.X_GO()
         distance, angle = motion_in_hand(self._X_GO_last, X_GO)
         self._X_GO_last = X_GO
-        if self._watch_others() <= settings.settled_speed * settings.poll:
+        if self._moved.look(self._still) <= settings.settled_speed * settings.poll:
             self._creep.append(max(distance, angle * LEVER))
         else:
             self._creep.clear()
-        hit = reached(contacts, self._hand, self._trial.diagram.fixed.values())
-        self._blocker = self._trial.diagram.body_names[min(hit)] if hit else ""
-        free = not touched_from_outside(contacts, self._hand | {target})
+        self._blocker = self._carrier.watch(contacts)
+        free = not touched_from_outside(contacts, self._robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
-
-    def _watch_others(self) -> float:
-        """Measures how far others are displaced; returns the largest motion since the last look."""
-        largest = 0.0
-        for index in self._names.keys() - self._still:
-            center = self._center(self._plant.get_body(index))
-            displacement = float(np.linalg.norm(center - self._others[index]))
-            self._displacements[index] = max(self._displacements[index], displacement)
-            largest = max(largest, float(np.linalg.norm(center - self._others_last[index])))
-            self._others_last[index] = center
-        return largest
 
     def risen(self) -> float:
         """How far the target's centre of mass has risen [m]."""
-        return float(self._center(self._target)[2] - self._height_start)
+        return float(self._center()[2] - self._height_start)
 
     def X_GO(self) -> Array:
         """(4, 4) target in the grasp frame."""
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
         return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
 
-    def _center(self, body: RigidBody) -> Array:
-        """Centre of mass (3,) in the world [m]."""
-        X_WB = self._plant.EvalBodyPoseInWorld(self._plant_context, body)
-        return X_WB.multiply(body.default_com())
+    def _center(self) -> Array:
+        """The target's centre of mass (3,) in the world [m]."""
+        return center_of_mass(self._plant, self._plant_context, self._target)
+
+    def _displacements(self, bodies: Iterable[BodyIndex]) -> Displacements:
+        """Of bodies, from where they are now."""
+        return Displacements(self._plant, self._plant_context, bodies)
 
     def result(self, outcome: Outcome) -> TrialResult:
         """The outcome with the margins at this moment."""
@@ -274,13 +289,19 @@ class Execution:
             pad_force=force,
             patch_area=area,
             lift=self.risen() + self._left_to_rise,
-            others_moved=max(self._displacements.values(), default=0.0),
+            others_moved=self._moved.largest,
             end_time=self._context.get_time(),
+            tracking_error=self._carrier.tracking_error,
+            tracking_distance=self._carrier.tracking_distance,
+            pushed=max(self._pushed.values(), default=math.nan),
         )
-        displacements = {name: self._displacements[i] for i, name in self._names.items()}
-        blocker = self._blocker if outcome is Outcome.BLOCKED else ""
         return TrialResult(
-            outcome=outcome, margins=margins, blocker=blocker, displacements=displacements
+            outcome=outcome,
+            margins=margins,
+            blocker=self._blocker if outcome is Outcome.BLOCKED else "",
+            displacements=self._moved.by_name(self._others),
+            pushed=self._pushed,
+            touched=self._carrier.touched,
         )
 
 

@@ -18,14 +18,14 @@ from burg_drake.simulation.hand_trial import HandTrial
 # Tests import what they share by name.
 sys.path.insert(0, str(Path(__file__).parent))
 
-from trial_world import BOX, BOX_MASS, SLOW, box_mesh, make_station
+from trial_world import BOX, BOX_MASS, POST, SLOW, box_mesh, make_station
 
 MakeScene = Callable[..., Scene]
 
 
 @pytest.fixture(scope="session")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Box, block, ball, can and bar, and a box that weighs 20 kg; each stands on its origin."""
+    """Box, block, ball, can, bar, post, a box that weighs 20 kg; each stands on its origin."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))
     can = trimesh.creation.cylinder(radius=0.03, height=0.1, sections=64)
@@ -37,6 +37,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ObjectSource(name="ball", mesh=ball, mass=0.1),
         ObjectSource(name="can", mesh=can, mass=0.2),
         ObjectSource(name="bar", mesh=box_mesh((0.03, 0.30, 0.04)), mass=0.2),
+        ObjectSource(name="post", mesh=box_mesh(POST), mass=0.3),
     ]
     out = tmp_path_factory.mktemp("library")
     assert not build_library(sources, out, confirm=False).failed

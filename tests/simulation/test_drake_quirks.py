@@ -198,6 +198,23 @@ def test_tamsi_ignores_servos() -> None:
     assert joint.get_translation_rate(context) == 0.0  # the servo asks for 0.1 m/s
 
 
+def test_servos_of_one_model_alone_end_the_process() -> None:
+    """Fixed: in `station.diagram`, one of the robot's models can be commanded without the other."""
+    builder = RobotDiagramBuilder(time_step=0.001)
+    plant = builder.plant()
+    for name in ("one", "other"):
+        inertia = SpatialInertia.SolidBoxWithMass(1.0, *CUBE)
+        body = plant.AddRigidBody(name, plant.AddModelInstance(name), inertia)
+        add_slider(plant, body)
+    for index in plant.GetJointActuatorIndices():
+        plant.get_joint_actuator(index).set_controller_gains(PdControllerGains(p=0.0, d=100.0))
+    simulator, context = start(builder)
+    one = plant.GetModelInstanceByName("one")
+    plant.get_desired_state_input_port(one).FixValue(context, [0.0, 0.1])
+    with pytest.raises(SystemExit, match="constraint_index"):
+        simulator.AdvanceTo(0.01)
+
+
 def test_collision_checker_fails_on_a_rounding_of_a_quaternion() -> None:
     """Fixed: `motion.collision` need not weld the objects (`weld_objects`). The failed check of
     Drake ends as SystemExit: see the next test."""

@@ -22,6 +22,8 @@ PAD = (0.0175, 0.0185)
 BOX = (0.06, 0.09, 0.08)
 """Size of the box [m]; only its x extent fits between the fingers."""
 BOX_MASS = 0.3
+POST = (0.04, 0.04, 0.42)
+"""Size of the post [m], which reaches up to an arm's forearm."""
 
 SLOW = TrialSettings(lift_height=0.01, lift_time=1.0, hold_time=0.3)
 """Accelerates by at most 0.04 m/s^2, so that weight alone decides."""

@@ -1,0 +1,158 @@
+"""The arm as the hand's carrier: its servos follow the trajectories of a plan."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core.frames import Array
+from burg_drake.simulation.contacts import Contact
+from burg_drake.simulation.course import Course
+from burg_drake.simulation.touches import Touches
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.arm_trial import ArmTrial
+
+SPACING = 0.01
+"""Hand's way between two looks along the rest of the lift [m]."""
+LITTLE = 0.01
+"""Relative difference of loads that does not count."""
+
+
+class ArmCarrier:
+    """Moves the hand with the arm; see `Carrier`.
+
+    Commands change at every step of the simulation, which is what a real arm's controller gets (a
+    Panda's takes one a millisecond). The servos are part of a step, so that they are told what is
+    wanted at its end.
+
+    Args:
+        trial: a trial that has been brought to its start.
+        target: the grasped body.
+        approach: from the pregrasp, or from further back, to the grasp.
+        lift: from there on.
+    """
+
+    def __init__(self, trial: ArmTrial, target: BodyIndex, approach: Course, lift: Course) -> None:
+        diagram = trial.diagram
+        self._trial = trial
+        self._target = target
+        self._step = diagram.engine.time_step
+        self._plant_context = diagram.plant.GetMyMutableContextFromRoot(trial.context)
+        self._port = diagram.diagram.GetInputPort("arm.desired_state")
+        self._approach, self._lift = approach, lift
+        self._loads = _loads(lift.p_WG, trial.look, trial.gravity)
+        self._touches = Touches(trial.diagram, trial.hand.links, target)
+        self._course: Course | None = None
+        self._start = 0
+        self._arrived = False
+        self.approach_looks, self.lift_looks = approach.looks, lift.looks
+        self.approach_steps = approach.steps_a_look
+        self.lift_time = lift.looks * trial.look
+        self.lift_height = float(lift.p_WG[-1, 2] - lift.p_WG[0, 2])
+        self.tracking_error = self.tracking_distance = math.nan
+
+    @property
+    def touched(self) -> str:
+        """The first touch that was not planned."""
+        return self._touches.first
+
+    def approach(self) -> None:
+        """Follows the way to the grasp."""
+        self._follow(self._approach)
+
+    def close(self) -> None:
+        """Closes the hand; the fingers begin where they would touch something first, as nothing
+        happens before, unless something has been moved."""
+        self._arrived = True
+        self._follow(None)
+        trial = self._trial
+        trial.command("hand", trial.hand.closing_command())
+        if not self.touched:
+            X_WG = trial.hand.X_WG(self._plant_context)
+            trial.hand.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
+            trial.simulator.Initialize()
+
+    def lift(self, look: int) -> None:
+        """Follows the way up."""
+        if look == 0:
+            self._follow(self._lift)
+
+    def stop(self) -> None:
+        """Stays where the way up ends."""
+        self._follow(None)
+
+    def advance_to(self, time: float) -> None:
+        """Steps, with a command of its own for each step."""
+        context, simulator = self._trial.context, self._trial.simulator
+        if self._course is None:
+            simulator.AdvanceTo(time)
+            return
+        done, last = self._steps(context.get_time()), self._steps(time)
+        for step in range(done + 1, last + 1):
+            self._port.FixValue(context, self._course.at(step - self._start))
+            simulator.AdvanceTo(step * self._step)
+
+    def watch(self, contacts: list[Contact]) -> str:
+        """Looks at the whole robot's contacts, and at how well it follows its command."""
+        if self._course is not None:
+            self._track(self._course)
+        return self._touches.look(contacts, self._arrived)
+
+    def risen(self) -> float:
+        """Of the grasp frame since the beginning of the lift as it was commanded [m]."""
+        p_WG = self._trial.hand.X_WG(self._plant_context)[:3, 3]
+        return float(p_WG[2] - self._lift.p_WG[0, 2])
+
+    def bears_the_most(self, look: int) -> bool:
+        """Compares what gravity and acceleration of the planned motion have loaded and will."""
+        window = self._loads[max(0, look + 1 - self._trial.settings.steady_polls) : look + 1]
+        ahead = np.append(self._loads[look + 1 :], self._trial.gravity).max()
+        return bool(ahead <= (1.0 + LITTLE) * window.max())
+
+    def is_free_above(self) -> bool:
+        """Looks along the planned motion."""
+        look = self._looks_done(self._lift)
+        p_WG = self._lift.p_WG[look:]
+        gone = np.append(0.0, np.linalg.norm(np.diff(p_WG, axis=0), axis=1).cumsum())
+        marks = np.append(np.arange(SPACING, gone[-1], SPACING), gone[-1])
+        rows = look + np.searchsorted(gone, marks - 1e-9)
+        q = np.array([self._lift.q_at_look(row) for row in rows])
+        positions = self._trial.diagram.plant.GetPositions(self._plant_context)
+        return self._trial.rise(self._target).is_free(positions, q)
+
+    def _follow(self, course: Course | None) -> None:
+        """Follows a course from now on; without one the last command stays."""
+        self._course = course
+        self._start = self._steps(self._trial.context.get_time())
+
+    def _steps(self, time: float) -> int:
+        return round(time / self._step)
+
+    def _looks_done(self, course: Course) -> int:
+        """Looks since the start of the course that is followed."""
+        steps = self._steps(self._trial.context.get_time()) - self._start
+        return steps // course.steps_a_look
+
+    def _track(self, course: Course) -> None:
+        look = self._looks_done(course)
+        q = self._trial.hand.q(self._plant_context)
+        p_WG = self._trial.hand.X_WG(self._plant_context)[:3, 3]
+        error = float(np.abs(q - course.q_at_look(look)).max())
+        distance = float(np.linalg.norm(p_WG - course.p_WG[look]))
+        self.tracking_error = float(np.fmax(self.tracking_error, error))
+        self.tracking_distance = float(np.fmax(self.tracking_distance, distance))
+
+
+def _loads(p_WG: Array, interval: float, gravity: float) -> Array:
+    """(L,) what gravity and the acceleration of the hand load on a target in it, over its mass
+    [m/s^2], in each interval between positions (L + 1, 3)."""
+    velocity = np.diff(p_WG, axis=0) / interval
+    velocity = np.concatenate([np.zeros((1, 3)), velocity, np.zeros((1, 3))])
+    at_ends = np.diff(velocity, axis=0) / interval
+    at_ends[:, 2] += gravity
+    load = np.linalg.norm(at_ends, axis=1)
+    return np.maximum(load[:-1], load[1:])
