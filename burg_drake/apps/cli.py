@@ -20,10 +20,12 @@ from burg_drake.apps import (
     grasps,
     hand,
     library,
+    reach,
     replay,
     report,
     robustness,
     scene,
+    station,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError
@@ -32,7 +34,7 @@ INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
 
-VERBS = (library, scene, grasps, evaluate, robustness, replay, report, hand, frames)
+VERBS = (library, scene, grasps, reach, evaluate, robustness, replay, report, station, hand, frames)
 
 
 def build_parser() -> Parser:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 DEFAULT_OUTPUT = "runs"
 DEFAULT_GRASPS = 100
 """Sampled for each object, unless grasps are given."""
+# Kept in step with evaluation.mode, which imports too much for a help text; a test compares them.
+MODES = ("hand", "reach", "arm")
 
 
 def add_to(verbs: Any) -> None:
@@ -33,10 +35,11 @@ def add_to(verbs: Any) -> None:
         verbs,
         "evaluate",
         run_evaluate,
-        "judge grasps of a scene on a station: clear, reachable, executed",
+        "judge grasps of a scene on a station: clear, reachable, planned, executed",
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
-        "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --no-reach",
+        "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
+        "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "",
@@ -83,7 +86,13 @@ def add_to(verbs: Any) -> None:
         default="csv",
         help="format of the table of results (default: %(default)s)",
     )
-    parser.add_argument("--no-reach", action="store_true", help="do not ask if the arm reaches")
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        help="hand: the hand alone executes grasps in simulation; reach: those that the arm can"
+        " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
+        " there is no arm)",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
@@ -91,7 +100,10 @@ def add_to(verbs: Any) -> None:
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
     from burg_drake.evaluation.cascade import evaluate
+    from burg_drake.evaluation.mode import mode_for
+    from burg_drake.motion.station_check import require_usable_arm
     from burg_drake.scene.scene import load_scene
+    from burg_drake.station.check import require_sound_scene
     from burg_drake.station.station import load_station
 
     require_file(arguments)
@@ -100,6 +112,10 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
     for note in given.notes if given else ():
         print(f"note: {note}")
+    if mode_for(station, arguments.mode) != "hand":
+        require_sound_scene(scene, station)
+        for warning in require_usable_arm(scene, station):
+            print(f"burg-drake: warning: {warning}", file=sys.stderr)
     run = evaluate(
         scene,
         station,
@@ -111,7 +127,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
         workers=arguments.workers,
         table=arguments.table,
-        reach=not arguments.no_reach,
+        mode=arguments.mode,
         progress=not arguments.quiet,
     )
     print_summary(run)
@@ -131,6 +147,7 @@ def print_summary(run: Run) -> None:
     """Prints the tables of a run."""
     from rich.console import Console
 
-    from burg_drake.evaluation.summary import summarize, summary_view
+    from burg_drake.evaluation.summary import summarize
+    from burg_drake.evaluation.summary_tables import summary_view
 
     Console().print(summary_view(summarize(run)))

@@ -16,9 +16,9 @@ SPARE = ("5%", "95%")
 
 UNITS = {
     **dict.fromkeys(("x", "y", "z", "width", "pregrasp_width"), "mm"),
-    **dict.fromkeys(("clearance", "contact_offset", "slide"), "mm"),
+    **dict.fromkeys(("clearance", "arm_clearance", "contact_offset", "slide"), "mm"),
     **dict.fromkeys(("load_margin", "gravity_margin"), "weights"),
-    "antipodal_angle": "deg",
+    **dict.fromkeys(("antipodal_angle", "joint_excess"), "deg"),
     "patch_area": "mm2",
 }
 """What columns of grasps are printed in; others as they are."""

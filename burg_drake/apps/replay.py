@@ -72,7 +72,7 @@ def add_to(verbs: Any) -> None:
 def run_replay(arguments: argparse.Namespace) -> int:
     """Executes a trial once more, recorded; 1 if it ends unlike the record."""
     from burg_drake.apps.live import open_view, present
-    from burg_drake.evaluation.rerun import as_result, comparison, differences
+    from burg_drake.evaluation.rerun import arm_figures, as_result, comparison, differences
     from burg_drake.visualization.replay import describe
 
     path = Path(arguments.results)
@@ -85,13 +85,13 @@ def run_replay(arguments: argparse.Namespace) -> int:
     for note in source.inputs.notes:
         print(f"burg-drake: {note}", file=sys.stderr)
     meshcat = open_view(arguments)
-    verdict, shown = _execute(source, meshcat)
-    lines = describe(as_result(verdict))
+    verdict, shown, who = _execute(source, meshcat)
+    lines = [*describe(as_result(verdict)), *arm_figures(verdict)]
     recorded = source.trial.verdict
     found = [] if recorded is None else differences(recorded, verdict)
     lines += [] if recorded is None else comparison(found, source.origin)
     if shown.outcome is not verdict.outcome:
-        lines += ["shown is the hand alone, to the end:", *describe(shown)]
+        lines += [f"shown is {who}, to the end:", *describe(shown)]
     for line in lines:
         print(line)
     if arguments.html is None and shown.margins.end_time == 0.0:
@@ -101,33 +101,33 @@ def run_replay(arguments: argparse.Namespace) -> int:
     return 0 if all(difference.rounding for difference in found) else 1
 
 
-def _execute(source: Source, meshcat: Any) -> tuple[Verdict, TrialResult]:
-    """The verdict as the row's engine gives it, and the whole trial as shown.
+def _execute(source: Source, meshcat: Any) -> tuple[Verdict, TrialResult, str]:
+    """The verdict as the row's engine gives it, and the whole trial as shown, of what.
 
-    An engine that ends trials early is run twice: as recorded, and to the end for the picture.
+    An engine that ends trials early is run twice: as recorded, and to the end for the picture. So
+    is a trial of the arm, which is shown from its home posture on.
     """
-    from burg_drake.core.outcome import Stage
     from burg_drake.evaluation.judge import trial_verdict
-    from burg_drake.evaluation.rerun import rerun
+    from burg_drake.evaluation.rerun import decisive_mode, rerun
+    from burg_drake.visualization.arm_replay import record_arm_trial
     from burg_drake.visualization.replay import record_trial
 
     trial, origin = source.trial, source.origin
     scene, station = source.inputs.scene, source.inputs.station
-    shown = record_trial(
-        scene,
-        station,
-        trial.instance,
-        trial.X_OG,
-        meshcat,
-        engine=origin.engine,
-        settings=origin.settings(),
-        friction=trial.friction,
-        mass=trial.mass,
-    )
-    decided = None if trial.verdict is None else trial.verdict.stage
-    if origin.engine.whole_trial and decided is not Stage.REACHABLE:
-        return trial_verdict(shown), shown
-    return rerun(scene, station, trial, origin), shown
+    like: dict[str, Any] = {
+        "engine": origin.engine,
+        "settings": origin.settings(),
+        "friction": trial.friction,
+        "mass": trial.mass,
+    }
+    what = (scene, station, trial.instance, trial.X_OG)
+    if decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
+        shown = record_trial(*what, meshcat, **like)
+        return trial_verdict(shown), shown, "the hand alone"
+    verdict, plan = rerun(scene, station, trial, origin)
+    if plan is not None:
+        return verdict, record_arm_trial(*what, plan, meshcat, **like), "the arm from home on"
+    return verdict, record_trial(*what, meshcat, **like), "the hand alone"
 
 
 def _from_run(path: Path, arguments: argparse.Namespace) -> Source:

@@ -111,9 +111,10 @@ def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
         The grasps by name of an instance, for `given_candidates`.
 
     Raises:
+        InvalidInputError: the set does not say which object its grasps are of.
         UnknownNameError: the scene has no such object.
     """
-    return _of_names(grasps, InstanceNames(scene, "the set", {}))
+    return _of_names(grasps, InstanceNames(scene, "the set", {}, is_file=False))
 
 
 def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
@@ -121,7 +122,7 @@ def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     on_instances = INSTANCE in grasps.columns and not names.given
     found = _of_instances(grasps) if on_instances else _of_objects(grasps, names)
     for part in found.values():
-        require_near(part, names.scene.library, names.path)
+        require_near(part, names.scene.library, names.path, is_file=names.is_file)
     return found
 
 

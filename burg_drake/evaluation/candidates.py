@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,6 +32,7 @@ class Candidate:
         X_OG: (4, 4) grasp in the object frame.
         friction: the target's coefficient, in place of the library's.
         mass: of the target, in place of the library's [kg].
+        width: distance of the contacts [m]; NaN if unknown.
     """
 
     id: str
@@ -38,6 +40,7 @@ class Candidate:
     X_OG: Array
     friction: float | None = None
     mass: float | None = None
+    width: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +59,9 @@ class Candidates:
         return len(self.grasps)
 
     def __iter__(self) -> Iterator[Candidate]:
-        for id, instance, X_OG in zip(self.id, self.instance, self.grasps.X_OG, strict=True):
-            yield Candidate(id, str(instance), X_OG)
+        grasps = zip(self.id, self.instance, self.grasps.X_OG, self.grasps.width, strict=True)
+        for id, instance, X_OG, width in grasps:
+            yield Candidate(id, str(instance), X_OG, width=float(width))
 
     @cached_property
     def id(self) -> list[str]:

@@ -1,7 +1,8 @@
 """The main job: judges grasps of a scene on a station, stage by stage, and records it all.
 
-Every grasp goes candidate → clear → reachable → executed and ends with exactly one outcome. What
-is judged is on disk at once; the same call on the same folder goes on where an earlier one stopped.
+Every grasp goes candidate → clear → reachable → planned → executed, as far as the run's mode asks,
+and ends with exactly one outcome. What is judged is on disk at once; the same call on the same
+folder goes on where an earlier one stopped.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG,
 from burg_drake.evaluation.candidates import Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal
-from burg_drake.evaluation.judge import StationJudgeFactory
+from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.progress import Listener, Progress, Reporter
 from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run_document import (
@@ -53,6 +54,7 @@ from burg_drake.evaluation.run_store import (
     save_run,
     write_copies,
 )
+from burg_drake.evaluation.station_judge import StationJudgeFactory
 from burg_drake.evaluation.table_file import require_writer, write_table
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.engine import ENGINES, Engine, engine_preset
@@ -71,7 +73,7 @@ def evaluate(
     seed: int = 0,
     workers: int | None = None,
     table: TableFormat = "csv",
-    reach: bool = True,
+    mode: Mode | None = None,
     progress: bool | Listener = True,
 ) -> Run:
     """Judges grasps and writes a run.
@@ -94,15 +96,18 @@ def evaluate(
         seed: of the sampling.
         workers: number of processes; as many as there are processors if None.
         table: format of the results file.
-        reach: whether to ask if the arm reaches; without an arm in the station it is not asked.
+        mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
+            execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
+            the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
         The complete run. Its `failures` lists grasps that could not be simulated.
 
     Raises:
-        InvalidInputError: bad argument, unsound scene, unwritable folder, or a folder that holds
-            another run or is being written.
+        InvalidInputError: bad argument, unsound scene, a mode that needs an arm where there is
+            none, or one that stands in something, collides in its home posture or does not reach
+            the board, unwritable folder, or a folder that holds another run or is being written.
         UnknownNameError: a reference to something that does not exist.
         MissingDependencyError: Parquet without pyarrow.
         SimulationError: the simulation of the scene cannot be built.
@@ -111,6 +116,7 @@ def evaluate(
         raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)
+    mode = mode_for(station, mode)
     engine = engine if isinstance(engine, Engine) else engine_preset(engine)
     workers = default_workers() if workers is None else workers
     if workers < 1:
@@ -119,9 +125,8 @@ def evaluate(
     folder = Path(out)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
-        _require_sound(scene, station)
+        _require_sound(scene, station, mode)
     writable_folder(folder)
-    reach = reach and station.document.arm is not None
     asked = Grasps(origin="given", count=0, objects={}, content="")
     if grasps is None:
         angle = float(approach_angle_deg)
@@ -134,10 +139,10 @@ def evaluate(
             scene,
             station,
             grasps,
-            _document(folder, scene, station, asked, engine, seed=seed, reach=reach, table=table),
+            _document(folder, scene, station, asked, engine, seed=seed, mode=mode, table=table),
             reporter,
         )
-        make_judge = StationJudgeFactory(scene, station, engine, reach)
+        make_judge = StationJudgeFactory(scene, station, engine, mode)
         run = _judge(run, make_judge, journal, workers, reporter)
         return _finish(run, table)
 
@@ -150,11 +155,11 @@ def _document(
     engine: Engine,
     *,
     seed: int,
-    reach: bool,
+    mode: Mode,
     table: TableFormat,
 ) -> RunDocument:
     """What this call asks for; what comes of the grasps is filled in later."""
-    from burg_drake.motion.reach import ReachSettings
+    from burg_drake.motion.reach_settings import ReachSettings
     from burg_drake.simulation.trial_settings import TrialSettings
 
     instances = [*scene.instances.values(), *scene.background.values()]
@@ -177,8 +182,8 @@ def _document(
         grasps=grasps,
         engine=engine,
         trial=numbers(TrialSettings()),
-        reach=reach,
-        arm=numbers(ReachSettings()) if reach else {},
+        mode=mode,
+        arm={} if mode == "hand" else numbers(ReachSettings()),
         seed=seed,
         table=table,
         versions=software_versions(),
@@ -233,10 +238,13 @@ def _with_grasps(
     )
 
 
-def _require_sound(scene: Scene, station: Station) -> None:
+def _require_sound(scene: Scene, station: Station, mode: Mode) -> None:
+    from burg_drake.motion.station_check import require_usable_arm
     from burg_drake.station.check import require_sound_scene
 
     require_sound_scene(scene, station)
+    if mode != "hand":
+        require_usable_arm(scene, station)
 
 
 def _judge(

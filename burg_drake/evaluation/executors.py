@@ -4,9 +4,9 @@ A grasp that ends its worker (a crash inside Drake) is tried once more, alone, i
 when that dies too, the grasp's outcome is `simulation_failed` and the others go on. So do they when
 a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended.
 
-The first stage is asked about many grasps at once, which costs a fraction of asking about each, and
-only what it passes on is handed out grasp by grasp. When a worker ends while it does so, its grasps
-go through all stages one by one, so that the one to blame is found.
+Screens are asked about many grasps at once, which costs a fraction of asking about each, and only
+what they pass on is handed out grasp by grasp. When a worker ends while it screens, its grasps go
+through what is left one by one, so that the one to blame is found.
 """
 
 from __future__ import annotations
@@ -16,13 +16,11 @@ import subprocess
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
-from typing import TypeVar
+from multiprocessing.connection import wait
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.processes import cause_of_death, default_workers, start_worker
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.processes import default_workers
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import Judge, Screened, Verdict
 from burg_drake.evaluation.worker import (
@@ -36,13 +34,10 @@ from burg_drake.evaluation.worker import (
     Task,
     Unable,
 )
-
-Item = TypeVar("Item")
+from burg_drake.evaluation.worker_process import Grasp, WorkerProcess, start
 
 TASK_SIZE = 4
 """Grasps handed out at a time: few enough that workers finish together."""
-SCREENING_SIZE = 512
-"""Grasps screened at a time: enough that more would hardly be cheaper each."""
 GRASP_TIME_LIMIT = 300.0
 """Wall time for one grasp, or one screening [s]; a trial takes about a second, the slowest ones
 some tens."""
@@ -86,87 +81,22 @@ def judge_all(
     pool.dismiss()
 
 
-@dataclass(eq=False)
-class _Worker:
-    """A process, the pipe to it, and what it is at.
-
-    Attributes:
-        process, connection: the process and our end of the pipe.
-        first: task that is kept for it until it is ready, if any.
-        ready: whether its judge is built.
-        screening: grasps that it screens.
-        task: grasps that it was given and has not judged yet.
-        last_try: whether its task is a grasp that has ended another worker before.
-        stage: the last one that it announced.
-        since: when it began with the first grasp of `task`, or the screening, by
-            `time.monotonic` [s].
-        overdue: whether it was ended because that took too long.
-        last_words: why it is about to end.
-    """
-
-    process: subprocess.Popen[bytes]
-    connection: Connection
-    first: Task | None = None
-    ready: bool = False
-    screening: tuple[Candidate, ...] = ()
-    task: deque[tuple[Candidate, Screened | None]] = field(default_factory=deque)
-    last_try: bool = False
-    stage: Stage = Stage.CLEAR
-    since: float = 0.0
-    overdue: bool = False
-    last_words: str = ""
-
-    @property
-    def busy(self) -> bool:
-        return bool(self.task or self.screening)
-
-    def give(self, work: Task | Screening) -> None:
-        if isinstance(work, Screening):
-            self.screening = work.candidates
-        else:
-            self.task = deque(work.grasps)
-            self.last_try = work.last_try
-        self.since = time.monotonic()
-        self.send(work)
-
-    def judged(self) -> Candidate:
-        """Takes the grasp off the task that a verdict has come for."""
-        self.since, self.overdue = time.monotonic(), False
-        return self.task.popleft()[0]
-
-    def screened(self) -> tuple[Candidate, ...]:
-        """Takes the grasps off that are screened."""
-        candidates, self.screening, self.overdue = self.screening, (), False
-        return candidates
-
-    def end_if_overdue(self) -> None:
-        if time.monotonic() > self.since + GRASP_TIME_LIMIT and not self.connection.poll():
-            self.overdue = True
-            self.process.kill()
-
-    def send(self, message: object) -> None:
-        with contextlib.suppress(OSError):  # it has died; its pipe's end tells the main loop
-            self.connection.send(message)
-
-    def cause_of_death(self) -> str:
-        cause = cause_of_death(self.process, self.last_words)
-        return f"took longer than {GRASP_TIME_LIMIT:g} s" if self.overdue else cause
-
-
 class _Pool:
     """Open work and living workers.
 
     Attributes:
-        unscreened: grasps that nothing was asked about yet.
-        open: grasps to be judged, with the answer of the first stage if that is known.
+        unscreened: grasps that wait for each screen.
+        open: grasps to be judged one by one.
+        batches: how many grasps to screen at a time, by screen.
         workers: by their connection.
     """
 
     def __init__(self, make_judge: Callable[[], Judge], candidates: Sequence[Candidate]) -> None:
         self.make_judge = make_judge
-        self.unscreened = deque(candidates)
-        self.open: deque[tuple[Candidate, Screened | None]] = deque()
-        self.workers: dict[object, _Worker] = {}
+        self.open: deque[Grasp] = deque((candidate, Screened()) for candidate in candidates)
+        self.batches: tuple[int, ...] = ()
+        self.unscreened: list[deque[Grasp]] = []
+        self.workers: dict[object, WorkerProcess] = {}
         self.false_starts = 0
         self.crashes_in_a_row = 0
 
@@ -184,19 +114,30 @@ class _Pool:
                     yield from self.hear(worker, message)
             for worker in self.workers.values():
                 if worker.busy:
-                    worker.end_if_overdue()
+                    worker.end_if_overdue(GRASP_TIME_LIMIT)
                 elif worker.ready and self.has_work:
                     worker.give(self.next_work())
 
     @property
     def has_work(self) -> bool:
-        return bool(self.unscreened or self.open)
+        return bool(self.open) or any(self.unscreened)
+
+    def know(self, batches: tuple[int, ...]) -> None:
+        """Learns of the screens, from the first worker that is ready; all grasps are open then."""
+        if not self.unscreened and batches:
+            self.batches = batches
+            self.unscreened = [self.open, *(deque() for _ in batches[1:])]
+            self.open = deque()
 
     def next_work(self) -> Task | Screening:
-        """Grasps to judge; when there are few of them left, grasps to screen. So the two take
-        turns, and the pace of judging tells how long the rest takes."""
-        if self.unscreened and len(self.open) < TASK_SIZE:
-            return Screening(_take(self.unscreened, SCREENING_SIZE))
+        """Grasps to judge; when there are few of them left, grasps to screen, of which the last
+        screen comes first, unless too few have come to it. So they take turns, and the pace of
+        judging tells how long the rest takes."""
+        if len(self.open) < TASK_SIZE:
+            for k in reversed(range(len(self.batches))):
+                waiting = self.unscreened[k]
+                if len(waiting) >= self.batches[k] or (waiting and not any(self.unscreened[:k])):
+                    return Screening(_take(waiting, self.batches[k]))
         return Task(_take(self.open, TASK_SIZE))
 
     @property
@@ -206,7 +147,7 @@ class _Pool:
         return max(0.0, min(since) + GRASP_TIME_LIMIT - time.monotonic()) if since else None
 
     def hire(self, first: Task | None = None) -> None:
-        worker = _start(self.make_judge, first)
+        worker = start(self.make_judge, first)
         self.workers[worker.connection] = worker
 
     def replace(self) -> None:
@@ -214,7 +155,7 @@ class _Pool:
         if self.has_work:
             self.hire()
 
-    def hear(self, worker: _Worker, message: Message) -> Iterator[tuple[Candidate, Verdict]]:
+    def hear(self, worker: WorkerProcess, message: Message) -> Iterator[tuple[Candidate, Verdict]]:
         match message:
             case Unable(error):
                 raise error
@@ -222,7 +163,8 @@ class _Pool:
                 worker.last_words = reason
             case Begins(stage):
                 worker.stage = stage
-            case Ready():
+            case Ready(batches):
+                self.know(batches)
                 worker.ready = True
                 self.false_starts = 0
                 if worker.first is not None:
@@ -230,26 +172,28 @@ class _Pool:
                     worker.first = None
             case Screens(screened):
                 for candidate, answer in zip(worker.screened(), screened, strict=True):
-                    if answer.decision.outcome is None:
-                        self.open.append((candidate, answer))
-                    else:
+                    if answer.outcome is not None:
                         yield candidate, answer.verdict()
+                        continue
+                    asked = len(answer.decisions)
+                    last = asked == len(self.batches)
+                    (self.open if last else self.unscreened[asked]).append((candidate, answer))
             case Judged(verdict):
                 self.crashes_in_a_row = 0
                 yield worker.judged(), verdict
 
-    def bury(self, worker: _Worker) -> Iterator[tuple[Candidate, Verdict]]:
+    def bury(self, worker: WorkerProcess) -> Iterator[tuple[Candidate, Verdict]]:
         """Deals with the death of a worker: the grasp it was at is suspect, the rest is kept."""
         del self.workers[worker.connection]
         worker.connection.close()
-        reason = worker.cause_of_death()
+        reason = worker.cause_of_death(GRASP_TIME_LIMIT)
         if not worker.ready:
             self.false_starts += 1
             if self.false_starts >= FALSE_STARTS:
                 raise SimulationError(f"cannot build the simulation: {reason}")
             self.hire(worker.first)
             return
-        self.open.extend((candidate, None) for candidate in worker.screening)
+        self.open.extend(worker.screening)
         if not worker.task:
             self.replace()
             return
@@ -288,13 +232,6 @@ class _Pool:
         self.workers.clear()
 
 
-def _take(queue: deque[Item], n: int) -> tuple[Item, ...]:
+def _take(queue: deque[Grasp], n: int) -> tuple[Grasp, ...]:
     """Takes the first n items off, or as many as there are."""
     return tuple(queue.popleft() for _ in range(min(n, len(queue))))
-
-
-def _start(make_judge: Callable[[], Judge], first: Task | None) -> _Worker:
-    process, connection = start_worker("burg_drake.evaluation.worker")
-    worker = _Worker(process, connection, first)
-    worker.send(make_judge)
-    return worker

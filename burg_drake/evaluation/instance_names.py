@@ -18,11 +18,13 @@ class InstanceNames:
         path: the file, for messages.
         given: names of the scene's objects or instances by the file's names; by the empty text for
             whatever the file has.
+        is_file: whether it is a file, of which a user can say what its names mean.
     """
 
     scene: Scene
     path: str
     given: Mapping[str, str]
+    is_file: bool = True
 
     def require_used(self, foreign: Collection[str]) -> None:
         """Refuses names for what the file does not have.
@@ -57,15 +59,16 @@ class InstanceNames:
             return self.called(meant)
         known = {instance.object for instance in self.scene.instances.values()}
         if not foreign:
+            how = "--grasps-object" if self.is_file else "GraspSet.create(..., object=NAME)"
             raise InvalidInputError(
                 f"{self.path} does not say which object its grasps are of; name it"
-                f" (--grasps-object); scene {self.scene.name!r} has {listing(sorted(known))}"
+                f" ({how}); scene {self.scene.name!r} has {listing(sorted(known))}"
             )
         if foreign not in known:
+            how = f"say which one it is (--grasps-object {foreign}=NAME); " if self.is_file else ""
             raise UnknownNameError(
                 f"{self.path} has grasps of object {foreign!r}, which is not in scene"
-                f" {self.scene.name!r}; say which one it is (--grasps-object {foreign}=NAME);"
-                f" {nearest(foreign, known)}"
+                f" {self.scene.name!r}; {how}{nearest(foreign, known)}"
             )
         return self.called(foreign)
 

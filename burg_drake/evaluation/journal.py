@@ -102,6 +102,8 @@ def encode(id: str, verdict: Verdict) -> bytes:
         "reason": verdict.reason,
         "margins": {k: _finite(v) for k, v in verdict.margins.items()},
         "displacements": {k: _finite(v) for k, v in verdict.displacements.items()},
+        "pushed": {k: _finite(v) for k, v in verdict.pushed.items()},
+        "touched": verdict.touched,
         "q_grasp": list(verdict.q_grasp),
         "q_pregrasp": list(verdict.q_pregrasp),
         "cpu": {stage.value: round(seconds, 6) for stage, seconds in verdict.cpu.items()},
@@ -123,6 +125,8 @@ def decode(line: bytes) -> tuple[str, Verdict]:
         reason=record["reason"],
         margins=_numbers(record["margins"]),
         displacements=_numbers(record.get("displacements", {})),  # older journals have none
+        pushed=_numbers(record.get("pushed", {})),
+        touched=record.get("touched", ""),
         q_grasp=tuple(record["q_grasp"]),
         q_pregrasp=tuple(record["q_pregrasp"]),
         cpu={Stage(stage): seconds for stage, seconds in record["cpu"].items()},

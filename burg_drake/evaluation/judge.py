@@ -1,33 +1,43 @@
 """How one grasp is judged: stage by stage, until one of them decides.
 
-A judge is a row of stages; each answers for one grasp with an outcome, or passes it on. The
-stages of a station are in `StationJudge`.
+A judge is a row of stages; each answers for one grasp with an outcome, or passes it on. The first
+ones are screens: they are asked about many grasps at once, which costs a fraction of asking about
+each. The stages of a station are in `station_judge`.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Protocol
-
-import numpy as np
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import Engine
-from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
+    from burg_drake.motion.trajectory import Plan
+    from burg_drake.motion.witness import Witness
     from burg_drake.simulation.result import TrialResult
-    from burg_drake.simulation.trial_settings import TrialSettings
 
+ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess")
+"""Of the arm's screen. `arm_clearance` [m]: if the arm can execute the grasp, a bound that the
+whole robot keeps from all else on its way; if something is in its way, the signed distance from
+that, negative for how deep they overlap. `joint_excess` [rad]: how far the configuration that comes
+closest is beyond a joint limit."""
+ARM_MARGINS = (
+    *ARM_SCREEN_MARGINS,
+    *("duration", "tracking_error", "tracking_distance", "pushed"),
+)
+"""Margins that only stations with an arm have: those of the arm's screen, the `duration` of the
+planned motion [s], and those of `simulation.arm_trial`, see `simulation.result.Margins`."""
 MARGINS = (
     *("overlap", "clearance", "slip", "tilt", "pad_force", "patch_area"),
     *("lift", "others_moved", "end_time"),
+    *ARM_MARGINS,
 )
-"""Margins of a verdict: see `simulation.result.Margins`."""
+"""Margins of a verdict: see `simulation.result.Margins` and `ARM_MARGINS`."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +51,11 @@ class Decision:
         margins: by name of `MARGINS`; what is not measured is left out.
         displacements: peak displacement of every other free object by instance [m]; empty if the
             trial did not start.
+        pushed: displacement of every free object, the target too, before the arm's hand closes, by
+            instance [m].
+        touched: the first body that the arm touched against its plan, and with what.
         q_grasp, q_pregrasp: arm configurations found [rad].
+        motion: the arm's motion, if later stages need it.
     """
 
     outcome: Outcome | None = None
@@ -49,8 +63,11 @@ class Decision:
     reason: str = ""
     margins: Mapping[str, float] = field(default_factory=dict)
     displacements: Mapping[str, float] = field(default_factory=dict)
+    pushed: Mapping[str, float] = field(default_factory=dict)
+    touched: str = ""
     q_grasp: tuple[float, ...] = ()
     q_pregrasp: tuple[float, ...] = ()
+    motion: Witness | Plan | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -60,7 +77,8 @@ class Verdict:
     Attributes:
         outcome: the one outcome.
         stage: the stage that decided; for `simulation_failed` the stage that failed.
-        blocker, reason, margins, displacements, q_grasp, q_pregrasp: as in `Decision`.
+        blocker, reason, margins, displacements, pushed, touched, q_grasp, q_pregrasp: as in
+            `Decision`.
         cpu: CPU time by stage [s].
     """
 
@@ -70,58 +88,97 @@ class Verdict:
     reason: str = ""
     margins: Mapping[str, float] = field(default_factory=dict)
     displacements: Mapping[str, float] = field(default_factory=dict)
+    pushed: Mapping[str, float] = field(default_factory=dict)
+    touched: str = ""
     q_grasp: tuple[float, ...] = ()
     q_pregrasp: tuple[float, ...] = ()
     cpu: Mapping[Stage, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Screened:
-    """The answer of `Stage.CLEAR`.
+class Screen(NamedTuple):
+    """A stage that is asked about many grasps at once; its answers do not depend on the batch.
 
     Attributes:
-        decision: the answer.
-        cpu: CPU time that it took; an equal share, if grasps were screened together [s].
+        stage: its name.
+        ask: gives an answer for each grasp.
+        batch: how many grasps to ask about at a time, so that more would hardly be cheaper each.
     """
 
-    decision: Decision
-    cpu: float
+    stage: Stage
+    ask: Callable[[Sequence[Candidate]], list[Decision]]
+    batch: int
 
-    def verdict(self) -> Verdict:
-        """The verdict, where that decides."""
-        return _verdict([self.decision], Stage.CLEAR, {Stage.CLEAR: self.cpu})
+
+Decide = Callable[[Candidate, "Witness | Plan | None"], Decision]
+"""A stage that is asked about one grasp, with the motion that an earlier stage has found for it."""
 
 
 class Judge(Protocol):
-    """Stages in the order in which a grasp passes them: `Stage.CLEAR`, which is asked about many
-    grasps at once, and those after it; the last one always decides."""
+    """Stages in the order in which a grasp passes them; the last one always decides."""
 
-    def screen(self, grasps: Sequence[Candidate]) -> list[Decision]:
-        """The answers of `Stage.CLEAR`; they do not depend on the batch."""
+    @property
+    def screens(self) -> Sequence[Screen]:
+        """The first stages."""
         ...
 
     @property
-    def stages(self) -> Sequence[tuple[Stage, Callable[[Candidate], Decision]]]:
+    def stages(self) -> Sequence[tuple[Stage, Decide]]:
         """Name and function of each later stage."""
         ...
 
 
-def screen_grasps(judge: Judge, candidates: Sequence[Candidate]) -> list[Screened]:
-    """Asks `Stage.CLEAR` about many grasps at once.
+@dataclass(frozen=True)
+class Screened:
+    """The answers of the first screens of a judge; all but the last one pass the grasp on.
+
+    Attributes:
+        decisions: the answers.
+        cpu: CPU time that they took by stage; an equal share, if grasps were screened together [s].
+    """
+
+    decisions: tuple[Decision, ...] = ()
+    cpu: Mapping[Stage, float] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the grasp ends; None if it is passed on."""
+        return self.decisions[-1].outcome if self.decisions else None
+
+    def verdict(self) -> Verdict:
+        """The verdict, where the last answer decides."""
+        return _verdict(self.decisions, list(self.cpu)[-1], self.cpu)
+
+    def then(self, stage: Stage, decision: Decision, cpu: float) -> Screened:
+        """With one more answer."""
+        return Screened((*self.decisions, decision), {**self.cpu, stage: cpu})
+
+
+def screen_grasps(judge: Judge, grasps: Sequence[tuple[Candidate, Screened]]) -> list[Screened]:
+    """Asks the next screen about many grasps at once.
+
+    Args:
+        judge: the stages.
+        grasps: with the answers of the screens before; the same ones for all grasps.
 
     Returns:
-        Its answers. Where an error comes up, each grasp is asked about alone, and the error is the
+        All answers. Where an error comes up, each grasp is asked about alone, and the error is the
         answer of those that have it.
     """
+    if not grasps:
+        return []
+    screen = judge.screens[len(grasps[0][1].decisions)]
     start = time.process_time()
     try:
-        decisions = judge.screen(candidates)
+        decisions = screen.ask([candidate for candidate, _ in grasps])
     except Exception as error:
-        if len(candidates) > 1:
-            return [screened for c in candidates for screened in screen_grasps(judge, [c])]
+        if len(grasps) > 1:
+            return [screened for grasp in grasps for screened in screen_grasps(judge, [grasp])]
         decisions = [Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))]
-    share = (time.process_time() - start) / max(1, len(candidates))
-    return [Screened(decision, share) for decision in decisions]
+    share = (time.process_time() - start) / len(grasps)
+    return [
+        before.then(screen.stage, decision, share)
+        for (_, before), decision in zip(grasps, decisions, strict=True)
+    ]
 
 
 def judge_grasp(
@@ -136,30 +193,31 @@ def judge_grasp(
         judge: the stages.
         candidate: the grasp.
         announce: called with each stage before it begins.
-        screened: answer of `Stage.CLEAR`, if it is known already.
+        screened: answers of screens that are known already.
 
     Returns:
         The verdict. An error inside a stage ends in `simulation_failed` with its message.
     """
     announce = announce or (lambda stage: None)
-    if screened is None:
-        announce(Stage.CLEAR)
-        (screened,) = screen_grasps(judge, [candidate])
-    if screened.decision.outcome is not None:
-        return screened.verdict()
-    cpu = {Stage.CLEAR: screened.cpu}
-    decisions = [screened.decision]
+    answers = screened or Screened()
+    for screen in judge.screens[len(answers.decisions) :]:
+        if answers.outcome is None:
+            announce(screen.stage)
+            (answers,) = screen_grasps(judge, [(candidate, answers)])
     for stage, decide in judge.stages:
+        if answers.outcome is not None:
+            break
         announce(stage)
+        motion = next((d.motion for d in reversed(answers.decisions) if d.motion), None)
         start = time.process_time()
         try:
-            decisions.append(decide(candidate))
+            decision = decide(candidate, motion)
         except Exception as error:  # whatever Drake throws becomes this one grasp's outcome
-            decisions.append(Decision(Outcome.SIMULATION_FAILED, reason=one_line(error)))
-        cpu[stage] = time.process_time() - start
-        if decisions[-1].outcome is not None:
-            return _verdict(decisions, stage, cpu)
-    raise ValueError("the last stage of a judge has to decide")
+            decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
+        answers = answers.then(stage, decision, time.process_time() - start)
+    if answers.outcome is None:
+        raise ValueError("the last stage of a judge has to decide")
+    return answers.verdict()
 
 
 def one_line(error: BaseException) -> str:
@@ -168,7 +226,7 @@ def one_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
-def _verdict(decisions: list[Decision], stage: Stage, cpu: Mapping[Stage, float]) -> Verdict:
+def _verdict(decisions: Sequence[Decision], stage: Stage, cpu: Mapping[Stage, float]) -> Verdict:
     last = decisions[-1]
     assert last.outcome is not None
     failed = last.outcome is Outcome.SIMULATION_FAILED
@@ -177,108 +235,39 @@ def _verdict(decisions: list[Decision], stage: Stage, cpu: Mapping[Stage, float]
         stage=stage if failed else last.outcome.stage,
         blocker=last.blocker,
         reason=last.reason,
-        margins={k: float(v) for d in decisions for k, v in d.margins.items()},
+        margins=_margins(decisions),
         displacements={k: float(v) for d in decisions for k, v in d.displacements.items()},
+        pushed={k: float(v) for d in decisions for k, v in d.pushed.items()},
+        touched=last.touched,
         q_grasp=next((d.q_grasp for d in decisions if d.q_grasp), ()),
         q_pregrasp=next((d.q_pregrasp for d in decisions if d.q_pregrasp), ()),
         cpu=cpu,
     )
 
 
+def _margins(decisions: Sequence[Decision]) -> dict[str, float]:
+    """The margins of all stages; a later one does not unsay what an earlier one has measured."""
+    found: dict[str, float] = {}
+    for decision in decisions:
+        for name, value in decision.margins.items():
+            if name not in found or not math.isnan(value):
+                found[name] = float(value)
+    return found
+
+
 def trial_decision(result: TrialResult) -> Decision:
-    """The answer of an executed trial."""
+    """The answer of an executed trial, of the hand alone or of the arm."""
     return Decision(
         result.outcome,
         result.blocker,
         result.reason,
         margins=asdict(result.margins),
         displacements=result.displacements,
+        pushed=result.pushed,
+        touched=result.touched,
     )
 
 
 def trial_verdict(result: TrialResult) -> Verdict:
     """The verdict of a trial that went through no other stage."""
     return _verdict([trial_decision(result)], Stage.EXECUTED, {})
-
-
-class StationJudge:
-    """Judges grasps on a station: clearance of the hand, reach of the arm, trial in simulation."""
-
-    def __init__(
-        self,
-        scene: Scene,
-        station: Station,
-        *,
-        engine: Engine,
-        reach: bool,
-        settings: TrialSettings | None = None,
-    ) -> None:
-        """Builds the diagrams that all grasps share.
-
-        Args:
-            scene, station: what to build.
-            engine: how the trial is stepped.
-            reach: ask whether the arm reaches; the station needs an arm then.
-            settings: phases of the trial, if not the usual ones.
-        """
-        from burg_drake.simulation.hand_trial import HandTrial
-        from burg_drake.simulation.trial_settings import TrialSettings
-
-        settings = TrialSettings() if settings is None else settings
-        self._trial = HandTrial(scene, station, engine=engine, settings=settings)
-        self._X_WO = {name: self._trial.diagram.X_WO(name) for name in scene.instances}
-        self.stages: list[tuple[Stage, Callable[[Candidate], Decision]]] = []
-        if reach:
-            from burg_drake.motion.reach import ArmReach
-
-            self._arm = ArmReach(scene, station)
-            self.stages.append((Stage.REACHABLE, self._reach))
-        self.stages.append((Stage.EXECUTED, self._execute))
-
-    def screen(self, grasps: Sequence[Candidate]) -> list[Decision]:
-        """Clearance of the hand at many grasps."""
-        places: dict[str, list[int]] = {}
-        for place, grasp in enumerate(grasps):
-            places.setdefault(grasp.instance, []).append(place)
-        decisions = [Decision()] * len(grasps)
-        for instance, chosen in places.items():
-            # One by one: products of stacked matrices may differ from single ones in the last bit.
-            X_WG = np.array([self._X_WO[instance] @ grasps[k].X_OG for k in chosen])
-            found = self._trial.clearance.check_all(instance, X_WG)
-            for k, clearance in zip(chosen, found, strict=True):
-                margins = {"overlap": clearance.overlap, "clearance": clearance.clearance}
-                decisions[k] = Decision(clearance.outcome, clearance.blocker, margins=margins)
-        return decisions
-
-    def _reach(self, grasp: Candidate) -> Decision:
-        X_WG = self._X_WO[grasp.instance] @ grasp.X_OG
-        found = self._arm.check(X_WG)
-        return Decision(
-            found.outcome,
-            found.blocker,
-            q_grasp=_floats(found.q_grasp),
-            q_pregrasp=_floats(found.q_pregrasp),
-        )
-
-    def _execute(self, grasp: Candidate) -> Decision:
-        result = self._trial.run(
-            grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass
-        )
-        return trial_decision(result)
-
-
-@dataclass(frozen=True)
-class StationJudgeFactory:
-    """What a worker process needs to build its `StationJudge`."""
-
-    scene: Scene
-    station: Station
-    engine: Engine
-    reach: bool
-
-    def __call__(self) -> StationJudge:
-        return StationJudge(self.scene, self.station, engine=self.engine, reach=self.reach)
-
-
-def _floats(q: object) -> tuple[float, ...]:
-    return () if q is None else tuple(float(value) for value in q)  # type: ignore[attr-defined]

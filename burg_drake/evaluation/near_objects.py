@@ -13,13 +13,16 @@ FARTHEST = 0.25
 between the pads; no parallel hand that we know of opens that far."""
 
 
-def require_near(grasps: GraspSet, library: ObjectLibrary, source: str) -> None:
+def require_near(
+    grasps: GraspSet, library: ObjectLibrary, source: str, *, is_file: bool = True
+) -> None:
     """Refuses grasps of an object that are all far from it.
 
     Args:
         grasps: in the frames of their objects; objects that the library lacks do not matter.
         library: has the objects.
         source: where the grasps are from, for the message.
+        is_file: whether that is a file, of which a user can say what its names mean.
 
     Raises:
         InvalidInputError: the nearest grasp of an object is more than `FARTHEST` from it.
@@ -33,5 +36,5 @@ def require_near(grasps: GraspSet, library: ObjectLibrary, source: str) -> None:
             raise InvalidInputError(
                 f"{source}: the nearest grasp of object {name!r} is {nearest:.3g} m away from it;"
                 " lengths have to be metres, and if the grasps are of another object, say which"
-                " (--grasps-object)"
+                + (" (--grasps-object)" if is_file else "")
             )

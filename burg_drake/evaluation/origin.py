@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, nearest
 from burg_drake.core.reader import Reader
 from burg_drake.core.yaml_nodes import parse_nodes
+from burg_drake.evaluation.mode import MODES, Mode
 from burg_drake.station.engine import ENGINES, Engine
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ ORIGIN_TEXT = (
     "scene_content",
     "station",
     "station_content",
+    "mode",
     "engine_settings",
     "trial_settings",
     "versions",
@@ -42,6 +44,7 @@ class Origin:
     Attributes:
         scene, station: where the documents were, or names of built-in ones.
         scene_content, station_content: first digits of their content hashes.
+        mode: what was asked about each grasp.
         engine: how time was stepped.
         trial: settings of the trial's phases; see `simulation.trial_settings.TrialSettings`.
         versions: of the software and the machine.
@@ -53,6 +56,7 @@ class Origin:
     scene_content: str
     station: str
     station_content: str
+    mode: Mode
     engine: Engine
     trial: Mapping[str, float]
     versions: Mapping[str, str]
@@ -77,6 +81,7 @@ class Origin:
             "scene_content": self.scene_content,
             "station": self.station,
             "station_content": self.station_content,
+            "mode": self.mode,
             "engine_settings": pairs_text(settings),
             "trial_settings": pairs_text(self.trial),
             "versions": pairs_text(self.versions),
@@ -99,6 +104,7 @@ def read_origin(row: Mapping[str, Any], where: str) -> Origin:
         scene_content=row["scene_content"],
         station=row["station"],
         station_content=row["station_content"],
+        mode=_mode(row["mode"], where),
         engine=_engine(row["engine"], row["engine_settings"], where),
         trial={name: _number(name, value, where) for name, value in trial.items()},
         versions=_pairs(row["versions"], where),
@@ -116,6 +122,15 @@ def pairs_text(values: Mapping[str, object]) -> str:
     """`name=value` pairs as one text; floats keep every bit."""
     words = {name: str(value).replace(" ", "_") for name, value in values.items()}
     return " ".join(f"{name}={word}" for name, word in words.items())
+
+
+def _mode(text: str, where: str) -> Mode:
+    for mode in MODES:
+        if mode == text:
+            return mode
+    raise InvalidInputError(
+        f"{where}: mode {text!r} is not known to this release; {nearest(text, MODES)}"
+    )
 
 
 def _engine(label: str, settings: str, where: str) -> Engine:

@@ -8,7 +8,7 @@ one, which stands for a limit beyond all that is tried, comes back from a journa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import count, takewhile
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decision, Verdict, trial_decision
+from burg_drake.evaluation.judge import Decide, Decision, Screen, Verdict, trial_decision
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.friction_limit import FrictionSettings, friction_limit
 from burg_drake.simulation.grip import take_grip
@@ -156,7 +156,9 @@ def _probe_id(grasp: str, test: str, key: str, repeat: int | None = None) -> str
 
 
 class ProbeJudge:
-    """Answers probes. The first stage passes all on: what starts in a collision is an answer."""
+    """Answers probes. There are no screens: what starts in a collision is an answer, too."""
+
+    screens: tuple[Screen, ...] = ()
 
     def __init__(self, factory: ProbeJudgeFactory) -> None:
         from burg_drake.simulation.hand_trial import HandTrial
@@ -165,15 +167,9 @@ class ProbeJudge:
         self._trial = HandTrial(
             factory.scene, factory.station, engine=factory.engine, settings=factory.trial
         )
-        self.stages: list[tuple[Stage, Callable[[Candidate], Decision]]] = [
-            (Stage.EXECUTED, self._answer),
-        ]
+        self.stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._answer)]
 
-    def screen(self, grasps: Sequence[Candidate]) -> list[Decision]:
-        """Passes all on."""
-        return [Decision()] * len(grasps)
-
-    def _answer(self, probe: Candidate) -> Decision:
+    def _answer(self, probe: Candidate, motion: object) -> Decision:
         assert isinstance(probe, Probe)
         trial, settings = self._trial, self._settings
         if probe.test == "noise":

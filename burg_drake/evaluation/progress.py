@@ -27,6 +27,7 @@ class Progress:
         before: how many of `done` were judged before the clock was started.
         elapsed: time since then [s].
         outcomes: number of grasps by outcome.
+        good: the outcome that is worth telling.
     """
 
     phase: str
@@ -35,6 +36,7 @@ class Progress:
     before: int = 0
     elapsed: float = 0.0
     outcomes: Counter[Outcome] | None = None
+    good: Outcome = Outcome.LIFTED
 
     @property
     def rate(self) -> float:
@@ -145,6 +147,6 @@ def _found(event: Progress) -> str:
     """What was found so far, in short: a terminal has no room for all outcomes."""
     if not event.outcomes:
         return ""
-    lifted = event.outcomes[Outcome.LIFTED]
     failed = event.outcomes[Outcome.SIMULATION_FAILED]
-    return f"{lifted} lifted" + (f", {failed} failed" if failed else "")
+    found = f"{event.outcomes[event.good]} {event.good}"
+    return found + (f", {failed} failed" if failed else "")

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from burg_drake.core.outcome import Stage
-from burg_drake.evaluation.judge import MARGINS, StationJudge, Verdict, judge_grasp
+from burg_drake.evaluation.judge import ARM_SCREEN_MARGINS, MARGINS, Verdict, judge_grasp
+from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.origin import Origin
 from burg_drake.evaluation.run_document import software_versions
+from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.evaluation.trial import Trial
+from burg_drake.motion.trajectory import Plan
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.result import Margins, TrialResult
 from burg_drake.station.station import Station
@@ -44,21 +47,35 @@ class Difference:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
 
 
-def rerun(scene: Scene, station: Station, trial: Trial, origin: Origin) -> Verdict:
-    """Judges a grasp again as its row tells; the arm is asked if it was the arm that decided.
+def rerun(
+    scene: Scene, station: Station, trial: Trial, origin: Origin
+) -> tuple[Verdict, Plan | None]:
+    """Judges a grasp again as its row tells.
+
+    The arm is asked only where it has decided, or has executed the grasp.
+
+    Returns:
+        The verdict, and the plan that the arm executed, if it did.
 
     Raises:
         InvalidInputError: settings that this release lacks, or an unsound scene.
     """
-    reach = trial.verdict is not None and trial.verdict.stage is Stage.REACHABLE
     judge = StationJudge(
         scene,
         station,
         engine=origin.engine,
-        reach=reach and station.document.arm is not None,
+        mode=mode_for(station, decisive_mode(trial, origin)),
         settings=origin.settings(),
     )
-    return judge_grasp(judge, trial.candidate)
+    verdict = judge_grasp(judge, trial.candidate)
+    return verdict, judge.plan
+
+
+def decisive_mode(trial: Trial, origin: Origin) -> Mode:
+    """The least that has to be asked to come to the same verdict."""
+    stage = None if trial.verdict is None else trial.verdict.stage
+    by_hand = stage is Stage.CLEAR or (origin.mode == "reach" and stage is Stage.EXECUTED)
+    return "hand" if by_hand else origin.mode
 
 
 def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
@@ -66,6 +83,9 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     there, here = _results(recorded), _results(now)
     if "clearance" not in there:  # of a release that did not measure it
         here.pop("clearance", None)
+    for name in ARM_SCREEN_MARGINS:  # the arm may have passed a grasp on, and is not asked again
+        if name not in here:
+            there.pop(name, None)
     found = []
     for name in {**there, **here}:
         empty = "" if isinstance(there.get(name, here.get(name)), str) else math.nan
@@ -97,19 +117,40 @@ def _results(verdict: Verdict) -> dict[str, float | str]:
     if margins.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
         del margins["end_time"]
     moved = {f"moved {name}": value for name, value in verdict.displacements.items()}
-    return {"outcome": verdict.outcome.value, "blocker": verdict.blocker, **margins, **moved}
+    pushed = {f"pushed {name}": value for name, value in verdict.pushed.items()}
+    texts = {"blocker": verdict.blocker, "touched": verdict.touched}
+    return {"outcome": verdict.outcome.value, **texts, **margins, **moved, **pushed}
 
 
 def _bits(value: float | str) -> str:
     return value if isinstance(value, str) else float(value).hex()
 
 
+def arm_figures(verdict: Verdict) -> list[str]:
+    """What the screen of the arm has measured, as lines for people; none if it was not asked."""
+    figures = [
+        f"{name} {verdict.margins[margin] * factor:.{digits}f} {unit}"
+        for name, margin, factor, digits, unit in (
+            ("arm clearance", "arm_clearance", 1e3, 1, "mm"),
+            ("beyond a joint limit by", "joint_excess", 180.0 / math.pi, 1, "deg"),
+            ("planned motion", "duration", 1.0, 2, "s"),
+        )
+        if margin in verdict.margins
+    ]
+    return [", ".join(figures)] if figures else []
+
+
 def as_result(verdict: Verdict) -> TrialResult:
     """A verdict as a trial returns it."""
     return TrialResult(
         outcome=verdict.outcome,
-        margins=Margins(**verdict.margins),
+        margins=Margins(**{k: v for k, v in verdict.margins.items() if k in _OF_TRIALS}),
         blocker=verdict.blocker,
         reason=verdict.reason,
         displacements=verdict.displacements,
+        pushed=verdict.pushed,
+        touched=verdict.touched,
     )
+
+
+_OF_TRIALS = {field.name for field in fields(Margins)}

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.origin import engine_label, pairs_text
 from burg_drake.evaluation.probes import RobustnessSettings
@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 T = TypeVar("T")
+
+OF_HANDS = tuple(o for o in Outcome if o.stage in (Stage.CLEAR, Stage.EXECUTED))
+"""What becomes of a grasp that no arm is asked about."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,7 @@ def robustness_columns(
     columns["success_low"] = _column(rates, lambda r: r.interval[0])
     columns["success_high"] = _column(rates, lambda r: r.interval[1])
     counts = [None if rate is None else rate.outcomes for rate in rates]
-    columns |= {f"n_{outcome}": _counts(counts, itemgetter(outcome)) for outcome in Outcome}
+    columns |= {f"n_{outcome}": _counts(counts, itemgetter(outcome)) for outcome in OF_HANDS}
     columns["failed"] = np.array([" ".join(g.failed) for g in grasps], dtype=np.str_)
     columns["engine"] = np.array([engine_label(engine)] * len(grasps), dtype=np.str_)
     columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)

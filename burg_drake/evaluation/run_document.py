@@ -13,6 +13,7 @@ from burg_drake import __version__
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import PACKAGE_URI, data_root
+from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.origin import Origin, engine_label
 from burg_drake.station.engine import Engine
 
@@ -104,8 +105,8 @@ class RunDocument:
         scene, station, library, grasps: what was judged.
         engine: how trials were stepped.
         trial: settings of the trial's phases.
-        reach: whether the arm was asked.
-        arm: settings of the search for arm configurations.
+        mode: what was asked about each grasp.
+        arm: settings of the search for the arm's motions; none in mode `hand`.
         seed: of the sampling.
         table: format of the results file.
         versions: of the software and the machine.
@@ -121,7 +122,7 @@ class RunDocument:
     grasps: Grasps
     engine: Engine
     trial: dict[str, float] = field(default_factory=dict)
-    reach: bool
+    mode: Mode
     arm: dict[str, float] = field(default_factory=dict)
     seed: int
     table: TableFormat = "csv"
@@ -154,7 +155,7 @@ def identity(document: RunDocument) -> dict[str, str]:
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
         "settings of engine, trial and arm": settings,
-        "reach": "on" if document.reach else "off",
+        "mode": document.mode,
         "grasps": (
             f"{grasps.per_object} an object"
             if sampled
@@ -180,6 +181,7 @@ def origin_of(document: RunDocument) -> Origin:
         station=document.station.path,
         station_content=document.station.content[:HASH_DIGITS],
         engine=document.engine,
+        mode=document.mode,
         trial=document.trial,
         versions=document.versions,
         seed=document.seed,
@@ -194,7 +196,7 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
         InvalidInputError: names every difference.
     """
     old, new = identity(there), identity(here)
-    if old["engine"] != new["engine"] or old["reach"] != new["reach"]:
+    if old["engine"] != new["engine"] or old["mode"] != new["mode"]:
         del old["settings of engine, trial and arm"]  # they differ too, which says nothing more
     topics = [k for k in old if k in new and old[k] != new[k]]
     differences = [f"{k} is {old[k]} there, {new[k]} here" for k in topics]

@@ -132,7 +132,13 @@ class Run:
         """
         candidate = self.candidate(id)
         verdict = self.verdicts.get(id)
-        return Trial(id=id, instance=candidate.instance, X_OG=candidate.X_OG, verdict=verdict)
+        return Trial(
+            id=id,
+            instance=candidate.instance,
+            X_OG=candidate.X_OG,
+            width=candidate.width,
+            verdict=verdict,
+        )
 
     def best(self, count: int = 1) -> list[str]:
         """Ids of the lifted grasps that disturbed least, best first; see `best_rows`."""
@@ -180,7 +186,7 @@ class Run:
     def _joints(self) -> int:
         """Number of the arm's joints, if it was asked."""
         arm = load_document(self.path / STATION_FILE, StationDocument).arm
-        return len(arm.home) if self.document.reach and arm is not None else 0
+        return len(arm.home) if self.document.mode != "hand" and arm is not None else 0
 
     def _library(self, reference: str) -> ObjectLibrary:
         """The library, relative to the run's folder, or where it was then."""

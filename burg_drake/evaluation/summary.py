@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
+from burg_drake.evaluation.trial import PUSHED
 
-if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
-    from rich.segment import Segment
-    from rich.table import Table
+ARM_STAGES = (Stage.REACHABLE.value, Stage.PLANNED.value)
+"""Counts of the funnel that a run without the arm does not have."""
+STAGES: dict[Mode, tuple[Stage, ...]] = {
+    "hand": (Stage.CLEAR, Stage.EXECUTED),
+    "reach": (Stage.CLEAR, Stage.REACHABLE, Stage.EXECUTED),
+    "arm": tuple(Stage),
+}
+"""Stages whose cost is known by mode; that of `reachable` includes the search for motions, that of
+`planned` is their timing."""
+PUSH = 0.001
+"""Objects that the approach moved by more than this were pushed [m]."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +53,18 @@ class Group:
 
     @property
     def reachable(self) -> int:
-        """Those that the arm reaches, too; the same as `clear` where it was not asked."""
+        """Those where the arm can be, too; the same as `clear` where it was not asked."""
         return self.clear - self.decided[Stage.REACHABLE]
+
+    @property
+    def planned(self) -> int:
+        """Those to which the arm can move, too, and from there up; likewise."""
+        return self.reachable - self.decided[Stage.PLANNED]
 
     @property
     def executed(self) -> int:
         """Those whose trial came to an end."""
-        return self.reachable - self.failed[Stage.EXECUTED]
+        return self.planned - self.failed[Stage.EXECUTED]
 
     @property
     def held(self) -> int:
@@ -71,6 +83,7 @@ class Group:
             "candidates": self.judged,
             "clear": self.clear,
             "reachable": self.reachable,
+            "planned": self.planned,
             "executed": self.executed,
             "held": self.held,
             "lifted": self.lifted,
@@ -105,6 +118,34 @@ class StageCost:
 
 
 @dataclass(frozen=True)
+class Pushes:
+    """What the arm moved before the hand closed.
+
+    Attributes:
+        trials: in which the arm went to the grasp.
+        pushed: those in which it moved any free object, the target too, by more than `PUSH`.
+        largest: displacement of any of them [m].
+        target_pushed, target_largest: the same of the target alone.
+    """
+
+    trials: int
+    pushed: int
+    largest: float
+    target_pushed: int
+    target_largest: float
+
+    def __str__(self) -> str:
+        text = f"The approach pushed something by more than {1e3 * PUSH:g} mm"
+        text += f" in {self.pushed} of {self.trials} trials"
+        if self.pushed:
+            text += f" (largest {1e3 * self.largest:.1f} mm)"
+            text += f", the object to be grasped in {self.target_pushed}"
+        if self.target_pushed:
+            text += f" (largest {1e3 * self.target_largest:.1f} mm)"
+        return f"{text}."
+
+
+@dataclass(frozen=True)
 class Summary:
     """A run in numbers.
 
@@ -112,13 +153,20 @@ class Summary:
         objects: by object, in the order of the scene.
         total: all together.
         costs: by stage, sampling first.
-        reach: whether the arm was asked.
+        mode: what was asked about each grasp.
+        pushes: what the arm's approaches pushed; None where no arm executed anything.
     """
 
     objects: tuple[Group, ...]
     total: Group
     costs: tuple[StageCost, ...]
-    reach: bool
+    mode: Mode
+    pushes: Pushes | None = None
+
+    @property
+    def steps(self) -> list[str]:
+        """Names of the funnel's counts that the mode has, first to last."""
+        return [n for n in self.total.funnel if self.mode != "hand" or n not in ARM_STAGES]
 
 
 def summarize(run: Run) -> Summary:
@@ -126,42 +174,37 @@ def summarize(run: Run) -> Summary:
     columns, document = run.results, run.document
     names = document.grasps.objects
     sampling = document.grasps
-    costs = [
-        _stage_cost(columns, stage) for stage in Stage if document.reach or stage != "reachable"
-    ]
+    costs = [_stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
     if sampling.origin == "sampled" and sampling.count:
         costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
     return Summary(
         objects=tuple(_group(columns, name, columns["object"] == name) for name in names),
         total=_group(columns, "all", np.ones(len(columns["id"]), dtype=bool)),
         costs=tuple(costs),
-        reach=document.reach,
+        mode=document.mode,
+        pushes=pushes(columns),
     )
 
 
-@dataclass(frozen=True)
-class SummaryView:
-    """The summary for a terminal of 80 columns or more, as `rich` prints it."""
-
-    summary: Summary
-
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        from rich.measure import Measurement
-
-        matrix = _outcome_matrix(self.summary)
-        wide = Measurement.get(console, options.update(max_width=1000), matrix).maximum
-        fits = wide <= options.max_width
-        outcomes = matrix if fits else _outcome_list(self.summary)
-        yield from _trimmed(console, options, _stage_table(self.summary))
-        yield ""
-        yield from _trimmed(console, options, outcomes)
-        yield ""
-        yield from _trimmed(console, options, _cost_table(self.summary))
-
-
-def summary_view(summary: Summary) -> RenderableType:
-    """Stages, outcomes and CPU time as tables; where objects are too many, outcomes as a list."""
-    return SummaryView(summary)
+def pushes(columns: Columns) -> Pushes | None:
+    """What the arm pushed in the trials of a table; None if it executed nothing."""
+    if "pushed" not in columns:
+        return None
+    went = np.isfinite(columns["pushed"])
+    if not went.any():
+        return None
+    anything, instance = columns["pushed"][went], columns["instance"][went]
+    target = np.zeros(len(anything))
+    for name in np.unique(instance):
+        of = instance == name
+        target[of] = columns[PUSHED + name][went][of]
+    return Pushes(
+        trials=len(anything),
+        pushed=int((anything > PUSH).sum()),
+        largest=float(anything.max()),
+        target_pushed=int((target > PUSH).sum()),
+        target_largest=float(target.max()),
+    )
 
 
 def percent(value: float) -> str:
@@ -196,100 +239,3 @@ def _stage_cost(columns: Columns, stage: Stage) -> StageCost:
     cpu = cpu[np.isfinite(cpu)]
     median = float(np.median(cpu)) if len(cpu) else math.nan
     return StageCost(stage.value, len(cpu), float(cpu.sum()), median)
-
-
-def _trimmed(console: Console, options: ConsoleOptions, table: Table) -> Iterator[Segment]:
-    """The lines of a table without trailing blanks."""
-    from rich.segment import Segment
-
-    for line in console.render_lines(table, options, pad=False):
-        while line and not line[-1].text.strip():
-            line.pop()
-        if line:
-            yield from line[:-1]
-            yield Segment(line[-1].text.rstrip(), line[-1].style)
-        yield Segment.line()
-
-
-def _table(title: str, *, gap: int = 2) -> Table:
-    """An empty table; `gap` characters, at least 1, are between its columns."""
-    from rich import box
-    from rich.table import Table
-
-    return Table(
-        title=title,
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, gap - 1, 0, 0),
-        pad_edge=False,
-    )
-
-
-def _stage_table(summary: Summary) -> Table:
-    table = _table("Grasps that pass each stage", gap=1)  # 17 characters are left for the objects
-    names = [n for n in summary.total.funnel if summary.reach or n != "reachable"]
-    table.add_column("object", overflow="fold")
-    for name in names:
-        table.add_column("grasps" if name == "candidates" else name, justify="right", no_wrap=True)
-    table.add_column("success", justify="right", no_wrap=True)
-    table.add_column("95 % CI", justify="right", no_wrap=True)
-    for group in _rows(summary):
-        if group is summary.total and len(summary.objects) > 1:
-            table.add_section()
-        low, high = group.interval
-        share, interval = "-", "-"
-        if group.executed:
-            share = percent(group.lifted / group.executed)
-            interval = f"{100 * low:.0f}-{100 * high:.0f} %"
-        counts = [str(group.funnel[name]) for name in names]
-        table.add_row(group.name, *counts, share, interval)
-    table.caption = (
-        "held: to the end; lifted: held, and no other object disturbed\n"
-        "success: lifted of executed; CI: Wilson's interval"
-    )
-    table.caption_justify = "left"
-    return table
-
-
-def _outcome_matrix(summary: Summary) -> Table:
-    table = _table("Outcomes")
-    groups = _rows(summary)
-    table.add_column("outcome", no_wrap=True)
-    for group in groups:
-        table.add_column(group.name, justify="right", no_wrap=True)
-    for outcome in _seen(summary):
-        counts = [str(group.outcomes[outcome] or "·") for group in groups]
-        style = "bold" if outcome is Outcome.LIFTED else None
-        table.add_row(outcome.value, *counts, style=style)
-    return table
-
-
-def _outcome_list(summary: Summary) -> Table:
-    table = _table("Outcomes")
-    table.add_column("object", overflow="fold")
-    table.add_column("outcomes")
-    for group in _rows(summary):
-        found = [f"{group.outcomes[o]} {o.value}" for o in _seen(summary) if group.outcomes[o]]
-        table.add_row(group.name, ", ".join(found))
-    return table
-
-
-def _seen(summary: Summary) -> list[Outcome]:
-    return [outcome for outcome in Outcome if summary.total.outcomes[outcome]]
-
-
-def _cost_table(summary: Summary) -> Table:
-    table = _table("CPU time")
-    table.add_column("stage", no_wrap=True)
-    for name in ("grasps", "CPU time", "median", "grasps per CPU second"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for cost in summary.costs:
-        rate = "-" if math.isnan(cost.rate) else rounded(cost.rate)
-        table.add_row(
-            cost.name, str(cost.grasps), duration(cost.seconds), duration(cost.median), rate
-        )
-    return table
-
-
-def _rows(summary: Summary) -> list[Group]:
-    return [*summary.objects, summary.total] if len(summary.objects) > 1 else [summary.total]

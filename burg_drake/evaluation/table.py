@@ -7,17 +7,22 @@
     x, y, z, qw, qx, qy, qz   grasp frame in the object frame [m; quaternion]
     overlap ... end_time      margins, see `simulation.result.Margins` (SI units)
     moved_NAME                peak displacement of each object that was not the target [m]
+    arm_clearance ... pushed  in the modes `reach` and `arm`: see `judge.ARM_MARGINS` (SI units)
+    pushed_NAME, touched      in mode `arm`: displacement of each object before the hand closed [m];
+                              what the arm touched first against its plan
     friction, mass            of the target, where the trial had others than the library's [-; kg]
-    q_grasp_1 ...             arm configuration at the grasp [rad]; stations with an arm only
+    q_grasp_1 ...             arm configuration at the grasp [rad]; not in mode `hand`
     q_pregrasp_1 ...          and at the pregrasp
     seed, engine              of the run; an engine that is no preset is marked
     run                       short hash of all that decides about the results; `hash` in run.yaml
-    cpu_clear, cpu_reach, cpu_trial   CPU time of each stage [s]
+    cpu_clear, cpu_reach, cpu_trial   CPU time of each stage [s]: hand, arm, trial; in mode `arm`
+                              there is cpu_plan, of the motion's timing
 
 and what makes any row, wherever it is copied to, a trial that can be executed again:
 
     scene, station            where the documents were, or names of built-in ones
     scene_content, station_content   their content hashes; objects and robot models count
+    mode                      what was asked, see `mode`
     engine_settings, trial_settings, versions   as name=value pairs
     X_OG                      grasp frame in the object frame: the upper three rows of the matrix,
                               bit for bit, which a quaternion is not
@@ -45,21 +50,24 @@ from numpy.typing import NDArray
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.judge import MARGINS, Verdict
+from burg_drake.evaluation.judge import ARM_MARGINS, ARM_SCREEN_MARGINS, MARGINS, Verdict
+from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.origin import ORIGIN_TEXT, Origin, engine_label
-from burg_drake.evaluation.trial import MOVED, Trial, pose_text
+from burg_drake.evaluation.trial import MOVED, PUSHED, Trial, pose_text
 
 Columns = dict[str, NDArray[Any]]
 
 CPU_COLUMNS = {
     Stage.CLEAR: "cpu_clear",
     Stage.REACHABLE: "cpu_reach",
+    Stage.PLANNED: "cpu_plan",
     Stage.EXECUTED: "cpu_trial",
 }
 GIVEN = "given_"
 """Columns that came with the grasps begin with this."""
 TEXT = (
-    *("id", "instance", "object", "outcome", "stage", "blocker", "reason", "engine", "run"),
+    *("id", "instance", "object", "outcome", "stage", "blocker", "reason", "touched"),
+    *("engine", "run"),
     *ORIGIN_TEXT,
     "X_OG",
 )
@@ -122,8 +130,9 @@ def trial_columns(
         "score": _numbers([t.score for t in trials]),
         **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
         **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        **{name: _numbers([v.margins.get(name) for v in rows]) for name in MARGINS},
+        **{name: _numbers([v.margins.get(name) for v in rows]) for name in _margins(origin.mode)},
         **{MOVED + name: _numbers([v.displacements.get(name) for v in rows]) for name in instances},
+        **(_arm_columns(rows, instances) if origin.mode == "arm" else {}),
         "friction": _numbers([t.friction for t in trials]),
         "mass": _numbers([t.mass for t in trials]),
     }
@@ -135,7 +144,8 @@ def trial_columns(
     columns["engine"] = _same(engine_label(origin.engine), len(rows))
     columns["run"] = _same(origin.run, len(rows))
     for stage, name in CPU_COLUMNS.items():
-        columns[name] = _numbers([v.cpu.get(stage) for v in rows])
+        if stage is not Stage.PLANNED or origin.mode == "arm":
+            columns[name] = _numbers([v.cpu.get(stage) for v in rows])
     for name, text in origin.cells().items():
         columns[name] = _same(text, len(rows))
     columns["X_OG"] = _texts([pose_text(t.X_OG) for t in trials])
@@ -145,6 +155,18 @@ def trial_columns(
 def table_row(columns: Columns, index: int) -> dict[str, Any]:
     """One row as Python values by column."""
     return {name: values[index].item() for name, values in columns.items()}
+
+
+def _margins(mode: Mode) -> list[str]:
+    """The margins that a mode measures."""
+    without = {"hand": ARM_MARGINS, "reach": ARM_MARGINS[len(ARM_SCREEN_MARGINS) :], "arm": ()}
+    return [name for name in MARGINS if name not in without[mode]]
+
+
+def _arm_columns(rows: Sequence[Verdict], instances: Sequence[str]) -> Columns:
+    """What only trials of the whole arm have."""
+    pushed = {PUSHED + name: _numbers([v.pushed.get(name) for v in rows]) for name in instances}
+    return {**pushed, "touched": _texts([v.touched for v in rows])}
 
 
 def _plain(values: NDArray[Any]) -> NDArray[Any]:

@@ -17,7 +17,7 @@ from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
-from burg_drake.evaluation.trial import MOVED
+from burg_drake.evaluation.trial import MOVED, PUSHED
 
 T = TypeVar("T", int, float)
 
@@ -167,7 +167,7 @@ def _typed(name: str, values: Sequence[Any]) -> NDArray[Any]:
             ]
         )
     except ValueError:
-        if name in (*MARGINS, "friction", "mass") or name.startswith(MOVED):
+        if name in (*MARGINS, "friction", "mass") or name.startswith((MOVED, PUSHED)):
             raise
         return np.array(texts, dtype=np.str_)
 

@@ -21,6 +21,8 @@ Name = TypeVar("Name", bound=StrEnum)
 
 MOVED = "moved_"
 """Columns of displacements begin with this; the instance's name follows."""
+PUSHED = "pushed_"
+"""Likewise of those before the arm's hand closes."""
 NEEDED = ("id", "instance", "outcome", "stage", "X_OG", "engine", *ORIGIN_TEXT)
 """Columns without which a row cannot be executed again."""
 
@@ -54,7 +56,9 @@ class Trial:
     @property
     def candidate(self) -> Candidate:
         """What a judge has to know."""
-        return Candidate(self.id, self.instance, self.X_OG, self.friction, self.mass)
+        return Candidate(
+            self.id, self.instance, self.X_OG, self.friction, self.mass, width=self.width
+        )
 
 
 def pose_text(X_OG: Array) -> str:
@@ -105,20 +109,22 @@ def read_trial(row: Mapping[str, Any], where: str) -> Trial:
         )
     outcome = _member(Outcome, row["outcome"], f"{where}: outcome")
     stage = _member(Stage, row["stage"], f"{where}: stage")
-    moved = {name.removeprefix(MOVED): v for name, v in row.items() if name.startswith(MOVED)}
     verdict = Verdict(
         outcome,
         stage,
         blocker=row.get("blocker", ""),
         reason=row.get("reason", ""),
         margins={name: row[name] for name in MARGINS if name in row},
-        displacements={name: v for name, v in moved.items() if math.isfinite(v)},
+        displacements=_by_instance(row, MOVED),
+        pushed=_by_instance(row, PUSHED),
+        touched=row.get("touched", ""),
     )
     return Trial(
         id=row["id"],
         instance=row["instance"],
         object=row.get("object", ""),
         X_OG=pose_from_text(row["X_OG"], where),
+        width=float(row.get("width", math.nan)),
         friction=_given(row, "friction"),
         mass=_given(row, "mass"),
         verdict=verdict,
@@ -132,6 +138,12 @@ def _member(kind: type[Name], text: str, where: str) -> Name:
             f"{where} {text!r} is not known to this release; {nearest(text, known)}"
         )
     return kind(text)
+
+
+def _by_instance(row: Mapping[str, Any], prefix: str) -> dict[str, float]:
+    """The finite cells of columns that begin with `prefix`, by what follows."""
+    cells = {k.removeprefix(prefix): float(v) for k, v in row.items() if k.startswith(prefix)}
+    return {name: value for name, value in cells.items() if math.isfinite(value)}
 
 
 def _given(row: Mapping[str, Any], name: str) -> float | None:

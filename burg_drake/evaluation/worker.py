@@ -23,32 +23,37 @@ from burg_drake.evaluation.judge import (
 
 @dataclass(frozen=True)
 class Screening:
-    """Work for a worker: the first stage of many grasps.
+    """Work for a worker: the next screen of many grasps.
 
     Attributes:
-        candidates: the grasps.
+        grasps: with the answers of the screens before, the same ones for all.
     """
 
-    candidates: tuple[Candidate, ...]
+    grasps: tuple[tuple[Candidate, Screened], ...]
 
 
 @dataclass(frozen=True)
 class Task:
-    """Work for a worker: all stages of a few grasps, or those after the first.
+    """Work for a worker: all that is left to ask about a few grasps.
 
     Attributes:
-        grasps: to be judged in this order; each with the answer of the first stage, or None where
-            that has not been asked.
+        grasps: to be judged in this order; each with the answers of screens that are known.
         last_try: of a single grasp that has ended another worker before.
     """
 
-    grasps: tuple[tuple[Candidate, Screened | None], ...]
+    grasps: tuple[tuple[Candidate, Screened], ...]
     last_try: bool = False
 
 
 @dataclass(frozen=True)
 class Ready:
-    """The judge is built."""
+    """The judge is built.
+
+    Attributes:
+        batches: how many grasps to screen at a time, by screen.
+    """
+
+    batches: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class Screens:
     """A screening is done.
 
     Attributes:
-        screened: the answers, in the order of the grasps.
+        screened: all answers so far, in the order of the grasps.
     """
 
     screened: tuple[Screened, ...]
@@ -122,10 +127,10 @@ def _serve(connection: Connection) -> None:
     except Exception as error:
         connection.send(Unable(SimulationError(f"cannot build the simulation: {one_line(error)}")))
         return
-    connection.send(Ready())
+    connection.send(Ready(tuple(screen.batch for screen in judge.screens)))
     while (work := connection.recv()) is not None:
         if isinstance(work, Screening):
-            connection.send(Screens(tuple(screen_grasps(judge, work.candidates))))
+            connection.send(Screens(tuple(screen_grasps(judge, work.grasps))))
             continue
         for candidate, screened in work.grasps:
             verdict = judge_grasp(judge, candidate, lambda s: connection.send(Begins(s)), screened)

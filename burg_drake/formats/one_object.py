@@ -10,7 +10,7 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import UNTRIED, Outcome
 from burg_drake.formats.grasp_format import Gripper
 
 SUCCESS_COLUMN = "object_in_gripper"
@@ -80,7 +80,8 @@ def success_of(grasps: GraspSet) -> Array:
         return grasps.columns[SUCCESS_COLUMN].astype(float)
     if "outcome" in grasps.columns:
         outcome = grasps.columns["outcome"]
-        return np.where(outcome == "", np.nan, (outcome == Outcome.LIFTED.value).astype(float))
+        lifted = (outcome == Outcome.LIFTED.value).astype(float)
+        return np.where(np.isin(outcome, UNTRIED), np.nan, lifted)
     if np.isin(grasps.score[~np.isnan(grasps.score)], (0.0, 1.0)).all():
         return grasps.score.copy()
     return np.full(len(grasps), np.nan)

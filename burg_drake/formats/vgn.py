@@ -39,7 +39,7 @@ from burg_drake.core.frames import (
     rotation_from_quaternion,
 )
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import UNTRIED, Outcome
 from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
 
@@ -200,7 +200,8 @@ def _labels(grasps: GraspSet) -> list[Any] | None:
     if "label" in grasps.columns:
         return [_label(value) for value in grasps.columns["label"].tolist()]
     if "outcome" in grasps.columns:
-        return [int(text == Outcome.LIFTED) if text else "" for text in grasps.columns["outcome"]]
+        outcomes = grasps.columns["outcome"].tolist()
+        return ["" if text in UNTRIED else int(text == Outcome.LIFTED) for text in outcomes]
     return None
 
 

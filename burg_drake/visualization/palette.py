@@ -46,7 +46,22 @@ GROUPS = (
         (0.80, 0.47, 0.65, 1.0),
         (Outcome.NO_CONTACT, Outcome.ONE_FINGER, Outcome.CLOSED_EMPTY),
     ),
-    Group("arm cannot reach", (0.0, 0.45, 0.70, 0.6), (Outcome.NO_IK, Outcome.ARM_COLLISION)),
+    Group("reachable, not tried", (0.60, 0.87, 0.62, 1.0), (Outcome.REACHABLE,)),
+    Group(
+        "arm has no way",
+        (0.10, 0.20, 0.45, 0.6),
+        (Outcome.APPROACH_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH),
+    ),
+    Group(
+        "arm cannot reach",
+        (0.0, 0.45, 0.70, 0.6),
+        (Outcome.NO_IK, Outcome.JOINT_LIMIT, Outcome.ARM_COLLISION),
+    ),
+    Group(
+        "hand collides on its way",
+        (0.55, 0.32, 0.15, 0.5),
+        (Outcome.HAND_COLLISION_APPROACH, Outcome.HAND_COLLISION_LIFT),
+    ),
     Group(
         "hand collides",
         (0.45, 0.45, 0.45, 0.4),

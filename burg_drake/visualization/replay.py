@@ -77,12 +77,17 @@ def record_trial(
     result = trial.run(instance, X_OG, friction=friction, mass=mass)
     meshcat.StopRecording()
     if result.margins.end_time > 0.0:
-        recording = meshcat.get_mutable_recording()
-        recording.set_autoplay(True)
-        recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-        recording.set_repetitions(LOOPS)
-        meshcat.PublishRecording()
+        play_in_a_loop(meshcat)
     return result
+
+
+def play_in_a_loop(meshcat: Meshcat) -> None:
+    """Publishes what was recorded."""
+    recording = meshcat.get_mutable_recording()
+    recording.set_autoplay(True)
+    recording.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
+    recording.set_repetitions(LOOPS)
+    meshcat.PublishRecording()
 
 
 def aim_at_grasp(meshcat: Meshcat, X_WG: Array, p_WB: Array, lift_height: float) -> None:
@@ -142,12 +147,15 @@ def describe(result: TrialResult) -> list[str]:
             ("pad force", margins.pad_force, 1.0, 1, "N"),
             ("patch", margins.patch_area, 1e6, 0, "mm²"),
             ("others moved", margins.others_moved, 1e3, 1, "mm"),
+            ("pushed before closing", margins.pushed, 1e3, 1, "mm"),
+            ("tracking error", margins.tracking_error, 1e3, 1, "mrad"),
         )
         if math.isfinite(value)
     ]
     moved = sorted(result.displacements.items(), key=lambda item: -item[1])
     pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]
     lines += [", ".join(figures)] if figures else []
+    lines += [f"touched against the plan: {result.touched}"] if result.touched else []
     return lines + ([f"moved {', '.join(pushed)}"] if pushed else [])
 
 

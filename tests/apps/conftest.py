@@ -57,6 +57,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         folder,
         grasps={"box": grasps},
         workers=1,
-        reach=False,
+        mode="hand",
         progress=False,
     )

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from burg_drake import __version__
-from burg_drake.apps import cli
+from burg_drake.apps import cli, evaluate
 from burg_drake.apps.arguments import (
     DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
@@ -20,6 +20,7 @@ from burg_drake.apps.arguments import (
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import builtin_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.evaluation.mode import MODES
 from burg_drake.station.engine import ENGINES
 
 GROUPS = (["library"], ["scene"], ["grasps"], ["hand"])
@@ -31,7 +32,7 @@ HELP = (
     *(["scene", v] for v in ("show", "validate", "settle", "import-burg")),
     *(["grasps", v] for v in ("sample", "score", "show", "convert", "stats")),
     *(["hand", v] for v in ("list", "check")),
-    *([v] for v in ("evaluate", "robustness", "replay", "report", "frames")),
+    *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
 )
 
 
@@ -208,6 +209,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 def test_defaults_are_those_of_the_library() -> None:
     assert set(ENGINE_NAMES) == set(ENGINES)
+    assert evaluate.MODES == MODES
     assert DEFAULT_ENGINE in ENGINES
     assert DEFAULT_STATION in builtin_names("stations")
     assert DEFAULT_APPROACH_ANGLE == DEFAULT_APPROACH_ANGLE_DEG

@@ -46,7 +46,7 @@ def test_a_network_s_grasps_seen_by_a_camera(tmp_path: Path, capsys: Capture) ->
     rows[:, 16] = -1
     np.save(tmp_path / "0000.npy", rows)
     file, camera = str(tmp_path / "0000.npy"), str(tmp_path / "camera.yaml")
-    results = judged(tmp_path, "--grasps", file, "--camera-pose", camera, "--no-reach")
+    results = judged(tmp_path, "--grasps", file, "--camera-pose", camera, "--mode", "hand")
     assert results["instance"].tolist() == ["box", "box"]
     assert results["outcome"].tolist() == OUTCOMES
     np.testing.assert_allclose(results["score"], [0.9, 0.4], rtol=1e-6)
@@ -91,7 +91,7 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
     path = tmp_path / "grasps.h5"
     hand = {"hand": {"name": "wsg_50"}}
     GraspSet.create(X_OG, object="box", provenance=hand).save(path)
-    judged(tmp_path, "--grasps", str(path), "--no-reach")
+    judged(tmp_path, "--grasps", str(path), "--mode", "hand")
     note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
     assert capsys.readouterr().out.startswith(note)
 

@@ -125,7 +125,7 @@ def test_columns_of_a_run_by_the_names_of_its_table(tmp_path: Path, capsys: Capt
     given = GraspSet.create(X_OG, object="mug", columns={"maker": ["me"], "outcome": ["slipped"]})
     given.save(tmp_path / "given.h5")
     folder = str(tmp_path / "run")
-    options = ["--no-reach", "--workers", "1", "--quiet", "-o", folder]
+    options = ["--mode", "hand", "--workers", "1", "--quiet", "-o", folder]
     file = str(tmp_path / "given.h5")
     assert main(["evaluate", "tabletop_six", "--grasps", file, *options]) == 0
     capsys.readouterr()

@@ -58,7 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         grasps={"box": GraspSet.create(grasps, object="box", width=0.06)},
         engine=ENGINE,
         workers=1,
-        reach=False,
+        mode="hand",
         progress=False,
     )
 
@@ -186,6 +186,28 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
     assert out[0] == result.outcome.value.replace("_", " ") and "as recorded" in out
     rewrite(tmp_path / "slippery.csv", friction="", mass="")
     assert replay(tmp_path / "slippery.csv") == 1
+
+
+def test_a_row_of_an_arm_trial_is_replayed_with_the_arm(tmp_path: Path, capsys: Capture) -> None:
+    above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+    run = evaluate(
+        "tabletop_six",
+        "panda_tabletop",
+        tmp_path / "run",
+        grasps={"box": GraspSet.create(above, object="box", width=0.06)},
+        engine="screening",
+        mode="arm",
+        workers=1,
+        progress=False,
+    )
+    table, page = tmp_path / "row.csv", tmp_path / "page.html"
+    shutil.copy(run.table_path, table)
+    assert replay(table, "--html", str(page)) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("lifted\n") and "\nas recorded\n" in out
+    duration = run.results["duration"][0]
+    assert "tracking error" in out and f"planned motion {duration:.2f} s" in out
+    assert page.exists()
 
 
 def test_what_is_no_table_is_said(tmp_path: Path, capsys: Capture) -> None:

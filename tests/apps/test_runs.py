@@ -30,18 +30,15 @@ def test_the_run_has_the_outcomes_that_its_grasps_must_have(run: Run) -> None:
 def test_evaluate_given_grasps(tmp_path: Path, capsys: Capture) -> None:
     above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.3))
     GraspSet.create(above, object="box").save(tmp_path / "grasps.npz")
-    arguments = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--no-reach"]
+    arguments = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
     arguments += ["--grasps", str(tmp_path / "grasps.npz"), "--engine", "screening", "--quiet"]
     assert main([*arguments, "--workers", "1", "--seed", "3"]) == 0
     out = capsys.readouterr().out
     assert f"table   {tmp_path / 'run' / 'results.csv'}" in out
     assert "no_contact" in out
     run = load_run(tmp_path / "run")
-    assert (run.document.engine.name, run.document.seed, run.document.reach) == (
-        "screening",
-        3,
-        False,
-    )
+    asked = (run.document.engine.name, run.document.seed, run.document.mode)
+    assert asked == ("screening", 3, "hand")
     assert main([*arguments, "--workers", "1", "--seed", "4"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "holds another run (seed is 3 there, 4 here)" in line
@@ -66,6 +63,8 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
         (["--approach-angle", "steep"], "'steep' is not a finite number"),
         (["--seed", "-1"], "'-1' is not a whole number from 0"),
         (["--workers", "0"], "'0' is not a whole number from 1"),
+        (["--mode", "leg"], "invalid choice: 'leg'"),
+        (["--station", "wsg_tabletop", "--mode", "arm"], "mode 'arm' needs an arm, which station"),
         (["--engine", "fast"], "invalid choice: 'fast'"),
         (["--station", "nowhere"], "nowhere does not exist"),
         (["--grasps", "nowhere.npz"], "nowhere.npz does not exist"),

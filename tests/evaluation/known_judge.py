@@ -11,13 +11,14 @@ import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decision
+from burg_drake.evaluation.judge import Decide, Decision, Screen
 
 
 def number(id: str) -> int:
@@ -37,22 +38,33 @@ def expected(id: str) -> Outcome:
     return Outcome.LIFTED if n < 90 else Outcome.LIFTED_DISTURBED
 
 
+def _all(one: Callable[[Candidate], Decision], grasps: Sequence[Candidate]) -> list[Decision]:
+    return [one(grasp) for grasp in grasps]
+
+
 @dataclass(frozen=True)
 class KnownJudge:
-    """Judges by `expected`; writes a line to `log` for each grasp it is asked about."""
+    """Judges by `expected`; writes a line to `log` for each grasp it is asked about.
+
+    Attributes:
+        batches: grasps that are screened at a time, by screen.
+    """
 
     log: Path | None = None
     pause: float = 0.0
+    batches: tuple[int, int] = (512, 16)
 
     @property
-    def stages(self) -> Sequence[tuple[Stage, Callable[[Candidate], Decision]]]:
-        return (
-            (Stage.REACHABLE, self.reach),
-            (Stage.EXECUTED, self.execute),
-        )
+    def screens(self) -> Sequence[Screen]:
+        asked = ((Stage.CLEAR, self.clear), (Stage.REACHABLE, self.reach))
+        return [
+            Screen(stage, partial(_all, one), batch)
+            for (stage, one), batch in zip(asked, self.batches, strict=True)
+        ]
 
-    def screen(self, grasps: Sequence[Candidate]) -> list[Decision]:
-        return [self.clear(grasp) for grasp in grasps]
+    @property
+    def stages(self) -> Sequence[tuple[Stage, Decide]]:
+        return ((Stage.EXECUTED, lambda grasp, motion: self.execute(grasp)),)
 
     def clear(self, grasp: Candidate) -> Decision:
         time.sleep(self.pause)
@@ -87,7 +99,7 @@ class CrashingJudge(KnownJudge):
     Attributes:
         how: by grasp id: `segfault`, `exit`, `error`, `hang`, or `once`, which crashes only as long
             as the file `log` does not exist; `screen` and `screen_error` are `segfault` and `error`
-            in the stage `clear`.
+            in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -117,6 +129,11 @@ class CrashingJudge(KnownJudge):
         return Decision()
 
     def reach(self, grasp: Candidate) -> Decision:
+        match dict(self.how).get(grasp.id):
+            case "reach":
+                os.kill(os.getpid(), signal.SIGSEGV)
+            case "reach_error":
+                raise RuntimeError("no joint")
         return Decision()
 
 
@@ -162,3 +179,5 @@ def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause:
     judge = Make(KnownJudge(log, pause))
     setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     setattr("burg_drake.evaluation.cascade._require_sound", lambda *_: None)
+    # the chart of the arm's reach takes longer than all else
+    setattr("burg_drake.evaluation.report.page.reachability_section", lambda *_: None)

@@ -163,8 +163,8 @@ def test_another_run_is_not_mixed_in(
     with pytest.raises(InvalidInputError) as error:
         evaluate(scene, station, run, grasps_per_object=5, approach_angle_deg=90, progress=False)
     assert "(approach angle is 75.0 degrees there, 90.0 degrees here)" in str(error.value)
-    with pytest.raises(InvalidInputError, match="reach is on there, off here"):
-        evaluate(scene, station, run, grasps_per_object=5, reach=False, progress=False)
+    with pytest.raises(InvalidInputError, match="mode is reach there, hand here"):
+        evaluate(scene, station, run, grasps_per_object=5, mode="hand", progress=False)
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
     with pytest.raises(InvalidInputError, match="5 an object there, given, content") as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
@@ -312,9 +312,9 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
 def test_judges_are_pickled_with_all_they_need(scene: Scene, station: Station) -> None:
     import pickle
 
-    from burg_drake.evaluation.judge import StationJudgeFactory
+    from burg_drake.evaluation.station_judge import StationJudgeFactory
     from burg_drake.station.engine import ENGINES
 
-    factory = StationJudgeFactory(scene, station, ENGINES["standard"], True)
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "reach")
     assert pickle.loads(pickle.dumps(factory)).scene.content == scene.content
     assert pickle.loads(pickle.dumps(Make(KnownJudge()))) == Make(KnownJudge())

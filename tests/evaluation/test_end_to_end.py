@@ -171,7 +171,7 @@ def test_friction_decides_as_statics_says(tmp_path: Path, factor: float, outcome
         tmp_path / "run",
         grasps={"box": GraspSet.create(on_the_box(BOX[2] - 0.025), object="box")},
         workers=1,
-        reach=False,
+        mode="hand",
         progress=False,
     )
     assert run.results["outcome"].tolist() == [outcome]

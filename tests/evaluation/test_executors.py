@@ -29,7 +29,8 @@ def test_every_grasp_is_judged_once(workers: int) -> None:
     for candidate, verdict in judged:
         assert verdict.outcome is expected(candidate.id)
         assert verdict.stage is verdict.outcome.stage
-        assert set(verdict.cpu) == set(list(Stage)[: list(Stage).index(verdict.stage) + 1])
+        stages = [Stage.CLEAR, Stage.REACHABLE, Stage.EXECUTED]
+        assert list(verdict.cpu) == stages[: stages.index(verdict.stage) + 1]
 
 
 def test_no_grasps_need_no_workers() -> None:
@@ -51,26 +52,35 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
 
 
 def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
-    how = {"cube-0003": "screen", "cube-0012": "screen_error"}
-    make = Make(CrashingJudge(how=tuple(how.items())))
-    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
-    failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
-    assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
-        "cube-0003": (Stage.CLEAR, "the worker process was ended by SIGSEGV"),
-        "cube-0012": (Stage.CLEAR, "RuntimeError: not a pose"),
+    died = "the worker process was ended by SIGSEGV"
+    expect = {
+        "cube-0003": ("screen", Stage.CLEAR, died),
+        "cube-0012": ("screen_error", Stage.CLEAR, "RuntimeError: not a pose"),
+        "cube-0015": ("reach", Stage.REACHABLE, died),
+        "cube-0016": ("reach_error", Stage.REACHABLE, "RuntimeError: no joint"),
     }
-    others = {c.id: expected(c.id) for c in grasps(20) if c.id not in how}
-    assert {id: v.outcome for id, v in judged.items() if id not in how} == others
+    for crashing in (("cube-0003", "cube-0012"), ("cube-0015", "cube-0016"), tuple(expect)):
+        how = tuple((id, expect[id][0]) for id in crashing)
+        make = Make(CrashingJudge(how=how, batches=(20, 7)))
+        judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
+        failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
+        assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
+            id: expect[id][1:] for id in crashing
+        }
+        others = {c.id: expected(c.id) for c in grasps(20) if c.id not in crashing}
+        assert {id: v.outcome for id, v in judged.items() if id not in crashing} == others
 
 
-def test_grasps_are_screened_together_and_once(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.executors.SCREENING_SIZE", 7)
+def test_grasps_are_screened_together_and_once(tmp_path) -> None:
     asked = tmp_path / "asked"
-    judged = {c.id: v for c, v in judge_all(grasps(30), Make(KnownJudge(asked)), workers=2)}
+    make = Make(KnownJudge(asked, batches=(7, 5)))
+    judged = {c.id: v for c, v in judge_all(grasps(30), make, workers=2)}
     assert sorted(asked.read_text().split()) == [c.id for c in grasps(30)]
     assert {id: v.outcome for id, v in judged.items()} == {c.id: expected(c.id) for c in grasps(30)}
     shares = {v.cpu[Stage.CLEAR] for v in judged.values()}
     assert len(shares) <= 5  # one for each of the screenings: 7, 7, 7, 7 and 2 grasps
+    passed = [v.cpu[Stage.REACHABLE] for v in judged.values() if Stage.REACHABLE in v.cpu]
+    assert 10 < len(passed) < 30 and len(set(passed)) < len(passed)
 
 
 def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:

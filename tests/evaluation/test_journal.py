@@ -17,6 +17,8 @@ LIFTED = Verdict(
     Stage.EXECUTED,
     margins={"slip": 0.1 + 0.2, "tilt": 1e-300, "pad_force": math.nan},
     displacements={"mug": 1 / 3, "bowl.2": 0.0},
+    pushed={"mug": 1 / 7},
+    touched="panda_link5 vs bowl.2",
     q_grasp=(0.1, -2.0 / 3.0),
     q_pregrasp=(1.0, math.pi),
     cpu={Stage.CLEAR: 0.0002, Stage.REACHABLE: 0.01, Stage.EXECUTED: 0.25},

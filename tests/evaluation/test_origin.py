@@ -27,6 +27,7 @@ def origin(engine: Engine) -> Origin:
         scene_content="0123456789ab",
         station="panda_tabletop",
         station_content="ba9876543210",
+        mode="arm",
         engine=engine,
         trial={"lift_height": 0.1 + 0.2, "disturbance": 1e-7},
         versions={"drake": "1.51.1", "platform": "Linux-6.1-x86_64"},

@@ -84,6 +84,7 @@ def test_the_command_is_the_one_that_was_run(run: Run) -> None:
     words = html.unescape(re.sub(r"<[^>]+>", "", code)).split()
     assert words == [
         *("burg-drake", "evaluate", run.document.scene.path, "--station", "panda_tabletop"),
+        *("--mode", "reach"),
         *("--grasps-per-object", "30", "--approach-angle", "75.0"),
         *("--engine", "standard", "--seed", "0"),
         *("-o", str(run.path)),

@@ -27,6 +27,7 @@ ORIGIN = Origin(
     scene_content="0",
     station="t",
     station_content="1",
+    mode="reach",
     engine=ENGINES["standard"],
     trial={},
     versions=software_versions(),

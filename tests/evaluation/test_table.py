@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,8 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.origin import Origin
+from burg_drake.evaluation.mode import MODES
+from burg_drake.evaluation.origin import Origin, read_origin
 from burg_drake.evaluation.table import Columns, make_columns, table_row, trial_columns
 from burg_drake.evaluation.table_file import (
     METADATA_KEY,
@@ -34,6 +36,7 @@ ORIGIN = Origin(
     scene_content="0123456789ab",
     station="panda_tabletop",
     station_content="ba9876543210",
+    mode="reach",
     engine=ENGINES["standard"],
     trial={"lift_height": 0.1 + 0.2},
     versions={"drake": "1.51.1"},
@@ -97,6 +100,43 @@ def test_a_row_gives_back_its_trial_bit_for_bit(tmp_path: Path, suffix: str) -> 
     assert trial.verdict is not None
     assert trial.verdict.margins["patch_area"] == 1e-4 / 3
     assert trial.verdict.displacements == {"box": 1.0 / 7.0, "bowl.2": 0.0}
+
+
+def test_each_mode_has_the_columns_of_what_it_asks() -> None:
+    arm = {"arm_clearance", "joint_excess"}
+    trial = {"duration", "tracking_error", "tracking_distance", "pushed", "touched", "cpu_plan"}
+    trial |= {f"pushed_{name}" for name in INSTANCES}
+    verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
+    one = [Trial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
+    found = {
+        mode: set(trial_columns(one, replace(ORIGIN, mode=mode), instances=INSTANCES))
+        for mode in MODES
+    }
+    assert not found["hand"] & (arm | trial)
+    assert found["reach"] == found["hand"] | arm
+    assert found["arm"] == found["hand"] | arm | trial
+
+
+def test_a_row_of_an_arm_trial_gives_back_all_that_it_was(tmp_path: Path) -> None:
+    verdict = Verdict(
+        Outcome.BLOCKED,
+        Stage.EXECUTED,
+        "panda_link5 vs box",
+        margins={"tracking_error": 1e-3 / 3, "duration": 5.25, "arm_clearance": 2e-3 / 7},
+        pushed={"mug_1": 1 / 7, "box": 0.0},
+        touched="panda_link5 vs box",
+    )
+    trial = Trial(id="a", instance="box", X_OG=np.eye(4), width=0.1 / 3, verdict=verdict)
+    origin = replace(ORIGIN, mode="arm")
+    table = trial_columns([trial], origin, instances=INSTANCES)
+    write_table(tmp_path / "arm.csv", table)
+    row = table_row(read_table(tmp_path / "arm.csv"), 0)
+    back = read_trial(row, "here")
+    assert read_origin(row, "here") == origin
+    assert back.width == back.candidate.width == 0.1 / 3
+    assert back.verdict is not None and back.verdict.touched == "panda_link5 vs box"
+    assert back.verdict.pushed == {"mug_1": 1 / 7, "box": 0.0}
+    assert {name: back.verdict.margins[name] for name in verdict.margins} == verdict.margins
 
 
 def test_displacements_are_columns_of_numbers() -> None:

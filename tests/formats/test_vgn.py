@@ -98,8 +98,10 @@ def test_each_grasp_is_read_alike_alone(
 
 
 def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
+    """A grasp that the arm can execute, and nobody has tried, is no failure."""
     X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2], [0, 0, 0.3]])
-    grasps = GraspSet.create(X_OG, object="").with_columns(outcome=["lifted", "no_contact", ""])
+    outcome = ["lifted", "no_contact", "reachable"]
+    grasps = GraspSet.create(X_OG, object="").with_columns(outcome=outcome)
     notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
     assert notes == (
         "1 failures got the hand's opening of 0.08 m as width.",

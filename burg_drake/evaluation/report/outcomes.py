@@ -16,6 +16,7 @@ LOST = {stage: tuple(o for o in Outcome if o.stage is stage and o is not FAILED)
 STOPPED = {
     "clear": LOST[Stage.CLEAR],
     "reachable": LOST[Stage.REACHABLE],
+    "planned": LOST[Stage.PLANNED],
     "executed": (FAILED,),
     "held": tuple(o for o in LOST[Stage.EXECUTED] if not o.held),
     "lifted": (Outcome.LIFTED_DISTURBED,),
@@ -63,9 +64,8 @@ def _object_row(group: Group, style: str) -> Html:
 def funnel_section(summary: Summary) -> Html:
     """How many grasps pass each stage."""
     total = summary.total
-    names = [n for n in total.funnel if summary.reach or n != "reachable"]
-    counts = {name: total.funnel[name] for name in names}
-    losses = [_loss(total, name) for name in names[1:]]
+    counts = {name: total.funnel[name] for name in summary.steps}
+    losses = [_loss(total, name) for name in summary.steps[1:]]
     return section(
         "Stages",
         "Grasps that pass each stage, and what stopped the others.",
@@ -109,6 +109,10 @@ def cost_section(summary: Summary) -> Html:
         numbers = [element("td", cell, class_="number") for cell in cells]
         rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))
     text = "CPU time of the worker processes, without their start."
+    if summary.mode != "hand":
+        text += " That of reachable includes the search for the arm's motions."
+    if summary.mode == "arm":
+        text += " That of planned is their timing."
     return section("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
 
 

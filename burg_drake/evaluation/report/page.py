@@ -6,6 +6,7 @@ import math
 
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.origin import engine_label
+from burg_drake.evaluation.report.arm import arm_section, execution_section
 from burg_drake.evaluation.report.bodies import collision_section, disturbed_section
 from burg_drake.evaluation.report.grasps import best_section, failure_section, margin_section
 from burg_drake.evaluation.report.markup import Child, Html, element
@@ -16,6 +17,7 @@ from burg_drake.evaluation.report.outcomes import (
     objects_section,
 )
 from burg_drake.evaluation.report.provenance import provenance
+from burg_drake.evaluation.report.reachability import reachability_section
 from burg_drake.evaluation.report.style import style_sheet
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import Summary, duration, percent, summarize
@@ -42,6 +44,9 @@ def report_page(run: Run) -> str:
         funnel_section(summary),
         count_section(summary),
         collision_section(columns),
+        arm_section(summary, columns),
+        reachability_section(run),
+        execution_section(summary, columns),
         margin_section(columns),
         disturbed_section(columns, run.document.trial.get("disturbance", math.inf)),
         best_section(run),
@@ -95,12 +100,13 @@ def _tiles(summary: Summary) -> Html:
     share = percent(total.lifted / total.executed) if total.executed else "-"
     interval = f"{100 * low:.0f} to {100 * high:.0f} % (95 % interval)" if total.executed else ""
     trial = next((c for c in summary.costs if c.name == "executed"), None)
-    screened = "clear and reachable" if summary.reach else "clear"
+    screened = "clear" if summary.mode == "hand" else "clear and feasible for the arm"
+    by_arm = "; by the whole arm" if summary.mode == "arm" else ""
     disturbed = total.held - total.lifted
     disturbing = f"; {disturbed} more disturbed others" if disturbed else ""
     tiles: list[tuple[str, Child, str]] = [
         ("Grasps judged", total.judged, f"on {len(summary.objects)} objects"),
-        ("Executed", total.executed, f"those found {screened}"),
+        ("Executed", total.executed, f"those found {screened}{by_arm}"),
         ("Lifted", total.lifted, f"of {total.executed} executed{disturbing}"),
         ("Success when executed", share, interval),
         ("CPU time of a trial", duration(trial.median) if trial else "-", "median"),

@@ -38,13 +38,13 @@ def reproduce_command(run: Run) -> str:
     """The command line that makes this run; for given grasps their file is among the run's."""
     document = run.document
     words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
+    words += ["--mode", document.mode]
     if document.grasps.per_object is None:
         words += ["--grasps", str(run.path / GRASPS_FILE)]
     else:
         words += ["--grasps-per-object", str(document.grasps.per_object)]
         words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
     words += ["--engine", document.engine.name, "--seed", str(document.seed)]
-    words += [] if document.reach else ["--no-reach"]
     words += [] if document.table == "csv" else ["--table", document.table]
     return shlex.join([*words, "-o", str(run.path)])
 
@@ -79,7 +79,8 @@ def _settings(document: RunDocument) -> list[tuple[str, str]]:
     return [
         ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
         ("trial", _listed(document.trial)),
-        ("arm", _listed(document.arm) if document.reach else "not asked"),
+        ("mode", document.mode),
+        ("arm", _listed(document.arm) if document.arm else "not asked"),
         ("seed", str(document.seed)),
         ("run", f"{document.hash} (all of the above; column run of the table)"),
         *document.versions.items(),

@@ -7,8 +7,12 @@ from importlib.resources import files
 from burg_drake.visualization.palette import GROUPS
 
 STYLES = {group.name: f"g{i}" for i, group in enumerate(GROUPS)}
-THEMED = {"hand collides": "var(--collides)", "simulation failed": "var(--failed)"}
-"""Greys and black need another tone on a dark page."""
+THEMED = {
+    "hand collides": "var(--collides)",
+    "arm has no way": "var(--no-way)",
+    "simulation failed": "var(--failed)",
+}
+"""Greys, black and dark blue need another tone on a dark page."""
 
 
 def style_sheet() -> str:

@@ -1,0 +1,256 @@
+"""`burg-drake reach`: which grasps the arm can execute, and what hinders it at the others."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import (
+    DEFAULT_APPROACH_ANGLE,
+    add_scene,
+    add_station,
+    add_verb,
+    approach_angle,
+    positive_int,
+    seed,
+)
+from burg_drake.apps.given_grasps import add_given, read_given, require_file
+from burg_drake.apps.grasp_output import Output, add_format, output_of
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import require_writable
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.scene.scene import Scene
+    from burg_drake.station.station import Station
+
+DEFAULT_GRASPS = 100
+"""Sampled for each object, unless grasps are given."""
+TABLES = (".csv", ".parquet")
+"""Suffixes of tables, which have a row for each grasp and no provenance."""
+BLOCKERS = 3
+"""Most frequent bodies that are listed for each outcome."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "reach",
+        run_reach,
+        "ask which grasps the arm can execute, and what hinders it at the others",
+        "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
+        "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
+        "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
+        "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
+        "",
+        "A grasp is reachable if the open hand is clear, also on the straight way in, and with",
+        "the object in it on the straight way up, the arm can follow both, and it finds a way from",
+        "home to where they begin. Each yes is checked by Drake's CollisionChecker; each no says",
+        "what failed first and what was in the way. Nothing is simulated; `evaluate` does that.",
+    )
+    add_scene(parser)
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--grasps-per-object",
+        metavar="N",
+        type=positive_int,
+        help="grasps sampled for each object at which the open hand is clear"
+        f" (default: {DEFAULT_GRASPS})",
+    )
+    add_given(parser, which)
+    add_station(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="table (.csv, .parquet) or grasp file (such as .npz, .h5), or folder for one file an"
+        " object (default: only print)",
+    )
+    add_format(parser)
+    parser.add_argument(
+        "--only-reachable", action="store_true", help="write only grasps that the arm can execute"
+    )
+    parser.add_argument(
+        "--plans",
+        metavar="DIR",
+        help="new or empty folder for the timed motion of each grasp that the arm can execute,"
+        " about 1.5 MB each",
+    )
+    parser.add_argument(
+        "--plan-format",
+        choices=("csv", "json"),
+        default="csv",
+        help="of these: a table, or what load_plan in Python reads (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--screening",
+        action="store_true",
+        help="do not check each yes by Drake's CollisionChecker; several times faster",
+    )
+    parser.add_argument(
+        "--approach-angle",
+        metavar="DEG",
+        type=approach_angle,
+        default=DEFAULT_APPROACH_ANGLE,
+        help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run_reach(arguments: argparse.Namespace) -> int:
+    """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
+    from burg_drake.core.outcome import Outcome
+    from burg_drake.evaluation.feasibility import reach
+    from burg_drake.motion.station_check import require_usable_arm
+    from burg_drake.scene.scene import load_scene
+    from burg_drake.station.check import require_sound_scene
+    from burg_drake.station.station import load_station
+
+    require_file(arguments)
+    if arguments.only_reachable and arguments.output is None:
+        raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
+    output = _output(arguments)
+    scene, station = load_scene(arguments.scene), load_station(arguments.station)
+    require_sound_scene(scene, station)
+    grasps = _grasps(arguments, scene, station)
+    if isinstance(output, Output):
+        output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
+    for warning in require_usable_arm(scene, station):
+        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    judged = reach(
+        scene,
+        station,
+        grasps,
+        exact=not arguments.screening,
+        plans=arguments.plans,
+        plan_format=arguments.plan_format,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    answered = judged.column("outcome") != ""
+    _print_tables(judged.select(answered))
+    yes = judged.column("outcome") == Outcome.REACHABLE
+    unplanned = yes & (judged.column("reason") != "")
+    if arguments.plans is not None:
+        print(f"wrote {(yes & ~unplanned).sum()} plans to {arguments.plans}")
+    if output is not None:
+        _write(judged.select(yes) if arguments.only_reachable else judged, output, station)
+    _print_failures(judged.select(~answered), "could not be judged", len(judged))
+    _print_failures(judged.select(unplanned), "have no plan", int(yes.sum()))
+    return 0 if answered.all() and not unplanned.any() else 1
+
+
+def _print_failures(failed: GraspSet, what: str, total: int) -> None:
+    """A line about grasps whose computation has failed, if there are any."""
+    if len(failed):
+        reason = failed.column("reason")[0].removeprefix("no plan: ")
+        print(
+            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {failed.id[0]}: {reason}",
+            file=sys.stderr,
+        )
+
+
+def _grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> Mapping[str, GraspSet]:
+    """The grasps of the file, or sampled ones, by instance."""
+    if arguments.grasps is not None:
+        given = read_given(arguments, scene, station)
+        for note in given.notes:
+            print(f"note: {note}")
+        return given.by_instance
+    from burg_drake.evaluation.candidate_sampling import sample_scene
+    from burg_drake.evaluation.sampling_settings import SamplingSettings
+
+    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, clear=True)
+    count = arguments.grasps_per_object or DEFAULT_GRASPS
+    return dict(sample_scene(scene, station, count, arguments.seed, settings))
+
+
+def _output(arguments: argparse.Namespace) -> Path | Output | None:
+    """Where to write: a table, a grasp file, or nowhere; a place that cannot be written to is
+    refused before any work."""
+    if arguments.output is None:
+        return None
+    path = Path(arguments.output)
+    if arguments.target is None and path.suffix in TABLES and not path.is_dir():
+        from burg_drake.evaluation.table_file import require_writer
+
+        require_writer(path.suffix.removeprefix("."))
+        require_writable(path)
+        return path
+    return output_of(arguments.output, arguments.target, frame="object")
+
+
+def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
+    from burg_drake.evaluation.feasibility import reach_columns
+    from burg_drake.evaluation.table_file import write_table
+    from burg_drake.station.gripper import gripper_of
+
+    if isinstance(output, Output):
+        output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
+        return
+    write_table(output, reach_columns(grasps), dict(grasps.provenance))
+    print(f"wrote {len(grasps)} grasps to {output}")
+
+
+def _print_tables(grasps: GraspSet) -> None:
+    """Counts by object and by outcome, what was in the way, and how fast that was found out."""
+    from burg_drake.apps.number_tables import new_table, print_table
+    from burg_drake.core.outcome import Outcome, Stage
+
+    outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
+    by_object: dict[str, Counter[Outcome]] = {}
+    for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
+        by_object.setdefault(name, Counter())[outcome] += 1
+    total = Counter(outcomes)
+    table = new_table("Grasps that the arm can execute", "object", "grasps", "clear", "reachable")
+    table.add_column("of clear", justify="right", no_wrap=True)
+    rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
+    for name, counts in rows.items():
+        if name == "all":
+            table.add_section()
+        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
+        good = counts[Outcome.REACHABLE]
+        share = f"{100 * good / clear:.1f} %" if clear else "-"
+        table.add_row(name, f"{counts.total():,}", f"{clear:,}", f"{good:,}", share)
+    print_table(table)
+    print_table(_outcome_table(grasps, by_object, total))
+    asked = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
+    seconds = float(grasps.column("cpu").sum())
+    if asked and seconds > 0.0:
+        print(f"{asked / seconds:.3g} clear grasps per CPU second; {seconds:.3g} s in all")
+
+
+def _outcome_table(grasps: GraspSet, by_object: Mapping[str, Counter[Any]], total: Any) -> Any:
+    """Outcomes by object where they fit, with what was mostly in the way."""
+    from rich.console import Console
+
+    from burg_drake.apps.number_tables import new_table
+    from burg_drake.core.outcome import Outcome
+
+    room = Console().width - 70
+    names = [name for name in by_object if len(by_object) > 1]
+    names = names if sum(len(name) + 2 for name in names) <= room else []
+    table = new_table("What became of them", "outcome", *names, "all", "share")
+    table.add_column("mostly in the way")
+    order = [Outcome.REACHABLE, *Outcome]
+    for outcome in sorted(total, key=order.index):
+        mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
+        blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(BLOCKERS)
+        counts = [f"{by_object[name][outcome] or '·'}" for name in names]
+        share = f"{100 * total[outcome] / len(grasps):.1f} %"
+        way = ", ".join(f"{name} ({count})" for name, count in blockers)
+        table.add_row(outcome.value, *counts, f"{total[outcome]:,}", share, way)
+    return table

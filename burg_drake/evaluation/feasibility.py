@@ -1,0 +1,230 @@
+"""Which grasps of a set the arm can execute in a scene, and what hinders it at the others."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import writable_folder
+from burg_drake.core.frames import quaternion_from_rotation
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.candidate_files import by_names
+from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
+from burg_drake.evaluation.executors import judge_all
+from burg_drake.evaluation.judge import Decide, Decision, Verdict, one_line
+from burg_drake.evaluation.progress import Listener, Progress, Reporter
+from burg_drake.evaluation.screens import arm_reach, arm_screen, hand_alone, hand_screen
+from burg_drake.evaluation.set_documents import set_documents
+from burg_drake.evaluation.table import Columns
+from burg_drake.motion.trajectory import Plan
+from burg_drake.motion.witness import Witness
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.station import Station, load_station
+
+PlanFormat = Literal["csv", "json"]
+YES = Outcome.REACHABLE
+ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
+"""What becomes of a grasp, unless the computation itself fails."""
+MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess")
+"""Margins of a verdict that become columns; NaN where they are not defined."""
+
+
+def reach(
+    scene: Scene | str | Path,
+    station: Station | str | Path,
+    grasps: GraspSet | Mapping[str, GraspSet],
+    *,
+    exact: bool = True,
+    plans: str | Path | None = None,
+    plan_format: PlanFormat = "csv",
+    workers: int | None = None,
+    progress: bool | Listener = False,
+) -> GraspSet:
+    """Asks of every grasp whether the arm can execute it, without a trial.
+
+    That is: the open hand is clear, also on the straight way in, and with the target in it on the
+    straight way up; the arm can follow both; and it finds a way from home to where they begin.
+
+    Args:
+        scene, station: as loaded, or references for `load_scene` and `load_station`.
+        grasps: in the frames of their objects. A set goes to the instances that its column
+            `instance` names, or else to all instances of its objects; a mapping has sets by
+            instance, such as those of `read_grasps`.
+        exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
+            screening, several times faster.
+        plans: folder, new or empty, that gets the timed motion of each grasp that the arm can
+            execute, as `INSTANCE-GRASP.csv`; see `motion.plan_file`.
+        plan_format: `json` for files that `load_plan` reads.
+        workers: number of processes; as many as there are processors if None.
+        progress: True shows a bar on standard error; a function gets the events.
+
+    Returns:
+        The grasps by instance in the scene's order, each one once on its instance, with columns:
+        `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
+        is no outcome, or no plan of what is reachable, should a computation fail; `clearance` of
+        the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
+        `judge.ARM_SCREEN_MARGINS`; `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there
+        [rad], NaN where there is none; and `cpu` [s]. Answers do not depend on the batch, the
+        order or the number of workers. The provenance tells documents, versions and settings.
+
+    Raises:
+        InvalidInputError: the station has no arm, or one that stands in something, collides in
+            its home posture, or does not reach the board; a set does not fit the scene; the folder
+            cannot be written, or is not empty.
+        UnknownNameError: a reference, instance or object that does not exist.
+        SimulationError: the worker processes die.
+    """
+    from burg_drake.motion.station_check import require_usable_arm
+
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    station = station if isinstance(station, Station) else load_station(station)
+    if station.document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} has no arm, of which one could ask what it can reach; give"
+            " another one"
+        )
+    given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+    candidates = given_candidates(scene, given)
+    require_usable_arm(scene, station)
+    folder = None if plans is None else _empty_folder(plans)
+    verdicts: dict[str, Verdict] = {}
+    factory = ReachJudgeFactory(scene, station, exact, folder, plan_format)
+    event = Progress("starting", total=len(candidates), outcomes=Counter(), good=YES)
+    with (
+        Reporter(progress) as reporter,
+        closing(judge_all(list(candidates), factory, workers=workers)) as judged,
+    ):
+        reporter.show(event)
+        start = time.monotonic()
+        for candidate, verdict in judged:
+            if not verdicts:  # the pace is that of judging alone
+                event, start = replace(event, phase="judging"), time.monotonic()
+            verdicts[candidate.id] = verdict
+            assert event.outcomes is not None
+            event.outcomes[verdict.outcome] += 1
+            done, elapsed = len(verdicts), time.monotonic() - start
+            reporter.show(replace(event, done=done, before=1, elapsed=elapsed))
+    rows = [verdicts[id] for id in candidates.id]
+    return _with_columns(candidates, rows, scene, station, exact)
+
+
+class ReachJudge:
+    """Asks whether the arm can execute a grasp.
+
+    Attributes:
+        screens, stages: see `judge.Judge`.
+    """
+
+    def __init__(self, factory: ReachJudgeFactory) -> None:
+        from burg_drake.motion.plan import Planner
+
+        scene, station = factory.scene, factory.station
+        hand, X_WO = hand_alone(scene, station)
+        arm = arm_reach(scene, station, exact=factory.exact)
+        wanted = factory.plans is not None
+        self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=wanted))
+        self.stages: tuple[tuple[Stage, Decide], ...] = ((Stage.PLANNED, self._plan),)
+        self._plans, self._format = factory.plans, factory.plan_format
+        self._planner = Planner(arm) if wanted else None
+
+    def _plan(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        if self._planner is None or self._plans is None:
+            return Decision(YES)
+        assert isinstance(motion, Witness)
+        try:
+            plan = self._planner.time(grasp.instance, motion, grasp.width)
+            write = plan.to_csv if self._format == "csv" else plan.to_json
+            write(self._plans / f"{grasp.id}.{self._format}")
+        except Exception as error:  # the grasp is reachable, whatever becomes of its plan
+            return Decision(YES, reason=f"no plan: {one_line(error)}")
+        return Decision(YES, margins={"duration": plan.duration})
+
+
+@dataclass(frozen=True)
+class ReachJudgeFactory:
+    """What a worker process needs to build its `ReachJudge`.
+
+    Attributes:
+        scene, station: where the grasps are.
+        exact, plans, plan_format: as in `reach`.
+    """
+
+    scene: Scene
+    station: Station
+    exact: bool = True
+    plans: Path | None = None
+    plan_format: PlanFormat = "csv"
+
+    def __call__(self) -> ReachJudge:
+        return ReachJudge(self)
+
+
+def _empty_folder(path: str | Path) -> Path:
+    """Makes a folder for plans, which are not to be mixed up with those of another call."""
+    folder = writable_folder(path)
+    held = sorted(item.name for item in folder.iterdir() if not item.name.startswith("."))
+    if held:
+        raise InvalidInputError(
+            f"folder {folder} is not empty, it has {held[0]}; plans go to a folder of their own:"
+            " choose another one, or empty it"
+        )
+    return folder
+
+
+def _with_columns(
+    candidates: Candidates, rows: Sequence[Verdict], scene: Scene, station: Station, exact: bool
+) -> GraspSet:
+    arm = station.document.arm
+    assert arm is not None
+    columns: dict[str, Any] = {
+        INSTANCE: candidates.instance,
+        "outcome": _texts([v.outcome.value if v.outcome in ANSWERS else "" for v in rows]),
+        "blocker": _texts([v.blocker for v in rows]),
+        "reason": _texts([v.reason for v in rows]),
+    }
+    for name in MARGIN_COLUMNS:
+        columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
+    if any("duration" in v.margins for v in rows):
+        columns["duration"] = np.array([v.margins.get("duration", np.nan) for v in rows])
+    for name in ("q_grasp", "q_pregrasp"):
+        q = np.full((len(rows), len(arm.home)), np.nan)
+        for row, verdict in enumerate(rows):
+            if found := getattr(verdict, name):
+                q[row] = found
+        columns |= {f"{name}_{k + 1}": q[:, k] for k in range(q.shape[1])}
+    columns["cpu"] = np.array([sum(v.cpu.values()) for v in rows], dtype=float)
+    objects = sorted(set(candidates.grasps.object.tolist()))
+    provenance = {
+        **candidates.grasps.provenance,
+        **set_documents(scene.library, scene, station, objects),
+        "reach": {"exact": exact},
+    }
+    return replace(candidates.grasps, provenance=provenance).with_columns(**columns)
+
+
+def reach_columns(grasps: GraspSet) -> Columns:
+    """What `reach` returns as a table: ids, poses as quaternions, and all its columns."""
+    wxyz = quaternion_from_rotation(grasps.X_OG[:, :3, :3]) if len(grasps) else np.empty((0, 4))
+    return {
+        "id": grasps.id,
+        INSTANCE: grasps.column(INSTANCE),
+        "object": grasps.object,
+        "width": grasps.width,
+        "score": grasps.score,
+        **{name: grasps.X_OG[:, k, 3] for k, name in enumerate("xyz")},
+        **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
+        **{name: values for name, values in grasps.columns.items() if name != INSTANCE},
+    }
+
+
+def _texts(values: Sequence[str]) -> np.ndarray:
+    return np.array(values, dtype=np.str_)

@@ -1,0 +1,122 @@
+"""The first stages of a station's judge, which are asked about many grasps at once, and what they
+need of the station."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from burg_drake.core.frames import Array
+from burg_drake.core.outcome import Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import Decision, Screen
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+if TYPE_CHECKING:
+    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.motion.reach import ArmReach, Reach
+    from burg_drake.simulation.trial_settings import TrialSettings
+
+HAND_BATCH = 512
+"""A grasp takes about 0.025 ms in such a batch."""
+ARM_BATCH = 128
+"""As many as `ArmReach` judges together."""
+
+
+def hand_screen(clearance: HandClearance, X_WO: Mapping[str, Array]) -> Screen:
+    """The stage `clear`.
+
+    Args:
+        clearance: of the open hand in the scene.
+        X_WO: (4, 4) poses of the free instances by name.
+    """
+
+    def ask(grasps: Sequence[Candidate]) -> list[Decision]:
+        places: dict[str, list[int]] = {}
+        for place, grasp in enumerate(grasps):
+            places.setdefault(grasp.instance, []).append(place)
+        decisions = [Decision()] * len(grasps)
+        for instance, chosen in places.items():
+            X_WG = placed([grasps[k] for k in chosen], X_WO)
+            found = clearance.check_all(instance, X_WG)
+            for k, answer in zip(chosen, found, strict=True):
+                margins = {"overlap": answer.overlap, "clearance": answer.clearance}
+                decisions[k] = Decision(answer.outcome, answer.blocker, margins=margins)
+        return decisions
+
+    return Screen(Stage.CLEAR, ask, HAND_BATCH)
+
+
+def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = False) -> Screen:
+    """The stages `reachable` and `planned`, which are asked about together.
+
+    Args:
+        reach: the arm in the scene.
+        X_WO: (4, 4) poses of the free instances by name.
+        motions: whether later stages need the motions that are found.
+    """
+
+    def ask(grasps: Sequence[Candidate]) -> list[Decision]:
+        found = reach.check_all(
+            [grasp.instance for grasp in grasps],
+            placed(grasps, X_WO),
+            np.array([grasp.width for grasp in grasps]),
+        )
+        return [_decision(answer, motions) for answer in found]
+
+    return Screen(Stage.REACHABLE, ask, ARM_BATCH)
+
+
+def placed(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
+    """(N, 4, 4) grasps in the world.
+
+    One by one: products of stacked matrices may differ from single ones in the last bit.
+    """
+    return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
+
+
+def _decision(answer: Reach, motions: bool) -> Decision:
+    margins = {"arm_clearance": answer.clearance, "joint_excess": answer.excess}
+    return Decision(
+        answer.outcome,
+        answer.blocker,
+        margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
+        q_grasp=_floats(answer.q_grasp),
+        q_pregrasp=_floats(answer.q_pregrasp),
+        motion=answer.witness if motions else None,
+    )
+
+
+def _floats(q: Array | None) -> tuple[float, ...]:
+    return () if q is None else tuple(q.tolist())
+
+
+def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
+    """What `hand_screen` takes, where there is no trial of the hand that has it."""
+    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.station.diagram import build_station_diagram
+
+    diagram = build_station_diagram(scene, station, robot="hand")
+    return HandClearance(diagram), {name: diagram.X_WO(name) for name in scene.instances}
+
+
+def arm_reach(
+    scene: Scene, station: Station, settings: TrialSettings | None = None, *, exact: bool = True
+) -> ArmReach:
+    """The arm in the scene, which lifts as far as in a trial.
+
+    Args:
+        scene, station: where.
+        settings: of the trial; the usual ones if None.
+        exact: see `ReachSettings`.
+    """
+    from burg_drake.motion.reach import ArmReach
+    from burg_drake.motion.reach_settings import ReachSettings
+    from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
+
+    lift = (settings or DEFAULT_TRIAL).lift_height
+    return ArmReach(scene, station, settings=ReachSettings(lift_height=lift, exact=exact))

@@ -1,0 +1,107 @@
+"""The stages of a station, by the mode of the run: clearance of the hand, feasibility for the arm,
+and a trial in simulation, of the hand alone or of the whole arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from burg_drake.core.outcome import Stage
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.judge import Decide, Decision, Screen, trial_decision
+from burg_drake.evaluation.mode import Mode
+from burg_drake.evaluation.screens import arm_reach, arm_screen, hand_alone, hand_screen
+from burg_drake.motion.trajectory import Plan
+from burg_drake.motion.witness import Witness
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import Engine
+from burg_drake.station.station import Station
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trial_settings import TrialSettings
+
+
+class StationJudge:
+    """Judges grasps on a station.
+
+    Attributes:
+        screens, stages: see `judge.Judge`.
+        plan: the one that the arm has executed last, if it has executed any.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        *,
+        engine: Engine,
+        mode: Mode,
+        settings: TrialSettings | None = None,
+    ) -> None:
+        """Builds the diagrams that all grasps share.
+
+        Args:
+            scene, station: what to build.
+            engine: how the trial is stepped.
+            mode: what to ask; but for `hand` the station needs an arm.
+            settings: phases of the trial, if not the usual ones.
+        """
+        from burg_drake.simulation.hand_trial import HandTrial
+        from burg_drake.simulation.trial_settings import TrialSettings
+
+        settings = TrialSettings() if settings is None else settings
+        self.plan: Plan | None = None
+        if mode == "arm":
+            self._build_arm_trial(scene, station, engine, settings)
+            return
+        self._hand = HandTrial(scene, station, engine=engine, settings=settings)
+        X_WO = {name: self._hand.diagram.X_WO(name) for name in scene.instances}
+        self.screens: list[Screen] = [hand_screen(self._hand.clearance, X_WO)]
+        self.stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._execute)]
+        if mode == "reach":
+            self.screens.append(arm_screen(arm_reach(scene, station, settings), X_WO))
+
+    def _build_arm_trial(
+        self, scene: Scene, station: Station, engine: Engine, settings: TrialSettings
+    ) -> None:
+        from burg_drake.motion.plan import Planner
+        from burg_drake.simulation.arm_trial import ArmTrial
+
+        hand, X_WO = hand_alone(scene, station)
+        reach = arm_reach(scene, station, settings)
+        self._planner = Planner(reach)
+        self._arm = ArmTrial(scene, station, engine=engine, settings=settings, clearance=hand)
+        self.screens = [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)]
+        self.stages = [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute_by_arm)]
+
+    def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        return trial_decision(
+            self._hand.run(grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass)
+        )
+
+    def _time(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        assert isinstance(motion, Witness)
+        plan = self._planner.time(grasp.instance, motion, grasp.width)
+        return Decision(margins={"duration": plan.duration}, motion=plan)
+
+    def _execute_by_arm(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        assert isinstance(motion, Plan)
+        self.plan = motion
+        return trial_decision(
+            self._arm.run(
+                grasp.instance, grasp.X_OG, motion, friction=grasp.friction, mass=grasp.mass
+            )
+        )
+
+
+@dataclass(frozen=True)
+class StationJudgeFactory:
+    """What a worker process needs to build its `StationJudge`."""
+
+    scene: Scene
+    station: Station
+    engine: Engine
+    mode: Mode
+
+    def __call__(self) -> StationJudge:
+        return StationJudge(self.scene, self.station, engine=self.engine, mode=self.mode)

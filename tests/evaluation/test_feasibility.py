@@ -1,0 +1,210 @@
+"""Feasibility of a set: answers that geometry demands, configurations that Drake places there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import Array, grasp_from_axes, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.feasibility import reach, reach_columns
+from burg_drake.evaluation.progress import Progress
+from burg_drake.evaluation.table_file import read_table, write_table
+from burg_drake.motion.plan_file import load_plan
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import Station, load_station
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+BELOW = grasp_from_axes((1, 0, 0), (0, 0, 1), (0.0, 0.0, 0.03))
+"""From below, through the table."""
+INSIDE = ABOVE @ make_pose(p_AB=(0, 0, 0.1))
+"""The hand is in the box."""
+BESIDE = grasp_from_axes((0, 0, 1), (0, 1, 0), (0.0, -0.9, 0.2))
+"""In thin air, far from the box."""
+GRASPS = np.stack([ABOVE, INSIDE, BELOW, BESIDE])
+EXPECTED = ["reachable", "collision_target", "collision_table"]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("tabletop_six")
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station("panda_tabletop")
+
+
+@pytest.fixture(scope="module")
+def plans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("plans")
+
+
+@pytest.fixture(scope="module")
+def judged(scene: Scene, station: Station, plans: Path) -> GraspSet:
+    given = GraspSet.create(GRASPS, object="box", width=0.06)
+    return reach(scene, station, given, plans=plans, plan_format="json", workers=1)
+
+
+def X_WG(scene: Scene, station: Station, q: Array) -> Array:
+    """Where Drake has the grasp frame at arm positions (n,)."""
+    built = build_station_diagram(scene, station, robot="arm")
+    context = built.plant.CreateDefaultContext()
+    for joint, value in zip(built.arm_joints, q, strict=True):
+        joint.set_angle(context, value)
+    hand = built.plant.GetModelInstanceByName("hand")
+    body = built.plant.GetBodyByName(station.hand.body, hand)
+    X_WH = built.plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+    return X_WH @ station.hand.X_HG.matrix()
+
+
+def at(judged: GraspSet, name: str, row: int) -> Array:
+    return np.array([judged.column(f"{name}_{k}")[row] for k in range(1, 8)])
+
+
+def same_grasp(a: Array, b: Array) -> bool:
+    """Whether two poses are one grasp, the fingers swapped or not."""
+    swapped = b @ np.diag([-1.0, -1.0, 1.0, 1.0])
+    return any(np.allclose(a, X, atol=1e-4) for X in (b, swapped))
+
+
+def test_answers_are_those_that_geometry_demands(judged: GraspSet) -> None:
+    assert judged.column("outcome")[:3].tolist() == EXPECTED
+    assert judged.column("blocker")[:3].tolist() == ["", "box", "table"]
+    assert judged.column("instance").tolist() == ["box"] * 4
+    clearance = judged.column("clearance")
+    assert clearance[0] > 0.0 > clearance[1]
+    assert judged.column("arm_clearance")[0] >= 0.0
+    assert (judged.column("cpu") > 0.0).all()
+
+
+def test_the_arm_is_where_the_grasp_is(judged: GraspSet, scene: Scene, station: Station) -> None:
+    wanted = station.document.X_WS.matrix() @ scene.X_SO("box") @ ABOVE
+    assert same_grasp(X_WG(scene, station, at(judged, "q_grasp", 0)), wanted)
+    back = wanted @ make_pose(p_AB=(0.0, 0.0, -0.1))
+    assert same_grasp(X_WG(scene, station, at(judged, "q_pregrasp", 0)), back)
+    assert np.isnan(at(judged, "q_grasp", 1)).all()
+
+
+def test_a_plan_leads_from_home_over_the_pregrasp_up(
+    judged: GraspSet, plans: Path, scene: Scene, station: Station
+) -> None:
+    good = judged.column("outcome") == "reachable"
+    written = sorted(path.stem for path in plans.iterdir())
+    assert written == sorted(f"box-{id}" for id in judged.id[good])
+    plan = load_plan(plans / f"box-{judged.id[0]}.json")
+    arm = station.document.arm
+    assert arm is not None
+    np.testing.assert_allclose(plan.transfer.q[0], arm.home, atol=1e-12)
+    np.testing.assert_allclose(plan.approach.q[0], at(judged, "q_pregrasp", 0), atol=1e-9)
+    np.testing.assert_allclose(plan.approach.q[-1], at(judged, "q_grasp", 0), atol=1e-9)
+    wanted = station.document.X_WS.matrix() @ scene.X_SO("box") @ ABOVE
+    top = make_pose(p_AB=(0.0, 0.0, 0.3)) @ wanted
+    assert same_grasp(X_WG(scene, station, plan.lift.q[-1]), top)
+    assert judged.column("duration")[0] == plan.duration
+    assert np.isnan(judged.column("duration")[~good]).all()
+
+
+def test_answers_do_not_depend_on_neighbours_or_workers(
+    judged: GraspSet, scene: Scene, station: Station
+) -> None:
+    other = GraspSet.create(GRASPS[[3, 0]], object="box", width=0.06)
+    again = reach(scene, station, other, workers=2)
+    assert again.id.tolist() == judged.id[[3, 0]].tolist()
+    for name, values in again.columns.items():
+        if name != "cpu":
+            np.testing.assert_array_equal(values, judged.column(name)[[3, 0]], err_msg=name)
+
+
+def test_plans_go_to_a_folder_of_their_own(
+    judged: GraspSet, plans: Path, scene: Scene, station: Station
+) -> None:
+    """Those of an earlier call would be taken for motions of this one."""
+    before = {path: path.stat().st_mtime_ns for path in plans.iterdir()}
+    with pytest.raises(InvalidInputError) as error:
+        reach(scene, station, {}, plans=plans)
+    assert str(error.value) == (
+        f"folder {plans} is not empty, it has {min(path.name for path in before)}; plans go to a"
+        " folder of their own: choose another one, or empty it"
+    )
+    assert {path: path.stat().st_mtime_ns for path in plans.iterdir()} == before
+
+
+def test_a_plan_that_fails_leaves_the_answer(
+    judged: GraspSet, scene: Scene, station: Station, tmp_path: Path
+) -> None:
+    """Where the first plan is to be written, somebody has made a folder."""
+    taken = tmp_path / f"box-{judged.id[0]}.csv"
+
+    def take(event: Progress) -> None:
+        taken.mkdir(exist_ok=True)
+
+    given = GraspSet.create(ABOVE[None], object="box", width=0.06)
+    found = reach(scene, station, given, plans=tmp_path, workers=1, progress=take)
+    assert found.column("outcome").tolist() == ["reachable"]
+    (reason,) = found.column("reason")
+    assert reason.startswith(f"no plan: InvalidInputError: cannot write {taken}: ")
+    assert "duration" not in found.columns and list(tmp_path.iterdir()) == [taken]
+
+
+def test_what_cannot_be_answered_has_no_outcome(
+    judged: GraspSet, scene: Scene, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from known_judge import CrashingJudge, Make
+
+    lost = f"box-{judged.id[2]}"
+    judge = Make(CrashingJudge(how=((lost, "screen"),)))
+    monkeypatch.setattr("burg_drake.evaluation.feasibility.ReachJudgeFactory", lambda *_: judge)
+    given = GraspSet.create(GRASPS, object="box", width=0.06)
+    found = reach(scene, station, given, workers=1)
+    empty = found.column("outcome") == ""
+    assert found.id[empty].tolist() == [judged.id[2]]
+    assert found.column("reason")[empty].tolist() == ["the worker process was ended by SIGSEGV"]
+
+
+def test_a_set_has_to_name_its_objects(scene: Scene, station: Station) -> None:
+    with pytest.raises(InvalidInputError) as error:
+        reach(scene, station, GraspSet.create(GRASPS, object=""))
+    assert str(error.value) == (
+        "the set does not say which object its grasps are of; name it (GraspSet.create(...,"
+        " object=NAME)); scene 'tabletop_six' has banana, bottle, bowl, box, mug, screwdriver"
+    )
+    with pytest.raises(UnknownNameError) as unknown:
+        reach(scene, station, GraspSet.create(GRASPS, object="bax"))
+    assert str(unknown.value) == (
+        "the set has grasps of object 'bax', which is not in scene 'tabletop_six'; did you mean"
+        " 'box'? Known: banana, bottle, bowl, box, mug, screwdriver"
+    )
+
+
+def test_a_table_has_it_all(judged: GraspSet, tmp_path: Path) -> None:
+    write_table(tmp_path / "reach.csv", reach_columns(judged))
+    back = read_table(tmp_path / "reach.csv")
+    assert back["id"].tolist() == judged.id.tolist()
+    assert back["outcome"].tolist() == judged.column("outcome").tolist()
+    np.testing.assert_array_equal(back["q_grasp_1"], judged.column("q_grasp_1"))
+    np.testing.assert_array_equal(back["z"], GRASPS[:, 2, 3])
+
+
+def test_a_set_comes_back_from_its_file(judged: GraspSet, tmp_path: Path) -> None:
+    judged.save(tmp_path / "reach.h5")
+    back = GraspSet.load(tmp_path / "reach.h5")
+    assert back.column("outcome").tolist() == judged.column("outcome").tolist()
+    assert back.provenance["reach"] == {"exact": True}
+
+
+def test_no_grasps_are_no_answers(scene: Scene, station: Station) -> None:
+    found = reach(scene, station, {})
+    assert len(found) == 0 and "outcome" in found.columns
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_any_work(
+    scene: Scene, station: Station
+) -> None:
+    with pytest.raises(InvalidInputError, match="/dev/null"):
+        reach(scene, station, {}, plans="/dev/null/plans")

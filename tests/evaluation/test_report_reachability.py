@@ -1,0 +1,47 @@
+"""The report's section about what the arm reaches of the board."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.reachability import reachability_section
+from burg_drake.evaluation.run_store import Run
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+
+@pytest.fixture
+def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
+    return evaluate(scene, station, tmp_path / "run", grasps_per_object=3, progress=False)
+
+
+def test_it_shows_where_the_objects_stand(
+    run: Run, scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the page, too, which other tests with the known judge do without."""
+    place = "burg_drake.evaluation.report.page.reachability_section"
+    monkeypatch.setattr(place, reachability_section)
+    section = reachability_section(run)
+    assert section is not None and section in report_page(run)
+    assert section.count("<svg") == 3  # two heights and the key
+    for said in ("Reach of the arm", "5 cm above the board", "15 cm above the board", "68 hand"):
+        assert said in section
+    for name in scene.instances:
+        assert section.count(f">{name}</text>") == 2
+
+
+def test_without_the_arm_there_is_none(run: Run) -> None:
+    document = dataclasses.replace(run.document, mode="hand")
+    assert reachability_section(Run(run.path, document)) is None
+
+
+def test_without_the_documents_of_then_there_is_none(run: Run) -> None:
+    path = run.path / "station.yaml"
+    moved = path.read_text(encoding="utf-8").replace("0.24", "0.25", 1)
+    path.write_text(moved, encoding="utf-8")
+    assert reachability_section(Run(run.path, run.document)) is None

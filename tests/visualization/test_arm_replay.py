@@ -1,0 +1,39 @@
+"""A replay of the whole arm begins at home, ends with the target lifted, and plays in a loop."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+import numpy as np
+
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.outcome import Outcome
+from burg_drake.motion.plan import plan
+from burg_drake.motion.trajectory import Plan
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.engine import ENGINES
+from burg_drake.station.station import load_station
+from burg_drake.visualization.arm_replay import record_arm_trial
+from burg_drake.visualization.scene_view import open_meshcat
+
+X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+
+
+def test_the_arm_is_recorded_from_home_on() -> None:
+    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    found = plan(scene, station, "box", X_OG, width=0.06)
+    assert isinstance(found, Plan)
+    meshcat = open_meshcat()
+    result = record_arm_trial(
+        scene, station, "box", X_OG, found, meshcat, engine=ENGINES["screening"]
+    )
+    assert result.outcome is Outcome.LIFTED
+    shortest = found.transfer.duration + found.approach.duration + found.lift.duration
+    assert result.margins.end_time > shortest  # and the hand has closed and held
+    assert np.isfinite(result.margins.tracking_error)
+    assert meshcat.get_mutable_recording().autoplay()
+    sent = re.findall(r"base64,([A-Za-z0-9+/=]+)", meshcat.StaticHtml())
+    assert any(b"set_animation" in base64.b64decode(part) for part in sent)
+    assert meshcat.HasPath("/drake/visualizer/arm")

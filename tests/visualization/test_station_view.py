@@ -1,0 +1,78 @@
+"""A station in Meshcat: tiles where they belong, and everything under the paths of the legend."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.geometry import Meshcat
+
+from burg_drake.motion.arm_span import ArmSpan
+from burg_drake.motion.reachability import ReachabilityMap
+from burg_drake.motion.station_check import empty_scene
+from burg_drake.station.station import load_station
+from burg_drake.visualization.legend import ColorBar, LegendEntry
+from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.visualization.station_view import BINS, MAP_PATH, show_station, tiles
+
+
+@pytest.fixture(scope="module")
+def meshcat() -> Meshcat:
+    return open_meshcat()
+
+
+def checkered() -> ReachabilityMap:
+    """Two heights; one cell of six is reached with all four orientations, one with one."""
+    reached = np.zeros((2, 2, 3, 4), dtype=bool)
+    reached[1, 1, 2] = True
+    reached[0, 0, 0, 3] = True
+    return ReachabilityMap(
+        x=np.array([0.1, 0.3, 0.5]),
+        y=np.array([0.1, 0.3]),
+        heights=np.array([0.05, 0.15]),
+        tilt=np.zeros(4),
+        R_WG=np.tile(np.eye(3), (4, 1, 1)),
+        reached=reached,
+        cell=(0.2, 0.2),
+    )
+
+
+def test_everything_in_the_legend_is_there(meshcat: Meshcat) -> None:
+    station = load_station("panda_shelf")
+    span = ArmSpan(np.array([0.0, 0.0, 0.333]), 0.95)
+    legend = show_station(
+        empty_scene(), station, meshcat, reachability=checkered(), span=span, camera="board"
+    )
+    bar = next(entry for entry in legend if isinstance(entry, ColorBar))
+    assert sum(bar.counts) == 12 and (bar.counts[0], bar.counts[-1]) == (10, 1)
+    entries = [entry for entry in legend if isinstance(entry, LegendEntry)]
+    assert [entry.label for entry in entries] == [
+        "tiles on the board: 5 cm above it, 17 % reached",
+        "small tiles: 15 cm above it, 17 % reached",
+        "longest reach on the table, 0.89 m",
+        "cameras, upper edge bold",
+        "obstacles",
+    ]
+    for entry in entries:
+        assert any(meshcat.HasPath(path) for path in entry.paths), entry.label
+    shown = {(b, k) for b in range(BINS) for k in (0, 1) if meshcat.HasPath(f"{MAP_PATH}/{b}/{k}")}
+    assert shown == {(0, 0), (2, 0), (0, 1), (BINS - 1, 1)}
+    for name in ("overview", "board"):
+        assert meshcat.HasPath(f"/drake/cameras/{name}/image")
+
+
+def test_a_station_without_an_arm_and_obstacles(meshcat: Meshcat) -> None:
+    legend = show_station(empty_scene(), load_station("wsg_tabletop"), meshcat)
+    assert [entry.label for entry in legend if isinstance(entry, LegendEntry)] == [
+        "cameras, upper edge bold"
+    ]
+
+
+def test_tiles_cover_their_cells_and_face_up() -> None:
+    middle = np.array([[0.1, 0.2], [-0.3, 0.5]])
+    vertices, faces = tiles(middle, np.array([0.2, 0.1]), 0.03)
+    assert vertices.shape == (3, 8) and faces.shape == (3, 4)
+    a, b, c = (vertices[:, faces[k]].T for k in range(3))
+    normal = np.cross(b - a, c - a) / 2.0
+    np.testing.assert_allclose(normal, [[0.0, 0.0, 0.01]] * 4, atol=1e-12)
+    np.testing.assert_allclose(vertices[2], 0.03)
+    np.testing.assert_allclose(vertices[:2].reshape(2, 2, 4).mean(axis=2).T, middle)
