@@ -183,7 +183,7 @@ def scaling(scene: Scene, station: Station, grasps: int) -> None:
             start = time.monotonic()
             run = burg.evaluate(
                 scene, station, Path(out) / "run",
-                grasps_per_object=grasps, workers=workers, reach=False, progress=False,
+                grasps_per_object=grasps, workers=workers, mode="hand", progress=False,
             )  # fmt: skip
             seconds[workers] = time.monotonic() - start
             executed = sum(v.outcome.stage is Stage.EXECUTED for v in run.verdicts.values())

@@ -38,11 +38,11 @@ def hand_only(station: Station, angle: float = 0.0, x: float = 0.0, y: float = 0
     return dataclasses.replace(station, document=document, arm_model=None)
 
 
-def sampled_grasps(scene: Scene, station: Station, name: str, count: int) -> Array:
-    """Antipodal grasps (N, 4, 4) on an instance, in its frame, from above; clear or not."""
+def sampled_set(scene: Scene, station: Station, name: str, count: int) -> burg.GraspSet:
+    """Antipodal grasps on an instance, in its frame, from above; clear or not."""
     X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
     down_O = np.round(-X_WO[2, :3], 9)
-    grasps = burg.sample_antipodal(
+    return burg.sample_antipodal(
         scene.library.surface(scene.instance(name).object),
         count,
         rng_from("mixed grasps", name),
@@ -50,7 +50,11 @@ def sampled_grasps(scene: Scene, station: Station, name: str, count: int) -> Arr
         opening=station.hand.opening,
         approach_cone=burg.ApproachCone(tuple(down_O), CONE),
     )
-    return grasps.X_OG
+
+
+def sampled_grasps(scene: Scene, station: Station, name: str, count: int) -> Array:
+    """Poses (N, 4, 4) of those."""
+    return sampled_set(scene, station, name, count).X_OG
 
 
 def clear_grasps(trial: burg.HandTrial, name: str, count: int) -> Array:

@@ -1,168 +1,194 @@
-"""CPU time and recall of the arm's reach check, beside an exhaustive search and a plain baseline.
+"""Speed and truth of the arm's reach check, beside an exhaustive search and a plain baseline.
 
-    python benchmarks/reach.py [SCENE] [--station S] [--grasps N] [--checks N] [--baseline N]
+    python benchmarks/reach.py [--stations S ...] [--scenes S ...] [--grasps N] [--exhaustive N]
+                               [--plain N] [--audit N]
 
-Samples grasps on every object of the scene, keeps those that the open hand is clear for, and judges
-them: by the closed form, by the numeric search that serves other arms, and exhaustively by one that
-starts from over 3,000 postures. The baseline is what Drake's tutorials suggest: `InverseKinematics`
-with SNOPT, restarted at random, and Drake's collision checker.
+Samples grasps on every object of each scene, keeps those that the open hand is clear for, and
+judges them on each station: with the exact recheck and in screening mode. The other judges, which
+are in `reach_judges`, are asked about some of them; for each grasp on which they differ it is said
+why. Some motions are audited (`reach_audit`), in steps in which no point of the robot moves by more
+than 5 mm. Intervals are Wilson's, of 95 %. Seconds are CPU time.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.inverse_kinematics import InverseKinematics
-from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RigidBody
-from pydrake.solvers import SnoptSolver
+from reach_audit import Audit
+from reach_judges import Exhaustive, Plain, PlainWorld, World
 
 from burg_drake.core.content import rng_from
-from burg_drake.core.frames import Array, inverse, pregrasp, swap_fingers
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.frames import Array
+from burg_drake.core.statistics import wilson_interval
 from burg_drake.grasping.antipodal import sample_antipodal
 from burg_drake.grasping.clearance import HandClearance
-from burg_drake.motion.reach import ArmReach, Reach, ReachSettings
+from burg_drake.motion.reach import ArmReach, Reach
+from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station, load_station
 
-EXHAUSTIVE = ReachSettings(
-    closed_form=False, starts=(32, 64, 128, 1024, 2048), postures=16384, iterations=25
-)
-NUMERIC = ReachSettings(closed_form=False)
-BASELINE_STARTS = 10
-"""Restarts of the baseline for each way to put the fingers."""
+STEP = 0.005
+"""Of the audit [m]."""
+SAMPLED = 4000
+"""Grasps for each object, of which those that are clear of everything are taken evenly."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grasps:
+    """N grasps that the open hand is clear for.
+
+    Attributes:
+        instance: N names.
+        X_WG: (N, 4, 4) in the world.
+        width: (N,) distances between the pads [m].
+    """
+
+    instance: list[str]
+    X_WG: Array
+    width: Array
 
 
 def main() -> None:
     """Runs the benchmark."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scene", nargs="?", default="tabletop_six")
-    parser.add_argument("--station", default="panda_tabletop")
-    parser.add_argument("--grasps", type=int, default=1000, help="sampled for each object")
-    parser.add_argument("--checks", type=int, default=300, help="clear grasps to judge")
-    parser.add_argument("--baseline", type=int, default=50, help="of them by the baseline, too")
+    stations = ["panda_tabletop", "panda_bin", "panda_shelf"]
+    parser.add_argument("--stations", nargs="+", default=stations)
+    parser.add_argument("--scenes", nargs="+", default=["tabletop_six", "tabletop_twelve"])
+    parser.add_argument("--grasps", type=int, default=500, help="to judge")
+    parser.add_argument("--exhaustive", type=int, default=100, help="judged exhaustively, too")
+    parser.add_argument("--plain", type=int, default=30, help="judged by the baseline, too")
+    parser.add_argument("--audit", type=int, default=500, help="motions that are audited")
     arguments = parser.parse_args()
-    scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    clear = clear_grasps(scene, station, arguments.grasps)
-    order = rng_from("benchmark reach").permutation(len(clear))[: arguments.checks]
-    grasps = [clear[i] for i in order]
-    print(f"{scene.name} on {station.name}: {len(clear)} clear grasps, {len(grasps)} judged")
-
-    start = time.process_time()
-    arm = ArmReach(scene, station)
-    print(f"set-up {time.process_time() - start:.2f} s")
-    found = report("reach", arm.check, grasps)
-    numeric = ArmReach(scene, station, settings=NUMERIC)
-    compare("numeric", found, report("numeric", numeric.check, grasps))
-    exhaustive = ArmReach(scene, station, settings=EXHAUSTIVE)
-    compare("exhaustive", found, report("exhaustive", exhaustive.check, grasps))
-    few = grasps[: arguments.baseline]
-    compare("baseline", found, report("baseline", Baseline(arm, station).check, few))
+    for name in arguments.scenes:
+        for station in arguments.stations:
+            judge(load_scene(name), load_station(station), arguments)
 
 
-def clear_grasps(scene: Scene, station: Station, count: int) -> list[Array]:
-    """`X_WG` of sampled grasps that the open hand is clear for."""
+def judge(scene: Scene, station: Station, arguments: argparse.Namespace) -> None:
+    """Judges the grasps of one scene on one station, and prints what comes of it."""
+    grasps = clear_grasps(scene, station, arguments.grasps)
+    n = len(grasps.instance)
+    print(f"\n{scene.name} on {station.name}: {n} grasps that the open hand is clear for")
+    exact, rate = timed("exact", scene, station, ReachSettings(), grasps)
+    screened, _ = timed("screening", scene, station, ReachSettings(exact=False), grasps)
+    compare("screening", screened, "exact", yes(exact))
+    audit_motions(scene, station, grasps, exact, arguments.audit)
+
+    settings = ReachSettings()
+    world = World(scene, station, settings.standoff, settings.lift_height)
+    few = slice(0, arguments.exhaustive)
+    other, _ = asked("exhaustive", Exhaustive(world).check, grasps, few)
+    compare("exact", exact[few], "exhaustive", other)
+    few = slice(0, arguments.plain)
+    plain = Plain(PlainWorld(scene, station, settings.standoff, settings.lift_height))
+    other, plain_rate = asked("SNOPT and RRT", plain.check, grasps, few)
+    compare("exact", exact[few], "SNOPT and RRT", other)
+    if other:
+        print(f"  exact is {rate / plain_rate:.0f} times as fast as SNOPT and RRT", flush=True)
+
+
+def audit_motions(
+    scene: Scene, station: Station, grasps: Grasps, found: list[Reach], most: int
+) -> None:
+    """Audits the first motions, and prints what collides."""
+    audit = Audit(scene, station)
+    motions = [(k, reach.witness) for k, reach in enumerate(found) if reach.witness][:most]
+    faulty = 0
+    for k, witness in motions:
+        faults = audit.faults(grasps.instance[k], witness, float(grasps.width[k]), step=STEP)
+        if faults:
+            faulty += 1
+            print(
+                f"    grasp {k}: {max(faults, key=lambda fault: fault.depth)}; {len(faults)} in all"
+            )
+    print(f"  audit: {share(faulty, len(motions))} motions collide", flush=True)
+
+
+def clear_grasps(scene: Scene, station: Station, count: int) -> Grasps:
+    """Sampled grasps that the open hand is clear for, of all objects alike."""
     diagram = build_station_diagram(scene, station, robot="hand")
     clearance = HandClearance(diagram)
-    found = []
+    instance: list[str] = []
+    poses, widths = [], []
     for name in scene.instances:
         entry = scene.entry(name)
         mesh = scene.library.surface(scene.instance(name).object)
         rng = rng_from("benchmark reach", name)
-        sampled = sample_antipodal(mesh, count, rng, friction=entry.friction)
+        sampled = sample_antipodal(mesh, SAMPLED, rng, friction=entry.friction)
         X_WG = diagram.X_WO(name) @ sampled.X_OG
-        found += [X for X in X_WG if clearance.check(name, X).outcome is None]
-    return found
+        clear = np.flatnonzero(clearance.measure(name, X_WG).clear)
+        instance += [name] * len(clear)
+        poses.append(X_WG[clear])
+        widths.append(sampled.width[clear])
+    order = rng_from("benchmark reach").permutation(len(instance))[:count]
+    return Grasps(
+        [instance[k] for k in order], np.concatenate(poses)[order], np.concatenate(widths)[order]
+    )
 
 
-def report(label: str, check: Callable[[Array], Reach], grasps: list[Array]) -> list[Reach]:
-    """Judges grasps and prints the CPU time by outcome."""
-    found: list[Reach] = []
-    seconds: dict[str, list[float]] = defaultdict(list)
-    for X_WG in grasps:
-        start = time.process_time()
-        found.append(check(X_WG))
-        seconds[found[-1].outcome or "reached"].append(time.process_time() - start)
-    print(f"{label}: {len(grasps) / sum(map(sum, seconds.values())):.0f} grasps/s")
-    for outcome, times in sorted(seconds.items()):
-        median, most, worst = np.percentile(np.array(times) * 1e3, (50, 90, 100))
-        print(
-            f"  {outcome:14}{len(times):5} {len(times) / len(grasps):7.1%}"
-            f"  median {median:6.1f} ms, 90 % {most:6.1f}, largest {worst:6.1f}",
-            flush=True,
-        )
-    return found
+def timed(
+    label: str, scene: Scene, station: Station, settings: ReachSettings, grasps: Grasps
+) -> tuple[list[Reach], float]:
+    """Judges all grasps; returns the verdicts and how many a second."""
+    start = time.process_time()
+    arm = ArmReach(scene, station, settings=settings)
+    arm.check_all(grasps.instance[:1], grasps.X_WG[:1], grasps.width[:1])
+    built = time.process_time()
+    found = arm.check_all(grasps.instance, grasps.X_WG, grasps.width)
+    seconds = time.process_time() - built
+    rate = len(found) / seconds
+    print(f"  {label}: {rate:.0f} grasps/s, set-up and first grasp {built - start:.2f} s")
+    counts = Counter(reach.outcome or "reached" for reach in found)
+    shares = ", ".join(f"{count} {outcome}" for outcome, count in counts.most_common())
+    print(f"    {shares}", flush=True)
+    return found, rate
 
 
-def compare(label: str, found: list[Reach], other: list[Reach]) -> None:
-    """Prints how many of the other's grasps were found, and the other way round."""
-    pairs = [(a.outcome is None, b.outcome is None) for a, b in zip(found, other, strict=False)]
-    theirs, ours = sum(b for _, b in pairs), sum(a for a, _ in pairs)
-    both = sum(a and b for a, b in pairs)
-    print(f"  of {theirs} that {label} reaches, {both} reached; of ours {both} of {ours}")
+def asked(
+    label: str, check: Callable[[str, Array], bool], grasps: Grasps, few: slice
+) -> tuple[list[bool], float]:
+    """Asks another judge about some grasps."""
+    start = time.process_time()
+    pairs = zip(grasps.instance[few], grasps.X_WG[few], strict=True)
+    found = [check(instance, X_WG) for instance, X_WG in pairs]
+    rate = len(found) / max(time.process_time() - start, 1e-9)
+    print(f"  {label}: {rate:.1f} grasps/s, {sum(found)} of {len(found)} reached", flush=True)
+    return found, rate
 
 
-class Baseline:
-    """SNOPT on the arm alone, restarted at random; same collision checks and same two goals."""
+def yes(found: list[Reach]) -> list[bool]:
+    """Which are reached."""
+    return [reach.outcome is None for reach in found]
 
-    def __init__(self, arm: ArmReach, station: Station) -> None:
-        self._arm, self._station = arm, station
-        self._plant = MultibodyPlant(0.0)
-        self._hand = self._add_robot()
-        self._plant.Finalize()
 
-    def _add_robot(self) -> RigidBody:
-        plant, station, arm = self._plant, self._station, self._station.document.arm
-        assert arm is not None
-        parser = Parser(plant)
-        (model,) = parser.AddModels(str(station.arm_model))
-        (hand,) = parser.AddModels(str(station.hand_model))
-        base, flange = (plant.GetFrameByName(name, model) for name in (arm.base, arm.flange))
-        body = plant.GetBodyByName(station.hand.body, hand)
-        plant.WeldFrames(plant.world_frame(), base, RigidTransform(arm.X_WA.matrix()))
-        plant.WeldFrames(flange, body.body_frame(), RigidTransform(arm.X_FH.matrix()))
-        return body
+def compare(label: str, ours: list[Reach], name: str, theirs: list[bool]) -> None:
+    """Prints how far two judges agree, and what we say of each grasp on which they do not."""
+    pairs = list(zip(yes(ours), theirs, strict=True))
+    print(f"  {label} against {name}: {share(sum(a == b for a, b in pairs), len(pairs))} alike")
+    print(f"    reached, too: {share(sum(a and b for a, b in pairs), sum(theirs))} of theirs")
+    print(f"    reached by {label} alone: {sum(a and not b for a, b in pairs)}")
+    missed = [k for k, (a, b) in enumerate(pairs) if b and not a]
+    for cause, count in Counter(cause_of(ours[k]) for k in missed).most_common():
+        print(f"    reached by {name} alone: {count} x {cause}", flush=True)
+    differing = [k for k, (a, b) in enumerate(pairs) if a != b]
+    print(f"    different: {differing[:20]}", flush=True)
 
-    def check(self, X_WG: Array) -> Reach:
-        """As `ArmReach.check`."""
-        rng = rng_from("baseline", X_WG)
-        kinematics, margin = self._arm.kinematics, self._arm.settings.limit_margin
-        outcome = Outcome.NO_IK
-        for X in (X_WG, swap_fingers(X_WG)):
-            for _ in range(BASELINE_STARTS):
-                q = self._solve(
-                    X, rng.uniform(kinematics.lower + margin, kinematics.upper - margin)
-                )
-                if q is None:
-                    continue
-                q_before = self._solve(pregrasp(X, self._arm.settings.standoff), q)
-                if q_before is None:
-                    continue
-                if self._arm.collision.is_free(q) and self._arm.collision.is_free(q_before):
-                    return Reach(None, q, q_before)
-                outcome = Outcome.ARM_COLLISION
-        return Reach(outcome)
 
-    def _solve(self, X_WG: Array, start: Array) -> Array | None:
-        X_WH = X_WG @ inverse(self._station.hand.X_HG.matrix())
-        problem = InverseKinematics(self._plant)
-        world, hand = self._plant.world_frame(), self._hand.body_frame()
-        problem.AddPositionConstraint(
-            hand, np.zeros(3), world, X_WH[:3, 3] - 1e-5, X_WH[:3, 3] + 1e-5
-        )
-        R_WH = RotationMatrix(X_WH[:3, :3])
-        problem.AddOrientationConstraint(world, R_WH, hand, RotationMatrix(), 1e-4)
-        problem.prog().SetInitialGuess(problem.q(), np.concatenate([start, (0.04, 0.04)]))
-        result = SnoptSolver().Solve(problem.prog())
-        return result.GetSolution(problem.q())[: len(start)] if result.is_success() else None
+def cause_of(reach: Reach) -> str:
+    """Why a grasp is not reached."""
+    return f"{reach.outcome} {reach.blocker}".rstrip()
+
+
+def share(count: int, total: int) -> str:
+    """A count with its interval."""
+    low, high = wilson_interval(count, total)
+    return f"{count} of {total} ({100.0 * low:.1f} to {100.0 * high:.1f} %)"
 
 
 if __name__ == "__main__":
