@@ -1,8 +1,9 @@
 """`python -m tools.pictures [station] [pages]`: makes pictures for the documentation.
 
 `station` renders those of stations and the built-in objects by Drake. `pages` takes those of grasps
-by a column, of frames and of a reachability map from the pages that the commands write with --html, by a Chromium
-that runs without a display. The others of Meshcat and of the report are screenshots by hand.
+by a column, of frames and of a reachability map from the pages that the commands write with --html,
+by a Chromium that runs without a display. The others of Meshcat and of the report are screenshots
+by hand.
 """
 
 from __future__ import annotations
