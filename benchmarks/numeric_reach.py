@@ -15,7 +15,8 @@ from collections import Counter
 from pathlib import Path
 
 from reach import STEP, Grasps, clear_grasps
-from reach_judges import Plain, World, audit
+from reach_audit import Audit
+from reach_judges import Plain, World
 
 from burg_drake.core.frames import inverse
 from burg_drake.motion.ik_routine import IkRoutine
@@ -99,11 +100,12 @@ def against_drake(
     world = World(scene, station, settings.standoff, settings.lift_height)
     reached = [k for k, reach in enumerate(found) if reach.witness is not None]
     audited = reached[: arguments.audit]
-    faults = 0
+    audit, faults = Audit(scene, station), 0
     for k in audited:
         witness = found[k].witness
         assert witness is not None
-        faults += bool(audit(world, grasps.instance[k], witness, STEP))
+        width = float(grasps.width[k])
+        faults += bool(audit.faults(grasps.instance[k], witness, width, step=STEP))
     print(f"  audit: {faults} of {len(audited)} motions collide")
     refused = [
         k
