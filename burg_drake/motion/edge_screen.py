@@ -21,6 +21,11 @@ COARSE = 0.08
 """Longest stretch that the screen begins with [m of displacement]."""
 FINE = 0.003
 """Longest stretch that is left undecided [m of displacement]."""
+GRAZE = 0.001
+"""The same where the hand passes objects without having been swept: at 3 mm a hand was missed that
+cut a corner by 0.2 mm."""
+GUESS = 0.012
+"""The same where a best guess decides in the end."""
 PIECES = 3
 """Into how many pieces a stretch is divided. Halving would need fewer configurations, but more
 batches, whose overhead counts where there are few segments."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
 from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.edge_screen import FINE, Screened, screen_edges
+from burg_drake.motion.edge_screen import FINE, GRAZE, GUESS, Screened, screen_edges
 from burg_drake.motion.proximity import ArmProximity
 
 ROWS = 0.20
@@ -47,10 +47,17 @@ class Edges:
         """Whether the arm can move straight in joint space from `q_a` (n,) to `q_b` (n,)."""
         return self.first_blocked(np.stack([q_a, q_b])) is None
 
-    def screen(self, q_a: Array, q_b: Array, *, fine: float = FINE) -> Screened:
+    def screen(self, q_a: Array, q_b: Array, *, fine: float | None = None) -> Screened:
         """What the fast tier says of (E, n) segments, in one batch; stretches no longer than `fine`
         [m of displacement] may be left undecided."""
+        fine = self._fine(hand=True) if fine is None else fine
         return screen_edges(self.proximity, q_a, q_b, fine=fine)
+
+    def _fine(self, *, hand: bool) -> float:
+        """Longest stretch that is left undecided [m of displacement]."""
+        if not self.exact:
+            return GUESS
+        return GRAZE if hand else FINE
 
     def seem_free(self, screened: Screened, *, guess: bool = False) -> NDArray[np.bool_]:
         """(E,) segments that are worth a closer look: with `exact` those that nothing is proven
@@ -141,6 +148,7 @@ class Edges:
             np.concatenate([q[:-1] for q in corners]),
             np.concatenate([q[1:] for q in corners]),
             hand=hand,
+            fine=self._fine(hand=hand),
             refutes=np.array([not name for name in names])[path],
             path=path,
             known=known,
