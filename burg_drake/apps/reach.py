@@ -230,7 +230,8 @@ def _print_tables(grasps: GraspSet) -> None:
     asked = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())
     if asked and seconds > 0.0:
-        print(f"{asked / seconds:.3g} clear grasps per CPU second; {seconds:.3g} s in all")
+        rate = f"{asked / seconds:.3g} clear grasps per CPU second"
+        print(f"{rate}; {seconds:.3g} CPU seconds without set-up")
 
 
 def _outcome_table(grasps: GraspSet, by_object: Mapping[str, Counter[Any]], total: Any) -> Any:

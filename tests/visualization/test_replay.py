@@ -46,7 +46,8 @@ def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station:
     early = HandTrial(scene, station).run("box", X_OG)
     result = record_trial(scene, station, "box", X_OG, meshcat)
     whole = dataclasses.replace(ENGINES["standard"], whole_trial=True)
-    assert result == HandTrial(scene, station, engine=whole).run("box", X_OG)
+    again = HandTrial(scene, station, engine=whole).run("box", X_OG)
+    assert repr(result) == repr(again)  # NaN is not equal to itself
     assert result.outcome is early.outcome is Outcome.LIFTED
     assert result.margins.end_time > early.margins.end_time + 1.0
     recording = meshcat.get_mutable_recording()
