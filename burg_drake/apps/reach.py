@@ -84,13 +84,13 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--plan-format",
         choices=("csv", "json"),
-        default="csv",
-        help="of these: a table, or what load_plan in Python reads (default: %(default)s)",
+        help="of these: a table, or what load_plan in Python reads (default: csv)",
     )
     parser.add_argument(
         "--screening",
         action="store_true",
-        help="do not check each yes by Drake's CollisionChecker; several times faster",
+        help="decide by quick bounds instead of Drake's CollisionChecker: twice as fast, and wrong"
+        " about one or two grasps in a hundred, either way",
     )
     parser.add_argument(
         "--approach-angle",
@@ -118,6 +118,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.station.station import load_station
 
     require_file(arguments)
+    if arguments.plan_format and not arguments.plans:
+        raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
     if arguments.only_reachable and arguments.output is None:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
     output = _output(arguments)
@@ -134,7 +136,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         grasps,
         exact=not arguments.screening,
         plans=arguments.plans,
-        plan_format=arguments.plan_format,
+        plan_format=arguments.plan_format or "csv",
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
@@ -155,8 +157,9 @@ def _print_failures(failed: GraspSet, what: str, total: int) -> None:
     """A line about grasps whose computation has failed, if there are any."""
     if len(failed):
         reason = failed.column("reason")[0].removeprefix("no plan: ")
+        id = f"{failed.column('instance')[0]}-{failed.id[0]}"
         print(
-            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {failed.id[0]}: {reason}",
+            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}",
             file=sys.stderr,
         )
 

@@ -22,7 +22,14 @@ from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, gi
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.judge import Decide, Decision, Verdict, one_line
 from burg_drake.evaluation.progress import Listener, Progress, Reporter
-from burg_drake.evaluation.screens import arm_reach, arm_screen, hand_alone, hand_screen
+from burg_drake.evaluation.run_document import numbers
+from burg_drake.evaluation.screens import (
+    arm_reach,
+    arm_screen,
+    arm_settings,
+    hand_alone,
+    hand_screen,
+)
 from burg_drake.evaluation.set_documents import set_documents
 from burg_drake.evaluation.table import Columns
 from burg_drake.motion.trajectory import Plan
@@ -206,16 +213,16 @@ def _with_columns(
     provenance = {
         **candidates.grasps.provenance,
         **set_documents(scene.library, scene, station, objects),
-        "reach": {"exact": exact},
+        "reach": {**numbers(arm_settings(exact=exact)), "exact": exact},
     }
     return replace(candidates.grasps, provenance=provenance).with_columns(**columns)
 
 
 def reach_columns(grasps: GraspSet) -> Columns:
-    """What `reach` returns as a table: ids, poses as quaternions, and all its columns."""
+    """What `reach` returns as a table: ids as in runs, poses as quaternions, all its columns."""
     wxyz = quaternion_from_rotation(grasps.X_OG[:, :3, :3]) if len(grasps) else np.empty((0, 4))
     return {
-        "id": grasps.id,
+        "id": _texts(Candidates(grasps, grasps.column(INSTANCE)).id),
         INSTANCE: grasps.column(INSTANCE),
         "object": grasps.object,
         "width": grasps.width,

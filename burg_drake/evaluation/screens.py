@@ -19,6 +19,7 @@ from burg_drake.station.station import Station
 if TYPE_CHECKING:
     from burg_drake.grasping.clearance import HandClearance
     from burg_drake.motion.reach import ArmReach, Reach
+    from burg_drake.motion.reach_settings import ReachSettings
     from burg_drake.simulation.trial_settings import TrialSettings
 
 HAND_BATCH = 512
@@ -115,8 +116,14 @@ def arm_reach(
         exact: see `ReachSettings`.
     """
     from burg_drake.motion.reach import ArmReach
+
+    return ArmReach(scene, station, settings=arm_settings(settings, exact=exact))
+
+
+def arm_settings(settings: TrialSettings | None = None, *, exact: bool = True) -> ReachSettings:
+    """How the arm is asked before a trial; see `arm_reach`."""
     from burg_drake.motion.reach_settings import ReachSettings
     from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
 
     lift = (settings or DEFAULT_TRIAL).lift_height
-    return ArmReach(scene, station, settings=ReachSettings(lift_height=lift, exact=exact))
+    return ReachSettings(lift_height=lift, exact=exact)

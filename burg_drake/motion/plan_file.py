@@ -103,7 +103,7 @@ def load_plan(path: str | Path) -> Plan:
         raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:
         raise InvalidInputError(
-            f"{path} is not JSON ({error}); give a file of Plan.to_json"
+            f"{path} is not JSON ({error}); give a file of Plan.to_json (a CSV cannot be read back)"
         ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InvalidInputError(f"{path} is no plan: it lacks format {FORMAT!r}")

@@ -185,7 +185,7 @@ def test_a_set_has_to_name_its_objects(scene: Scene, station: Station) -> None:
 def test_a_table_has_it_all(judged: GraspSet, tmp_path: Path) -> None:
     write_table(tmp_path / "reach.csv", reach_columns(judged))
     back = read_table(tmp_path / "reach.csv")
-    assert back["id"].tolist() == judged.id.tolist()
+    assert back["id"].tolist() == [f"box-{id}" for id in judged.id]
     assert back["outcome"].tolist() == judged.column("outcome").tolist()
     np.testing.assert_array_equal(back["q_grasp_1"], judged.column("q_grasp_1"))
     np.testing.assert_array_equal(back["z"], GRASPS[:, 2, 3])
@@ -195,7 +195,8 @@ def test_a_set_comes_back_from_its_file(judged: GraspSet, tmp_path: Path) -> Non
     judged.save(tmp_path / "reach.h5")
     back = GraspSet.load(tmp_path / "reach.h5")
     assert back.column("outcome").tolist() == judged.column("outcome").tolist()
-    assert back.provenance["reach"] == {"exact": True}
+    said = back.provenance["reach"]
+    assert said["exact"] is True and said["lift_height"] == 0.3
 
 
 def test_no_grasps_are_no_answers(scene: Scene, station: Station) -> None:
