@@ -54,6 +54,7 @@ from burg_drake.evaluation.run_store import (
     save_run,
     write_copies,
 )
+from burg_drake.evaluation.screens import arm_settings
 from burg_drake.evaluation.station_judge import StationJudgeFactory
 from burg_drake.evaluation.table_file import require_writer, write_table
 from burg_drake.scene.scene import Scene, load_scene
@@ -159,7 +160,6 @@ def _document(
     table: TableFormat,
 ) -> RunDocument:
     """What this call asks for; what comes of the grasps is filled in later."""
-    from burg_drake.motion.reach_settings import ReachSettings
     from burg_drake.simulation.trial_settings import TrialSettings
 
     instances = [*scene.instances.values(), *scene.background.values()]
@@ -183,7 +183,7 @@ def _document(
         engine=engine,
         trial=numbers(TrialSettings()),
         mode=mode,
-        arm={} if mode == "hand" else numbers(ReachSettings()),
+        arm={} if mode == "hand" else numbers(arm_settings()),
         seed=seed,
         table=table,
         versions=software_versions(),

@@ -89,12 +89,7 @@ class ArmTrial(Trial):
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
-        self._kinematics = ArmKinematics.from_plant(
-            diagram.plant,
-            diagram.arm_joints,
-            diagram.plant.GetFrameByName(arm.base, self.hand.arm),
-            self.hand.body.body_frame(),
-        )
+        self._kinematics = ArmKinematics.of(diagram)
         self._steps_a_look = max(1, round(settings.poll / engine.time_step))
         self.look = self._steps_a_look * engine.time_step
         self.gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
@@ -129,6 +124,10 @@ class ArmTrial(Trial):
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
         self._check_plan(plan, X_WG)
+        # Which finger is on which side is the plan's; of a hand that is not symmetric that matters.
+        as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
+        if rotation_angle(X_WG[:3, :3].T @ as_planned) > OFF_ANGLE:
+            X_WG = swap_fingers(X_WG)
         screen = self.clearance.check(instance, X_WG)
         if screen.outcome is not None:
             return collision(screen)
