@@ -14,6 +14,7 @@ from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, dump_document, load_document, save_document
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.scene.markers import MarkerLayout, Markers, marker_layout
 
 NAME_PATTERN = re.compile(r"[\w.-]+")
 """Names of instances are parts of grasp ids, of file names and of paths in Meshcat."""
@@ -47,13 +48,24 @@ class Board:
 
     Attributes:
         size: extents along x and y [m]; A2 landscape by default.
+        markers: ArUco markers printed on it.
     """
 
     size: tuple[float, float] = (0.594, 0.420)
+    markers: Markers = Markers()
 
     def __post_init__(self) -> None:
         if min(self.size) <= 0.0:
             raise InvalidInputError(f"board size {list(self.size)} must be positive [m]")
+
+    @cached_property
+    def layout(self) -> MarkerLayout:
+        """Where its markers lie; see `scene.markers.marker_layout`.
+
+        Raises:
+            InvalidInputError: they do not fit.
+        """
+        return marker_layout(self.size, self.markers)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""Cameras: intrinsics, the board's pose from an image, overlay, placement check, image sources."""

@@ -1,0 +1,1 @@
+"""The printable board: height map of a scene, markers at true scale, pages."""
