@@ -15,15 +15,19 @@ from collections.abc import Sequence
 
 from burg_drake import __version__
 from burg_drake.apps import (
+    ar,
+    camera,
     evaluate,
     frames,
     grasps,
     hand,
     library,
+    printout,
     reach,
     replay,
     report,
     robustness,
+    ros,
     scene,
     station,
 )
@@ -34,7 +38,23 @@ INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
 
-VERBS = (library, scene, grasps, reach, evaluate, robustness, replay, report, station, hand, frames)
+VERBS = (
+    library,
+    scene,
+    printout,
+    ar,
+    camera,
+    grasps,
+    reach,
+    evaluate,
+    robustness,
+    replay,
+    report,
+    station,
+    hand,
+    frames,
+    ros,
+)
 
 
 def build_parser() -> Parser:

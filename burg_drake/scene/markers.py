@@ -127,9 +127,7 @@ def marker_layout(size: tuple[float, float], markers: Markers) -> MarkerLayout:
     left, bottom = (np.array(size) - extent) / 2
     x = left + pitch * np.arange(columns)
     y = bottom + pitch * np.arange(rows)[::-1] + markers.side  # upper edges, from the top row on
-    upper_left = np.stack([*np.meshgrid(x, y), np.zeros((rows, columns))], axis=-1).reshape(
-        -1, 1, 3
-    )
+    grid = np.stack([*np.meshgrid(x, y), np.zeros((rows, columns))], axis=-1)
     square = markers.side * np.array([[0, 0, 0], [1, 0, 0], [1, -1, 0], [0, -1, 0]], dtype=float)
     ids = np.arange(markers.first_id, markers.first_id + total, dtype=np.int32)
     cells = dictionary.markerSize + 2

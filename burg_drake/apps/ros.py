@@ -1,0 +1,9 @@
+"""`burg-drake ros`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verbs."""
