@@ -29,6 +29,7 @@ HEAVY = {
     "networkx",
     "pyarrow",
     "pydrake",
+    "reportlab",
     "scipy",
     "trimesh",
 }

@@ -9,7 +9,10 @@ github.com/mrudorfer/jogramop-framework:
 - `objects` are free, `bg_objects` are fixed. Each has the identifier of its type in the object
   library, and the pose (4, 4) of the type's mesh after scaling. There are no names of instances.
 - `object_library_fn` leads to the library, relative to the scene; null if it was not told.
-- `printout` has the size and the markers of the printed board, or null. Ours are other ones.
+- `printout` is null, or has the printed board, with the same lower left corner as the ground area
+  and at least as large: `size` [m], and the grid of markers in the middle of it, `marker_info`:
+  `aruco_dict` ("DICT_4X4_250"), `marker_count_x`, `marker_count_y`, `marker_size_mm`,
+  `marker_spacing_mm` (burg_toolkit/printout.py). Ids count from 0 row by row from the upper left.
 """
 
 from __future__ import annotations
@@ -18,9 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-import yaml
-
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import FieldError, InvalidInputError
 from burg_drake.core.schema import Pose
 from burg_drake.core.yaml_nodes import load_nodes
 from burg_drake.formats.burg_document import BurgReader, Matrix, relocated
@@ -48,6 +49,25 @@ class BurgInstance:
 
 
 @dataclass(frozen=True, kw_only=True)
+class BurgPrintout:
+    """The printed board of a scene of BURG-Toolkit.
+
+    Attributes:
+        size: extents along x and y [m], from the ground area's origin.
+        dictionary: of its ArUco markers, as OpenCV names it, without `DICT_`.
+        count: columns and rows of markers.
+        side: length of a marker's side [m].
+        spacing: width of the gap between markers [m].
+    """
+
+    size: tuple[float, float]
+    dictionary: str
+    count: tuple[int, int]
+    side: float
+    spacing: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class BurgScene:
     """A scene of BURG-Toolkit.
 
@@ -57,6 +77,7 @@ class BurgScene:
         objects: free objects, in the document's order.
         bg_objects: fixed objects.
         library: the object library's document; it need not exist. None if the scene names none.
+        printout: the printed board; None if the scene has none.
         notes: what in the document was left aside or changed, one sentence each.
     """
 
@@ -65,6 +86,7 @@ class BurgScene:
     objects: tuple[BurgInstance, ...]
     bg_objects: tuple[BurgInstance, ...]
     library: Path | None = None
+    printout: BurgPrintout | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -77,8 +99,36 @@ class _Instance:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _MarkerInfo:
+    """Schema of the markers of a printout."""
+
+    aruco_dict: str
+    marker_count_x: int
+    marker_count_y: int
+    marker_size_mm: float
+    marker_spacing_mm: float
+
+    def __post_init__(self) -> None:
+        for name in ("marker_count_x", "marker_count_y", "marker_size_mm", "marker_spacing_mm"):
+            if getattr(self, name) <= 0:
+                raise FieldError(f"{name} is {getattr(self, name):g}; it must be above 0", name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Printout:
+    """Schema of a printout."""
+
+    size: tuple[float, float]
+    marker_info: _MarkerInfo
+
+    def __post_init__(self) -> None:
+        if min(self.size) <= 0.0:
+            raise FieldError(f"size {list(self.size)} must be above 0 [m]", "size")
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Document:
-    """Schema of the file, without the printout."""
+    """Schema of the file."""
 
     yaml_file_type: str
     yaml_file_version: str
@@ -87,6 +137,7 @@ class _Document:
     objects: tuple[_Instance, ...]
     bg_objects: tuple[_Instance, ...] = ()
     object_library_fn: str | None = None
+    printout: _Printout | None = None
 
     def __post_init__(self) -> None:
         if min(self.ground_area_x, self.ground_area_y) <= 0.0:
@@ -109,15 +160,16 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     """
     path = Path(path)
     node = load_nodes(path)
-    reader = BurgReader(str(path), skipped=("printout",))
+    reader = BurgReader(str(path))
     reader.check_kind(node, FILE_TYPE, FILE_VERSION, "a scene", HINTS)
     document = cast(_Document, reader.read(node, _Document, ""))
     notes = reader.notes
-    printout = reader.entries(node, "").get("printout")
-    if printout is not None and isinstance(printout[1], yaml.MappingNode):
+    ground_area = (document.ground_area_x, document.ground_area_y)
+    if document.printout is not None and document.printout.size != ground_area:
+        line = reader.entries(node, "")["printout"][0].start_mark.line + 1
         notes.append(
-            f"{path}:{printout[0].start_mark.line + 1}: the printout was left aside; markers of"
-            " BURG-Toolkit's boards are not ours"
+            f"{path}:{line}: the board is the printout, {_millimetres(document.printout.size)}; the"
+            f" ground area of {_millimetres(ground_area)} was left aside"
         )
     placed = {}
     for key in ("objects", "bg_objects"):
@@ -125,12 +177,30 @@ def read_burg_scene(path: str | Path) -> BurgScene:
         placed[key] = tuple(_instance(item, str(path), line, notes) for item, line in items)
     return BurgScene(
         path=path,
-        ground_area=(document.ground_area_x, document.ground_area_y),
+        ground_area=ground_area,
         objects=placed["objects"],
         bg_objects=placed["bg_objects"],
         library=relocated(document.object_library_fn, path.parent),
+        printout=_printout(document.printout),
         notes=tuple(notes),
     )
+
+
+def _printout(given: _Printout | None) -> BurgPrintout | None:
+    if given is None:
+        return None
+    info = given.marker_info
+    return BurgPrintout(
+        size=given.size,
+        dictionary=info.aruco_dict.removeprefix("DICT_"),
+        count=(info.marker_count_x, info.marker_count_y),
+        side=round(info.marker_size_mm * 1e-3, 9),
+        spacing=round(info.marker_spacing_mm * 1e-3, 9),
+    )
+
+
+def _millimetres(size: tuple[float, float]) -> str:
+    return f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm"
 
 
 def _instance(item: _Instance, path: str, line: int, notes: list[str]) -> BurgInstance:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
-from burg_drake.core.errors import UnknownNameError, nearest
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.formats.burg_scene import BurgInstance, BurgScene
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.pipeline.source import object_name
+from burg_drake.scene.markers import Markers
 from burg_drake.scene.scene import Board, Instance, SceneDocument
 
 
@@ -18,7 +19,8 @@ def burg_scene_document(
 
     Objects are those that `pipeline.imports.burg_sources` makes of the scene's object library, by
     `object_name(identifier)`. Instances have no names in BURG-Toolkit; they get those of their
-    objects, the second one of an object `NAME_2` and so on.
+    objects, the second one of an object `NAME_2` and so on. The board is the scene's printout with
+    its markers; without one it has the size of the ground area and the markers of this project.
 
     Args:
         scene: from `formats.burg_scene.read_burg_scene`.
@@ -28,17 +30,36 @@ def burg_scene_document(
 
     Raises:
         UnknownNameError: the library lacks an object; the message names file and line.
-        InvalidInputError: an identifier makes no object name.
+        InvalidInputError: an identifier makes no object name; the printout's markers do not exist
+            or do not fit.
     """
     names = _Names(scene, library)
     return SceneDocument(
         name=name or scene.path.stem,
         description=f"Imported from BURG-Toolkit's {scene.path.name}",
         library=reference or str(library.root),
-        board=Board(size=scene.ground_area),
+        board=_board(scene),
         instances=tuple(names.instance(item) for item in scene.objects),
         background=tuple(names.instance(item) for item in scene.bg_objects),
     )
+
+
+def _board(scene: BurgScene) -> Board:
+    printout = scene.printout
+    if printout is None:
+        return Board(size=scene.ground_area)
+    markers = Markers(
+        dictionary=printout.dictionary,
+        side=printout.side,
+        spacing=printout.spacing,
+        count=printout.count,
+    )
+    board = Board(size=printout.size, markers=markers)
+    try:
+        _ = board.layout
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{scene.path}: printout: {error}") from error
+    return board
 
 
 class _Names:

@@ -29,7 +29,16 @@ def burg_scene(tmp_path: Path) -> Path:
             {"object_type": "bottle", "pose": np.array(UPRIGHT, float).tolist()},
         ],
         "bg_objects": [],
-        "printout": {"size": [0.594, 0.42]},
+        "printout": {
+            "size": [0.594, 0.42],
+            "marker_info": {
+                "aruco_dict": "DICT_4X4_250",
+                "marker_count_x": 7,
+                "marker_count_y": 5,
+                "marker_size_mm": 57,
+                "marker_spacing_mm": 19,
+            },
+        },
         "yaml_file_version": "1.0",
         "yaml_file_type": "Scene",
     }
@@ -42,12 +51,14 @@ def test_it_becomes_a_sound_scene(burg_scene: Path, tmp_path: Path, capsys: Capt
     output = tmp_path / "kitchen.yaml"
     options = ["--library", "household", "-o", str(output)]
     assert main(["scene", "import-burg", str(burg_scene), *options]) == 0
-    note, wrote = capsys.readouterr().out.splitlines()
-    assert "the printout was left aside" in note
+    (wrote,) = capsys.readouterr().out.splitlines()
     assert wrote == f"wrote {output}: 2 objects"
     scene = load_scene(output)
     assert (scene.name, scene.document.library) == ("kitchen", "household")
+    markers = scene.board.markers
     assert scene.board.size == (0.594, 0.42)
+    assert (markers.dictionary, markers.count, markers.first_id) == ("4X4_250", (7, 5), 0)
+    assert (markers.side, markers.spacing) == (0.057, 0.019)
     np.testing.assert_allclose(scene.X_SO("mug"), TURNED, atol=1e-15)
     np.testing.assert_allclose(scene.X_SO("bottle"), UPRIGHT, atol=1e-15)
     assert main(["scene", "validate", str(output)]) == 0

@@ -102,12 +102,33 @@ def test_poses_in_single_precision(tmp_path: Path) -> None:
 def test_what_it_may_lack_and_have(tmp_path: Path) -> None:
     scene = read_burg_scene(changed(tmp_path, object_library_fn=None, bg_objects=None, objects=[]))
     assert (scene.library, scene.objects, scene.bg_objects) == (None, (), ())
-    printout = {"size": [0.594, 0.42], "marker_info": {"aruco_dict": "DICT_4X4_250"}}
-    path = changed(tmp_path, printout=printout, lights=3)
-    unknown, board = read_burg_scene(path).notes
+    (unknown,) = read_burg_scene(changed(tmp_path, lights=3)).notes
     assert "key 'lights' was left aside" in unknown
-    assert "the printout was left aside; markers of BURG-Toolkit's boards are not ours" in board
-    assert str(path) in unknown and str(path) in board
+
+
+MARKERS = {
+    "aruco_dict": "DICT_4X4_250",
+    "marker_count_x": 7,
+    "marker_count_y": 5,
+    "marker_size_mm": 57,
+    "marker_spacing_mm": 19,
+}
+
+
+def test_its_printed_board(tmp_path: Path) -> None:
+    printout = {"size": [2, 1.5], "marker_info": MARKERS}
+    scene = read_burg_scene(changed(tmp_path, printout=printout))
+    board = scene.printout
+    assert board is not None and scene.notes == ()
+    assert (board.size, board.dictionary, board.count) == ((2.0, 1.5), "4X4_250", (7, 5))
+    assert (board.side, board.spacing) == (0.057, 0.019)
+    path = changed(tmp_path, printout=printout | {"size": [2.1, 1.6]})
+    (note,) = read_burg_scene(path).notes
+    line = path.read_text().splitlines().index("printout:") + 1
+    assert note == (
+        f"{path}:{line}: the board is the printout, 2100 x 1600 mm; the ground area of"
+        " 2000 x 1500 mm was left aside"
+    )
 
 
 def instance(**values: Any) -> list[dict[str, Any]]:
@@ -129,6 +150,15 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0]).tolist()
         ({"objects": "box"}, "objects: expected a list"),
         ({"objects": instance(pose=[[1, 0, 0, 0]])}, r"objects\[0\].pose: has 1 entries; expected"),
         ({"objects": [{"object_type": "a"}]}, r"objects\[0\]: key 'pose' is missing"),
+        (
+            {"printout": {"size": [0, 1], "marker_info": MARKERS}},
+            r"size \[0.0, 1.0\] must be above 0",
+        ),
+        ({"printout": {"size": [1, 1]}}, "printout: key 'marker_info' is missing"),
+        (
+            {"printout": {"size": [1, 1], "marker_info": MARKERS | {"marker_size_mm": -57}}},
+            r":\d+: printout.marker_info: marker_size_mm is -57; it must be above 0",
+        ),
         ({"objects": instance(pose=MIRROR)}, r"scene.yaml:\d+: pose of 'a'\[0\] is a mirror image"),
     ],
 )

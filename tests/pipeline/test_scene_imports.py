@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from burg_drake.core.errors import UnknownNameError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.schema import Pose
-from burg_drake.formats.burg_scene import BurgInstance, BurgScene
+from burg_drake.formats.burg_scene import BurgInstance, BurgPrintout, BurgScene
 from burg_drake.objects.library import load_library
 from burg_drake.pipeline.scene_imports import burg_scene_document
 
@@ -57,3 +59,36 @@ def test_an_object_that_the_library_lacks() -> None:
     message = r"there/scene.yaml:11: object 'mugg' \('Mugg'\) is not in .*; did you mean 'mug'\?"
     with pytest.raises(UnknownNameError, match=message):
         burg_scene_document(scene(("mug", "Mugg")), load_library("household"))
+
+
+PRINTOUT = BurgPrintout(
+    size=(0.594, 0.42), dictionary="4X4_250", count=(7, 5), side=0.057, spacing=0.019
+)
+
+
+def test_the_printed_board() -> None:
+    """BURG-Toolkit's default on A2: the border of its grid is half of what 7 x 5 markers leave."""
+    printed = dataclasses.replace(scene(("mug",)), printout=PRINTOUT)
+    board = burg_scene_document(printed, load_library("household")).board
+    layout = board.layout
+    assert (board.size, layout.dictionary, layout.ids.tolist()) == (
+        (0.594, 0.42), "4X4_250", list(range(35)),
+    )  # fmt: skip
+    left, bottom = (0.594 - 7 * 0.076 + 0.019) / 2, (0.42 - 5 * 0.076 + 0.019) / 2
+    first = np.array([left, bottom + 4 * 0.076 + 0.057, 0.0])
+    np.testing.assert_allclose(layout.p_SQ[0, 0], first, atol=1e-12)
+    np.testing.assert_allclose(layout.p_SQ[28, 3], [left, bottom, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"dictionary": "4X4_25"}, "there/scene.yaml: printout: marker dictionary '4X4_25' does"),
+        ({"count": (9, 5)}, "there/scene.yaml: printout: markers of 57 mm .* do not fit"),
+    ],
+)
+def test_a_board_that_cannot_be(change: dict[str, object], message: str) -> None:
+    printout = dataclasses.replace(PRINTOUT, **change)
+    printed = dataclasses.replace(scene(()), printout=printout)
+    with pytest.raises(InvalidInputError, match=message):
+        burg_scene_document(printed, load_library("household"))

@@ -1,0 +1,230 @@
+"""Prints a scene's board as a PDF: markers at true scale, objects from below, pages to assemble."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from reportlab.pdfgen.canvas import Canvas
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import atomic_write
+from burg_drake.core.frames import Array
+from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
+from burg_drake.printout.page_frame import Caption, draw_page_frame
+from burg_drake.printout.paper import Paper, orientations
+from burg_drake.printout.pen import FAINT, POINT, Pen, rectangle
+from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
+from burg_drake.printout.tiling import Tile, Tiling, tile_board
+from burg_drake.scene.markers import MarkerLayout
+from burg_drake.scene.scene import Scene
+from burg_drake.scene.validate import validate_scene
+
+MEASURED = (0.080, 0.125)
+"""What a printed ruler of 100 mm can measure [m]; else it was read in another unit."""
+LOST = 0.5e-3
+"""An object that loses less than this to the page's margin is worth no word [m]."""
+FORM = "board"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrintSettings:
+    """How a board is printed.
+
+    Attributes:
+        page: name of a paper, or `WxH` in millimetres; see `printout.paper`.
+        margin: that the printer leaves white on all sides of a page [m].
+        measured: what the rulers of 100 mm along x and y of the page measured on paper [m]; all is
+            drawn larger by as much as that is too little.
+        height_map: draw the objects.
+        names: write their names beside them.
+    """
+
+    page: str = "A4"
+    margin: float = 5e-3
+    measured: tuple[float, float] = (0.1, 0.1)
+    height_map: bool = True
+    names: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.margin <= 0.05:
+            raise InvalidInputError(f"margin is {1e3 * self.margin:g} mm; it must be 0 to 50 mm")
+        for value in self.measured:
+            if not MEASURED[0] <= value <= MEASURED[1]:
+                raise InvalidInputError(
+                    f"a ruler of 100 mm measured {1e3 * value:g} mm; it must be"
+                    f" {1e3 * MEASURED[0]:g} to {1e3 * MEASURED[1]:g} mm"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Printout:
+    """A printed board.
+
+    Attributes:
+        pdf: the document; the same bytes for the same scene and settings.
+        tiling: what of the board is where on which page.
+        settings: how it was printed.
+        warnings: what is not as the scene has it, a sentence each.
+    """
+
+    pdf: bytes
+    tiling: Tiling
+    settings: PrintSettings
+    warnings: tuple[str, ...]
+
+    def p_PQ(self, page: int, p_SQ: Array) -> Array:
+        """Points of the board on a page of the document.
+
+        Args:
+            page: its number, from 1.
+            p_SQ: (..., 2 or 3) points in the scene frame [m].
+
+        Returns:
+            (..., 2) from the page's lower left corner [m], as the document has them: what a printer
+            that scales as `measured` says puts in its true place.
+        """
+        tile = self.tiling.tiles[page - 1]
+        return (np.asarray(p_SQ)[..., :2] + tile.p_PS) * _stretch(self.settings)
+
+    def save(self, path: str | Path) -> None:
+        """Writes the PDF.
+
+        Raises:
+            InvalidInputError: the place cannot be written to.
+        """
+        atomic_write(path, self.pdf)
+
+
+def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout:
+    """Prints the board of a scene.
+
+    Args:
+        scene: what reaches beyond the board is cut off, and an arrow points to it.
+        settings: page and printer; A4 by default.
+
+    Raises:
+        UnknownNameError: there is no such page; a mesh file is missing.
+        InvalidInputError: no markers fit on the board, or none on a page; too many pages.
+    """
+    settings = settings or PrintSettings()
+    papers = orientations(settings.page, settings.margin, settings.measured)
+    size, layout = scene.board.size, scene.board.layout
+    drawings = draw_objects(scene) if settings.height_map else []
+    tiling = tile_board(size, layout, _needed(size, layout, drawings, papers[0]), papers)
+    sheet = Sheet(
+        size=size,
+        layout=layout,
+        drawings=drawings,
+        arrows=draw_arrows(scene) if settings.height_map else [],
+        marks=alignment_marks(layout, tiling),
+    )
+    homeless: list[str] = []
+    if settings.names:
+        sheet, homeless = place_names(sheet, tiling)
+    warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
+    warnings += _lost(sheet, tiling)
+    warnings += [f"there is no room for the words {words!r}" for words in homeless]
+    pdf = _document(scene, sheet, tiling, settings)
+    return Printout(pdf, tiling, settings, tuple(warnings))
+
+
+def _needed(
+    size: tuple[float, float], layout: MarkerLayout, drawings: list[Drawing], paper: Paper
+) -> tuple[Array, Array]:
+    """Corners of what has to be on paper: markers, and objects but for the rim that a page of the
+    board's own size has no room for."""
+    points = layout.p_SQ[:, :, :2].reshape(-1, 2)
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    inner = np.array(paper.lower), np.array(size) - paper.margin
+    for drawing in drawings:
+        for outline in drawing.outline:
+            lower = np.minimum(lower, np.maximum(outline.min(axis=0), inner[0]))
+            upper = np.maximum(upper, np.minimum(outline.max(axis=0), inner[1]))
+    return lower, upper
+
+
+def _lost(sheet: Sheet, tiling: Tiling) -> list[str]:
+    """What of the objects no page shows; of those beyond the board something else was said."""
+    first, last = tiling.tiles[0], tiling.tiles[-1]
+    lower = np.array([first.lower[0], last.lower[1]])
+    upper = np.array([last.upper[0], first.upper[1]])
+    warnings = []
+    beyond = {arrow.name for arrow in sheet.arrows}
+    for drawing in sheet.drawings:
+        if drawing.name in beyond or not drawing.outline:
+            continue
+        points = np.concatenate(drawing.outline)
+        lost = max((lower - points.min(axis=0)).max(), (points.max(axis=0) - upper).max())
+        if lost > LOST:
+            warnings.append(
+                f"the outermost {1e3 * lost:.1f} mm of {drawing.name!r} lie in the margin of the"
+                " page; larger pages have room"
+            )
+    return warnings
+
+
+def _stretch(settings: PrintSettings) -> Array:
+    """How much larger all is drawn along x and y."""
+    return 0.1 / np.array(settings.measured)
+
+
+def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings) -> bytes:
+    stretch, paper = _stretch(settings), tiling.paper
+    stream = io.BytesIO()
+    page_size = tuple((stretch * [paper.width, paper.height] / POINT).tolist())
+    canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)
+    canvas.setTitle(f"Board of {scene.name}")
+    canvas.setSubject(f"scene {scene.name}, content {scene.content}")
+    canvas.setCreator("burg-drake")
+    canvas.setAuthor("burg-drake")
+    canvas.setViewerPreference("PrintScaling", "None")
+    pen = Pen(canvas)
+    canvas.beginForm(FORM, 0.0, 0.0, sheet.size[0] / POINT, sheet.size[1] / POINT)
+    draw_sheet(pen, sheet)
+    canvas.endForm()
+    for tile in tiling.tiles:
+        canvas.scale(*stretch.tolist())
+        _draw_board(pen, sheet, tile)
+        draw_page_frame(
+            pen, tile, tiling, sheet.size, _caption(scene, settings), tints=bool(sheet.drawings)
+        )
+        canvas.showPage()
+    canvas.save()
+    return stream.getvalue()
+
+
+def _draw_board(pen: Pen, sheet: Sheet, tile: Tile) -> None:
+    """The tile's part of the board, and the board's edge where it is on the page."""
+    canvas = pen.canvas
+    canvas.saveState()
+    canvas.translate(tile.p_PS[0] / POINT, tile.p_PS[1] / POINT)
+    pen.clip([rectangle(tile.lower, tile.upper)])
+    canvas.doForm(FORM)
+    pen.outline([rectangle((0.0, 0.0), sheet.size)], 0.2e-3, FAINT)
+    canvas.restoreState()
+
+
+def _caption(scene: Scene, settings: PrintSettings) -> Caption:
+    layout, size = scene.board.layout, scene.board.size
+    edge = layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0)
+    how = "Print at 100 %, not fitted to the page: both rulers must measure 100 mm."
+    if settings.measured != (0.1, 0.1):
+        x, y = (f"{1e3 * m:g}" for m in settings.measured)
+        how = (
+            f"For a printer that made 100 mm {x if x == y else f'{x} x {y}'} mm. Print at 100 %:"
+            " both rulers must measure 100 mm."
+        )
+    side, gap = 1e3 * layout.side, 1e3 * scene.board.markers.spacing
+    return Caption(
+        title=scene.name,
+        lines=(
+            f"{layout.dictionary}, ids {layout.ids[0]} to {layout.ids[-1]}, {side:g} mm with gaps"
+            f" of {gap:g} mm; content {scene.content[:8]}",
+            f"Board {1e3 * size[0]:g} x {1e3 * size[1]:g} mm; its origin lies {1e3 * edge[0]:g} mm"
+            f" left of the markers, {1e3 * edge[1]:g} mm below.",
+            how,
+        ),
+    )

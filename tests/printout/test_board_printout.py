@@ -1,0 +1,235 @@
+"""Printed boards: rasterised by poppler, detected by OpenCV, measured."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
+from burg_drake.scene.markers import MarkerLayout, Markers, marker_dictionary
+from burg_drake.scene.scene import Board, Instance, Scene, load_scene
+
+poppler = pytest.mark.skipif(
+    shutil.which("pdftoppm") is None, reason="needs pdftoppm of poppler-utils"
+)
+BURG = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019, count=(7, 5)))
+
+
+@functools.cache
+def printed(scene: str, page: str) -> Printout:
+    """A scene on a page; `burg` is on a board of BURG-Toolkit."""
+    return print_board(loaded(scene), PrintSettings(page=page))
+
+
+@functools.cache
+def loaded(scene: str) -> Scene:
+    if scene == "burg":
+        return changed(load_scene("tabletop_six"), board=BURG)
+    return load_scene(scene)
+
+
+def changed(scene: Scene, **changes: object) -> Scene:
+    """The scene with another document."""
+    document = dataclasses.replace(scene.document, **changes)
+    return Scene(document, scene.library, scene.path)
+
+
+def pages(printout: Printout, folder: Path, dpi: int, *options: str) -> list[np.ndarray]:
+    file = folder / "board.pdf"
+    printout.save(file)
+    subprocess.run(["pdftoppm", "-r", str(dpi), *options, file, folder / "page"], check=True)
+    return [cv2.imread(str(image)) for image in sorted(folder.glob("page*"))]
+
+
+def words(printout: Printout, folder: Path) -> list[str]:
+    """Text of each page, spaces made single."""
+    printout.save(folder / "board.pdf")
+    found = subprocess.run(
+        ["pdftotext", folder / "board.pdf", "-"], capture_output=True, text=True, check=True
+    )
+    return [" ".join(page.split()) for page in found.stdout.split("\f")[:-1]]
+
+
+def detect(image: np.ndarray, layout: MarkerLayout) -> dict[int, np.ndarray]:
+    """Corners (4, 2) [px] by id; pixel centres at whole numbers."""
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    detector = cv2.aruco.ArucoDetector(marker_dictionary(layout.dictionary), parameters)
+    corners, ids, _ = detector.detectMarkers(image)
+    pairs = zip(ids.reshape(-1).tolist(), corners, strict=True)
+    return {i: c.reshape(4, 2).astype(float) for i, c in pairs if i in layout.ids}
+
+
+def measured_corners(image: np.ndarray, layout: MarkerLayout, dpi: int) -> dict[int, np.ndarray]:
+    """Corners (4, 2) [m] from the page's lower left corner."""
+    up = image.shape[0] - 0.5
+    return {
+        i: np.column_stack([uv[:, 0] + 0.5, up - uv[:, 1]]) * 0.0254 / dpi
+        for i, uv in detect(image, layout).items()
+    }
+
+
+@poppler
+@pytest.mark.parametrize(
+    ("scene", "page", "dpi", "tolerance"),
+    [
+        ("tabletop_twelve", "A4", 300, 1e-4),
+        ("tabletop_six", "letter", 150, 2e-4),
+        ("burg", "A3", 150, 2e-4),
+    ],
+)
+def test_every_marker_of_every_page(
+    scene: str, page: str, dpi: int, tolerance: float, tmp_path: Path
+) -> None:
+    """Each marker is on one page, is found, is where it belongs and as long as it should be; so
+    pages that are laid over each other by their alignment marks make the board."""
+    printout, layout = printed(scene, page), loaded(scene).board.layout
+    seen: list[int] = []
+    images = pages(printout, tmp_path, dpi, "-gray")
+    assert len(images) == len(printout.tiling.tiles)
+    for number, image in enumerate(images, start=1):
+        for i, p_PQ in measured_corners(image, layout, dpi).items():
+            seen.append(i)
+            expected = printout.p_PQ(number, layout.p_SQ[layout.ids == i][0])
+            assert np.linalg.norm(p_PQ - expected, axis=1).max() < tolerance
+            sides = np.linalg.norm(p_PQ - np.roll(p_PQ, 1, axis=0), axis=1)
+            assert np.abs(sides - layout.side).max() < tolerance / 2
+    assert sorted(seen) == layout.ids.tolist()
+
+
+@poppler
+def test_a_printer_that_scales(tmp_path: Path) -> None:
+    """What is drawn larger by 100/98 along x and 100/99 along y has its true size when the printer
+    makes it smaller by as much; rulers, too."""
+    scene, dpi = load_scene("tabletop_six"), 300
+    settings = PrintSettings(page="A3", measured=(0.098, 0.099))
+    printout, shrink = print_board(scene, settings), np.array([0.98, 0.99])
+    image = pages(printout, tmp_path, dpi, "-gray", "-l", "1")[0]
+    found = measured_corners(image, scene.board.layout, dpi)
+    assert len(found) >= 12
+    for p_PQ in found.values():
+        sides = np.linalg.norm((p_PQ - np.roll(p_PQ, 1, axis=0)) * shrink, axis=1)
+        assert np.abs(sides - 0.045).max() < 5e-5
+    dark = image[..., 0] < 140
+    lower = dark[int(0.93 * len(dark)) :]  # the ruler along x; the one along y stands above
+    row = max(lower, key=longest_run)
+    column = max(dark[:, : dpi // 2].T, key=longest_run)
+    for line, factor in ((row, 0.98), (column, 0.99)):
+        assert abs(longest_run(line) / dpi * 0.0254 * factor - 0.1) < 3e-4
+
+
+def longest_run(line: np.ndarray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], line.astype(int), [0]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+@poppler
+def test_height_map_on_paper(tmp_path: Path) -> None:
+    """Under the mug's body the paper is darker than under its handle, and white beside both; white
+    cells stay far brighter than black ones everywhere."""
+    scene, dpi = load_scene("tabletop_six"), 100
+    printout = print_board(scene, PrintSettings(page="A1", names=False))
+    image = cv2.cvtColor(pages(printout, tmp_path, dpi)[0], cv2.COLOR_BGR2GRAY)
+    X_SO = scene.X_SO("mug")
+
+    def grey(x: float, y: float, z: float = 0.0) -> int:
+        u, v = printout.p_PQ(1, (X_SO @ [x, y, z, 1.0])[:3]) / 0.0254 * dpi
+        return int(image[image.shape[0] - round(v), round(u)])
+
+    surface = scene.library.surface("mug").vertices
+    tip = surface[np.argmax(np.linalg.norm(surface[:, :2], axis=1))][:2]
+    along = tip / np.linalg.norm(tip)
+    gaps = [s for s in np.linspace(0.0, 1.0, 200) if grey(*(s * tip)) not in (0, 255)]
+    body = [grey(*(s * tip)) for s in gaps if s * np.linalg.norm(tip) < 0.035]
+    handle = [grey(*(s * tip)) for s in gaps if s * np.linalg.norm(tip) > 0.05]
+    assert np.median(body) + 15 < np.median(handle) < 250
+    assert grey(*(1.2 * np.linalg.norm(tip) * along)) in (0, 255)
+    for corners, black in zip(scene.board.layout.p_SQ, scene.board.layout.black, strict=True):
+        cells = scene.board.layout.cells
+        step = scene.board.layout.side / cells
+        for (r, c), is_black in np.ndenumerate(black):
+            p = corners[0] + [(c + 0.5) * step, -(r + 0.5) * step, 0.0]
+            u, v = printout.p_PQ(1, p) / 0.0254 * dpi
+            value = np.median(
+                image[
+                    image.shape[0] - round(v) - 3 : image.shape[0] - round(v) + 4,
+                    round(u) - 3 : round(u) + 4,
+                ]
+            )
+            assert value < 30 if is_black else value > 165
+
+
+@poppler
+def test_words_on_every_page(tmp_path: Path) -> None:
+    scene = load_scene("tabletop_twelve")
+    printout = printed("tabletop_twelve", "A4")
+    texts = words(printout, tmp_path)
+    for k, text in enumerate(texts, start=1):
+        assert f"page {k} of {len(texts)}" in text and "tabletop_twelve" in text
+        assert "Print at 100 %, not fitted to the page: both rulers must measure 100 mm" in text
+        assert (
+            f"ARUCO_MIP_36h12, ids 0 to 53, 45 mm with gaps of 15 mm; content {scene.content[:8]}"
+            in text
+        )
+    said = " ".join(texts).replace(scene.name, "")
+    for name in scene.instances:
+        assert re.search(rf"(?<!\w){name}(?!\w)", said)
+    assert printout.warnings == ()
+    bare = words(print_board(loaded("tabletop_six"), PrintSettings(names=False)), tmp_path)
+    assert not re.search(r"\bmug\b", " ".join(bare))
+
+
+def test_the_same_bytes_and_no_scaling_by_the_viewer() -> None:
+    scene = load_scene("tabletop_six")
+    first = printed("tabletop_six", "letter").pdf
+    second = print_board(scene, PrintSettings(page="letter")).pdf
+    assert first == second
+    assert first.startswith(b"%PDF-") and b"/PrintScaling /None" in first
+    assert b"Board of tabletop_six" in first
+    assert print_board(scene, PrintSettings(height_map=False)).pdf != first
+
+
+@poppler
+def test_what_is_beyond_the_board(tmp_path: Path) -> None:
+    scene = load_scene("tabletop_six")
+    away = Instance(name="stray", object="can", X_SO=Pose((3.0, 0.1, 0.0)))
+    over = Instance(name="over", object="bowl", X_SO=Pose((0.3, 0.41, 0.0)))
+    shelf = Instance(name="shelf", object="box", X_SO=Pose((-0.02, 0.2, 0.0)))
+    fixed = changed(scene, instances=(away, over), background=(shelf,))
+    printout = print_board(fixed, PrintSettings(page="A2"))
+    stray, bowl, rest = printout.warnings
+    assert "'stray' is out of bounds: 2.44 m over the right edge" in stray
+    assert "'over' is out of bounds: 70.0 mm over the upper edge" in bowl
+    assert "of 'shelf' lie in the margin of the page; larger pages have room" in rest
+    (text,) = words(printout, tmp_path)
+    for said in ("stray: 2.44 m beyond the edge", "over: 70 mm beyond the edge", "shelf (fixed)"):
+        assert said in text
+    (image,) = pages(printout, tmp_path, 150)
+    assert len(detect(image, fixed.board.layout)) == 54
+    # The arrow to the bowl, in the only red of the sheet, points up at the place it names.
+    u, v = printout.p_PQ(1, np.array([0.3, 0.42 - 0.0235])) / 0.0254 * 150
+    blue, green, red = image[image.shape[0] - round(v), round(u)].astype(int)
+    assert red > 150 and green < 60 and blue < 60
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"measured": (0.0985, 9.85)}, "a ruler of 100 mm measured 9850 mm; it must be 80 to 125"),
+        ({"margin": 0.2}, "margin is 200 mm; it must be 0 to 50 mm"),
+        ({"margin": float("nan")}, "margin is nan mm"),
+    ],
+)
+def test_settings_that_cannot_be(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        PrintSettings(**settings)
