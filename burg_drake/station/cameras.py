@@ -18,7 +18,8 @@ from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.sensors import CameraInfo, RgbdSensor
 
 from burg_drake.core.errors import MissingDependencyError
-from burg_drake.station.station import Camera, Station
+from burg_drake.station.area_camera import AreaCamera, finer
+from burg_drake.station.station import HALF_PIXEL, Camera, Station
 from burg_drake.system_libraries import apt_command, missing_render_libraries
 
 RENDERER = "burg_drake"
@@ -33,8 +34,6 @@ LIGHTS = [
 ]
 """Room light from above, and a weaker light that goes with the camera, so that nothing is black.
 Without shadows, which cost three times the rendering."""
-HALF_PIXEL = 0.5
-"""Drake puts pixel edges at integers, OpenCV pixel centres; intrinsics differ by half a pixel."""
 
 
 def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera]:
@@ -70,9 +69,18 @@ def add_cameras(builder: RobotDiagramBuilder, station: Station) -> None:
             )
         )
         sensor.set_name(f"camera.{name}")
-        system.Connect(scene_graph.get_query_output_port(), sensor.query_object_input_port())
+        query = scene_graph.get_query_output_port()
+        system.Connect(query, sensor.query_object_input_port())
+        color_image = sensor.color_image_output_port()
+        if camera.samples > 1:
+            fine, _ = render_cameras(finer(camera))
+            area = AreaCamera(fine, camera.samples, scene_graph.world_frame_id())
+            system.AddNamedSystem(f"camera.{name}.area", area)
+            system.Connect(query, area.GetInputPort("geometry_query"))
+            system.Connect(sensor.body_pose_in_world_output_port(), area.GetInputPort("X_WC"))
+            color_image = area.GetOutputPort("color_image")
         for port, image in (
-            (sensor.color_image_output_port(), "color_image"),
+            (color_image, "color_image"),
             (sensor.depth_image_32F_output_port(), "depth_image"),
             (sensor.label_image_output_port(), "label_image"),
         ):

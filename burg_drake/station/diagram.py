@@ -136,7 +136,8 @@ def build_station_diagram(
             the hand is above the board, pointing down. `none` leaves the robot out.
         engine: time step and contact settings.
         meshcat: where to show the diagram live, if anywhere.
-        cameras: add the station's cameras; needs the renderer's system libraries.
+        cameras: add the station's cameras; needs the renderer's system libraries. The board's
+            markers are drawn with cameras or `meshcat` only; it is plain where nobody looks.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
             stands where it is placed, and can only be lifted off, by a joint `RISE` of its model
             along world z; rigid meshes are replaced by pieces (see `station.hollow`).
@@ -163,7 +164,7 @@ def build_station_diagram(
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
-    add_board(plant, scene.board, station)
+    add_board(plant, scene.board, station, markers=cameras or meshcat is not None)
     free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
     fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
     for name, body in fixed.items():

@@ -16,6 +16,11 @@ from burg_drake.station.hand import Hand, locate_hand
 
 FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']""")
 """A mesh in SDF, or in URDF."""
+HALF_PIXEL = 0.5
+"""From OpenCV's image coordinates, with pixel centres at integers, to those of Drake's cameras,
+which have pixel edges there [pixels]."""
+MAX_SAMPLES = 8
+"""Of a camera; 64 rays a pixel bring nothing more, and take seconds an image."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +83,7 @@ class Camera:
         focal: fx, fy [pixels].
         center: cx, cy [pixels]; the image centre if not given.
         depth_range: nearest and farthest depth [m].
+        samples: a pixel of its simulated colour image is the mean of this many rays along x and y.
     """
 
     X_WC: Pose
@@ -86,12 +92,17 @@ class Camera:
     focal: tuple[float, float] = (600.0, 600.0)
     center: tuple[float, float] | None = None
     depth_range: tuple[float, float] = (0.05, 5.0)
+    samples: int = 1
 
     def __post_init__(self) -> None:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("camera width, height and focal must be positive")
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
+        if not 1 <= self.samples <= MAX_SAMPLES:
+            raise FieldError(
+                f"samples {self.samples} of a camera must be 1 to {MAX_SAMPLES}", "samples"
+            )
 
     @property
     def principal_point(self) -> tuple[float, float]:

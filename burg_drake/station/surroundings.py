@@ -7,7 +7,11 @@ from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
     Box,
+    GeometryInstance,
+    MakePhongIllustrationProperties,
+    PerceptionProperties,
     ProximityProperties,
+    Rgba,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -16,6 +20,7 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.scene.scene import Board
+from burg_drake.station.board_visual import board_meshes
 from burg_drake.station.robot import ROBOT_MODELS
 from burg_drake.station.station import Station
 
@@ -27,9 +32,14 @@ DISSIPATION = 5.0
 """Hunt-Crossley dissipation of table and obstacles [s/m]."""
 
 TABLE_COLOR = (0.82, 0.79, 0.74, 1.0)
-BOARD_COLOR = (0.97, 0.97, 0.95, 1.0)
+SEEN_BOARD = {"paper": (0.97, 0.97, 0.95, 1.0), "markers": (0.06, 0.06, 0.06, 1.0)}
+"""Colours for simulated cameras, as printed."""
+SHOWN_BOARD = SEEN_BOARD | {"markers": (0.8, 0.8, 0.78, 1.0)}
+"""Colours for people: pale, so that what stands on the board and is drawn there stands out."""
 OBSTACLE_COLOR = (0.55, 0.58, 0.62, 1.0)
-BOARD_THICKNESS = 5e-4
+PAPER = 1e-4
+"""Thickness of the sheet [m], as of usual paper. Its face, on which objects stand, lies in the
+table's plane of contact; so that it shows, table and obstacles are drawn smaller on all sides."""
 
 
 def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
@@ -40,18 +50,30 @@ def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
     return _add_box(plant, "table", X_WB, np.array(table.size), table.friction, TABLE_COLOR)
 
 
-def add_board(plant: MultibodyPlant, board: Board, station: Station) -> None:
-    """Adds the printed sheet, to look at only."""
-    size = np.array([*board.size, BOARD_THICKNESS])
-    X_SB = np.eye(4)
-    X_SB[:3, 3] = (size[0] / 2, size[1] / 2, -BOARD_THICKNESS / 4)
-    X_WB = station.document.X_WS.matrix() @ X_SB
+def add_board(plant: MultibodyPlant, board: Board, station: Station, markers: bool) -> None:
+    """Adds the printed sheet, to look at only.
+
+    Args:
+        plant: to add it to.
+        board: the sheet.
+        station: where it lies.
+        markers: draw them; otherwise, and if they do not fit, it is white.
+    """
+    size = np.array([*board.size, PAPER])
     instance = plant.AddModelInstance("board")
     body = plant.AddRigidBody("board", instance, SpatialInertia.SolidBoxWithMass(1.0, *size))
-    plant.RegisterVisualGeometry(
-        body, RigidTransform(), Box(*size), "visual", np.array(BOARD_COLOR)
-    )
-    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WB))
+    if markers:
+        for name, mesh in board_meshes(board).items():
+            part = GeometryInstance(RigidTransform(), mesh, name)
+            part.set_illustration_properties(MakePhongIllustrationProperties(SHOWN_BOARD[name]))
+            part.set_perception_properties(_seen_as(SEEN_BOARD[name]))
+            plant.RegisterVisualGeometry(body, part)
+    else:
+        X_SB = RigidTransform(size * [0.5, 0.5, -0.5])
+        color = np.array(SHOWN_BOARD["paper"])
+        plant.RegisterVisualGeometry(body, X_SB, Box(*size), "paper", color)
+    X_WS = RigidTransform(station.document.X_WS.matrix())
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WS)
 
 
 def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBody]:
@@ -84,9 +106,16 @@ def _add_box(
     plant.RegisterCollisionGeometry(
         body, RigidTransform(), box, "collision", _compliant_box(size, friction)
     )
-    plant.RegisterVisualGeometry(body, RigidTransform(), box, "visual", np.array(color))
+    drawn = Box(*np.maximum(size - 2 * PAPER, size / 2))  # thin ones, too, remain
+    plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(color))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WB))
     return body
+
+
+def _seen_as(color: tuple[float, ...]) -> PerceptionProperties:
+    properties = PerceptionProperties()
+    properties.AddProperty("phong", "diffuse", Rgba(*color))
+    return properties
 
 
 def _compliant_box(size: Array, friction: float) -> ProximityProperties:

@@ -15,6 +15,7 @@ from burg_drake.scene.scene import Scene, SceneDocument, load_scene
 from burg_drake.station.cameras import render_cameras
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.station import Camera, Obstacle, Station, load_station
+from burg_drake.station.surroundings import PAPER
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(
@@ -81,9 +82,9 @@ def test_label_and_depth_by_the_pinhole_model(
     for pixels, c in zip((columns, rows), middle, strict=True):
         assert (pixels.min(), pixels.max()) == (np.ceil(c - half), np.floor(c + half))
     depth = image(built, "top", "depth")
-    assert depth[rows, columns] == pytest.approx(np.full(len(rows), 0.8), abs=1e-4)
+    assert depth[rows, columns] == pytest.approx(np.full(len(rows), 0.8 + PAPER), abs=1e-5)
     table = image(built, "top", "label") == int(built.table)
-    assert depth[table] == pytest.approx(np.full(table.sum(), 0.9), abs=1e-4)
+    assert depth[table] == pytest.approx(np.full(table.sum(), 0.9 + PAPER), abs=1e-5)
 
 
 @needs_renderer
