@@ -19,6 +19,7 @@ ROOMS = [
     "printout",
     "station",
     "cameras",
+    "ros",
     "grasping",
     "motion",
     "simulation",

@@ -213,3 +213,11 @@ def renaming(text: str) -> tuple[str, str]:
     if not ours:
         raise argparse.ArgumentTypeError(f"{text!r} is not THEIRS=OURS, such as Mug_3f2a=mug")
     return theirs, ours
+
+
+def measured_mm(text: str) -> tuple[float, float]:
+    """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
+    values = [positive(part) for part in text.split(",")]
+    if len(values) > 2:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X or X,Y, such as 98.5 or 98.5,99.2")
+    return values[0], values[-1]

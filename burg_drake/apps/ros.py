@@ -1,9 +1,124 @@
-"""`burg-drake ros`."""
+"""`burg-drake ros`: a node for robots that run ROS."""
 
 from __future__ import annotations
 
-from typing import Any
+import argparse
+import signal
+from typing import Any, NoReturn
+
+from burg_drake.apps.arguments import add_scene, add_verb, measured_mm
+
+# Kept in step with ros.link, which imports too much for a help text; a test compares them.
+PARENTS = ("camera", "board", "none")
+RULER = 100.0
+DEFAULT_IMAGE = "/camera/image_raw"
+DEFAULT_NODE = "burg_board"
+DEFAULT_FRAME = "board"
 
 
 def add_to(verbs: Any) -> None:
-    """Adds the verbs."""
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "ros",
+        run,
+        "run a ROS 1 or ROS 2 node: overlay, pose of the camera, and the board on tf",
+        "burg-drake ros tabletop_six --image /camera/color/image_raw",
+        "burg-drake ros my_scene.yaml --image /usb_cam/image_raw/compressed --frame board_link",
+    )
+    add_scene(parser)
+    parser.add_argument(
+        "--image",
+        metavar="TOPIC",
+        default=DEFAULT_IMAGE,
+        help="images; compressed ones if the name ends in /compressed (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--camera-info",
+        metavar="TOPIC",
+        default="",
+        help="the camera's intrinsics (default: camera_info beside the images)",
+    )
+    parser.add_argument(
+        "--intrinsics", metavar="FILE", help="take the intrinsics from a file, not from a topic"
+    )
+    parser.add_argument(
+        "--rectified",
+        action="store_true",
+        help="the images are rectified (image_rect): no lens distortion",
+    )
+    parser.add_argument(
+        "--measured-mm",
+        metavar="X[,Y]",
+        type=measured_mm,
+        default=(RULER, RULER),
+        help="what the printed board's rulers of 100 mm measure, along x and along y",
+    )
+    parser.add_argument(
+        "--frame",
+        metavar="NAME",
+        default=DEFAULT_FRAME,
+        help="the board on tf (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--tf-parent",
+        choices=PARENTS,
+        default=PARENTS[0],
+        help="which of camera's and board's frame is the other's parent on tf, or none to leave tf"
+        " alone (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--name",
+        metavar="NODE",
+        default=DEFAULT_NODE,
+        help="the node; it publishes NODE/overlay, NODE/camera_pose, NODE/status"
+        " (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--distro", type=int, choices=(1, 2), help="version of ROS (default: the one that is here)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serves until Ctrl-C, SIGTERM or ROS ends it."""
+    from burg_drake.ros.distribution import choose, connect
+    from burg_drake.ros.link import Names, Parent
+
+    names = Names(
+        node=arguments.name,
+        image=arguments.image,
+        camera_info=arguments.camera_info,
+        board_frame=arguments.frame,
+        parent=Parent(arguments.tf_parent),
+    )
+    version = choose(arguments.distro)
+
+    from burg_drake.cameras.intrinsics_file import load_intrinsics
+    from burg_drake.ros.board_node import BoardNode
+    from burg_drake.ros.serve import serve
+    from burg_drake.scene.scene import load_scene
+
+    intrinsics = load_intrinsics(arguments.intrinsics) if arguments.intrinsics else None
+    scene = load_scene(arguments.scene)
+    x, y = arguments.measured_mm
+    node = BoardNode(
+        scene,
+        intrinsics=intrinsics,
+        rectified=arguments.rectified,
+        print_scale=(x / RULER, y / RULER),
+    )
+    signal.signal(signal.SIGTERM, _interrupt)
+    link = connect(version, names, with_camera_info=intrinsics is None)
+    try:
+        link.say(f"{scene.name}: ROS {version}, images from {names.image}")
+        serve(link, node)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        link.close()
+    return 0
+
+
+def _interrupt(number: int, frame: Any) -> NoReturn:
+    """Launchers end nodes by SIGTERM where SIGINT did not."""
+    raise KeyboardInterrupt

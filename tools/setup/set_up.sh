@@ -4,25 +4,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 venv=${1:?usage: set_up.sh VENV}
+# shellcheck source=tools/setup/apt.sh
+. tools/setup/apt.sh
 
-say() { printf 'set-up: %s\n' "$*"; }
 fail() { printf 'set-up: %s\n' "$*" >&2; exit 2; }
-
-# apt_install PACKAGE...: true if they are installed now; false if this user may not, or apt failed.
-apt_install() {
-  local as_root=() output
-  command -v apt-get > /dev/null || return 1
-  if [ "$(id -u)" -ne 0 ]; then
-    sudo -n true 2> /dev/null || return 1
-    as_root=(sudo -n)
-  fi
-  say "apt-get install $*"
-  ${as_root[@]+"${as_root[@]}"} apt-get update > /dev/null 2>&1 || true
-  output=$(${as_root[@]+"${as_root[@]}"} env DEBIAN_FRONTEND=noninteractive \
-    apt-get install -y --no-install-recommends "$@" 2>&1) && return
-  printf '%s\n' "$output" | grep '^E:' >&2 || true
-  return 1
-}
 
 # Drake publishes wheels for macOS from Python 3.13 on.
 if [ "$(uname -s)" = Darwin ]; then oldest=13; else oldest=11; fi

@@ -1,0 +1,93 @@
+"""Which ROS is here, and how to get one."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from burg_drake.core.errors import MissingDependencyError
+from burg_drake.ros.link import Link, Names
+
+CLIENTS = {1: "rospy", 2: "rclpy"}
+SYSTEM_PACKAGES = Path("/usr/lib/python3/dist-packages")
+"""Where Debian and Ubuntu keep Python's packages, rospy among them; not seen from a virtual
+environment."""
+VERSION_VARIABLE = "ROS_VERSION"
+"""Set to 1 or 2 by the set-up scripts of a ROS installation."""
+ROS_1_HINT = (
+    "for ROS 1 source /opt/ros/noetic/setup.bash or, on Debian, run: sudo apt-get install"
+    " python3-rospy python3-sensor-msgs python3-geometry-msgs python3-tf2-msgs"
+)
+ROS_2_HINT = (
+    "for ROS 2 source /opt/ros/jazzy/setup.bash, and install burg_drake for the same Python"
+)
+
+
+def choose(wanted: int | None, environment: Mapping[str, str] = os.environ) -> int:
+    """1 or 2: the ROS that is wanted, else the one whose set-up script was sourced, else the one
+    whose client library can be imported.
+
+    Debian's folder of packages is put behind all others on the path if nothing else helps: what
+    this environment has comes first, and ROS's pure Python packages are found.
+
+    Args:
+        wanted: 1, 2 or None.
+        environment: variables.
+
+    Raises:
+        MissingDependencyError: it cannot be imported; says why, and what to install.
+    """
+    told = environment.get(VERSION_VARIABLE, "")
+    order = [wanted] if wanted else sorted(CLIENTS, key=lambda version: str(version) != told)
+    failures = []
+    for version in order:
+        failure = _import(CLIENTS[version])
+        if failure is None:
+            return version
+        failures.append(failure)
+    raise MissingDependencyError(f"{'; '.join(failures)}. {_advice(order)}")
+
+
+def connect(version: int, names: Names, *, with_camera_info: bool) -> Link:
+    """Starts the node; see `Ros1Link` and `Ros2Link` for what may go wrong.
+
+    Raises:
+        MissingDependencyError: message packages are not installed.
+    """
+    try:
+        if version == 1:
+            from burg_drake.ros.ros1 import Ros1Link
+
+            return Ros1Link(names, with_camera_info=with_camera_info)
+        from burg_drake.ros.ros2 import Ros2Link
+
+        return Ros2Link(names, with_camera_info=with_camera_info)
+    except ImportError as error:
+        raise MissingDependencyError(f"{error}. {_advice([version])}") from error
+
+
+def _import(name: str) -> str | None:
+    """Imports a module; what went wrong, or None."""
+    try:
+        importlib.import_module(name)
+        return None
+    except ImportError as error:
+        failure = str(error)
+    if not SYSTEM_PACKAGES.is_dir() or str(SYSTEM_PACKAGES) in sys.path:
+        return failure
+    sys.path.append(str(SYSTEM_PACKAGES))
+    try:
+        importlib.import_module(name)
+        return None
+    except ImportError as error:
+        sys.path.remove(str(SYSTEM_PACKAGES))
+        return str(error)
+
+
+def _advice(versions: Sequence[int]) -> str:
+    hints = {1: ROS_1_HINT, 2: ROS_2_HINT}
+    text = "; ".join(hints[version] for version in versions)
+    return text[0].upper() + text[1:]

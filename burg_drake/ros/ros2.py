@@ -1,0 +1,101 @@
+"""The node in ROS 2, by rclpy.
+
+Written after rclpy's documentation (Jazzy) and NOT YET RUN against an installation of ROS 2; all
+that it shares with ROS 1 is tested there.
+"""
+
+from __future__ import annotations
+
+import array
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from burg_drake.ros.link import Link, Names, Publications
+from burg_drake.ros.messages import message_classes
+
+
+class Ros2Link(Link):
+    """An rclpy node; see `Link`."""
+
+    def __init__(self, names: Names, *, with_camera_info: bool = True) -> None:
+        """
+        Args:
+            names: of node, topics and frames.
+            with_camera_info: listen for the camera's intrinsics, too.
+
+        Raises:
+            ImportError: rclpy or a message package is not installed.
+        """
+        import rclpy
+        from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+        from rclpy.signals import SignalHandlerOptions
+
+        classes = message_classes(lambda octets: array.array("B", octets))
+        self._rclpy = rclpy
+        self._ended = ExternalShutdownException
+        # Ctrl-C stays Python's: rclpy's handlers end the context under a publisher that is at work.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(names.node)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._image: Any | None = None
+        self.publications = Publications(
+            names,
+            classes,
+            lambda topic, message, queue: self._node.create_publisher(
+                message, topic, QoSProfile(depth=queue)
+            ),
+            lambda publisher: int(publisher.get_subscription_count()),
+        )
+        # Best effort listens to reliable publishers as well; depth 1 keeps the latest alone.
+        latest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        image_class = classes.CompressedImage if names.compressed else classes.Image
+        self._node.create_subscription(image_class, names.image, self._take_image, latest)
+        self._topics = [names.image]
+        if with_camera_info:
+            self._node.create_subscription(
+                classes.CameraInfo, names.info_topic, self._take_info, latest
+            )
+            self._topics.append(names.info_topic)
+
+    def running(self) -> bool:
+        """See `Link`."""
+        return bool(self._rclpy.ok())
+
+    def next_image(self, patience: float) -> Any | None:
+        """See `Link`."""
+        deadline = time.monotonic() + patience
+        try:
+            while self._image is None and (left := deadline - time.monotonic()) > 0.0:
+                self._executor.spin_once(timeout_sec=left)
+        except self._ended:
+            return None
+        image, self._image = self._image, None
+        return image
+
+    def publishers(self) -> Mapping[str, int]:
+        """See `Link`."""
+        return {topic: int(self._node.count_publishers(topic)) for topic in self._topics}
+
+    def say(self, text: str, *, warning: bool = False) -> None:
+        """See `Link`."""
+        logger = self._node.get_logger()
+        # rclpy allows one severity a calling line.
+        if warning:
+            logger.warning(text)
+        else:
+            logger.info(text)
+
+    def close(self) -> None:
+        """See `Link`."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._rclpy.try_shutdown()
+
+    def _take_image(self, message: Any) -> None:
+        self._image = message
+
+    def _take_info(self, message: Any) -> None:
+        self.camera_info = message

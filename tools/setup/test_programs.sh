@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Installs the programs that some tests hold burg_drake against, where apt is at hand and needs no
+# password: pdftoppm for printouts, ROS 1 for the ROS node. Without them those tests skip and say so.
+set -euo pipefail
+# shellcheck source=tools/setup/apt.sh
+. "$(dirname "$0")/apt.sh"
+
+# want NAME TIME PACKAGE...: installs the packages if they can be downloaded in that time.
+want() {
+  local name=$1 time=$2 missing=() package
+  shift 2
+  for package in "$@"; do
+    dpkg -s "$package" > /dev/null 2>&1 || missing+=("$package")
+  done
+  [ ${#missing[@]} -gt 0 ] || return 0
+  apt_install_within "$time" "${missing[@]}" ||
+    say "no $name: tests that need it skip (missing: ${missing[*]})"
+}
+
+want pdftoppm 2m poppler-utils
+want "ROS 1" 4m python3-rospy python3-rosmaster python3-cv-bridge python3-sensor-msgs \
+  python3-geometry-msgs python3-tf2-msgs
