@@ -1,9 +1,10 @@
-"""`python -m tools.pictures [station] [pages]`: makes pictures for the documentation.
+"""`python -m tools.pictures [station] [board] [overlay] [pages]`: makes pictures for the docs.
 
-`station` renders those of stations and the built-in objects by Drake. `pages` takes those of grasps
-by a column, of frames and of a reachability map from the pages that the commands write with --html,
-by a Chromium that runs without a display. The others of Meshcat and of the report are screenshots
-by hand.
+`station` renders those of stations and the built-in objects by Drake, `board` what a camera over
+the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
+of grasps by a column, of frames and of a reachability map from the pages that the commands write
+with --html, by a Chromium that runs without a display. The others of Meshcat and of the report are
+screenshots by hand.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ if __package__ in (None, ""):
 
 from burg_drake import build_station_diagram, load_library, load_scene, load_station
 from burg_drake.apps.cli import main as burg_drake
+from burg_drake.cameras.board_loop import build_board_loop
+from burg_drake.cameras.overlay import Overlay
+from burg_drake.cameras.placement import check_placement
+from burg_drake.core.frames import rot_z
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.station.station import Camera, Station
@@ -55,11 +60,17 @@ def household() -> Scene:
 
 def render(scene: Scene, station: Station, camera: Camera, robot: str, file: str) -> None:
     """Writes one picture."""
+    camera = dataclasses.replace(camera, samples=SAMPLES)
     document = dataclasses.replace(station.document, cameras={"portrait": camera})
     station = dataclasses.replace(station, document=document)
     built = build_station_diagram(scene, station, robot=robot, cameras=True)  # type: ignore[arg-type]
     context = built.diagram.CreateDefaultContext()
     pixels = built.diagram.GetOutputPort("camera.portrait.color_image").Eval(context).data
+    save(pixels, file)
+
+
+def save(pixels: np.ndarray, file: str) -> None:
+    """Writes an image of Drake's (H, W, 4)."""
     image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
     IMAGES.mkdir(parents=True, exist_ok=True)
     image.save(IMAGES / file, optimize=True)
@@ -71,6 +82,8 @@ OPTIONS = (
     *("--enable-unsafe-swiftshader", "--disable-background-networking", "--hide-scrollbars"),
     "--virtual-time-budget=12000",
 )
+SAMPLES = 2
+"""Rays along each side of a rendered pixel."""
 COLORS = 256
 """Of a screenshot, which makes its PNG a third of the size."""
 CONTROLS = "<style>.dg {display: none !important}</style></body>"
@@ -132,9 +145,54 @@ def station() -> None:
     render(household(), panda, close, "none", "household.png")
 
 
+def board() -> None:
+    """Writes what the overlay shows while a scene is being built: three objects to be placed."""
+    scene, panda = load_scene("tabletop_six"), load_station("panda_tabletop")
+    X_WC = Pose((-0.07, -0.48, 0.76), rpy_deg=(-137.0, 0.0, -47.0))
+    camera = Camera(X_WC=X_WC, width=960, height=720, focal=(1000.0, 1000.0))
+    document = dataclasses.replace(panda.document, cameras={"board": camera})
+    loop = build_board_loop(scene, dataclasses.replace(panda, document=document))
+    context = loop.diagram.CreateDefaultContext()
+    for name, shift in {"mug": (0.02, 0.05), "banana": (-0.06, 0.03), "box": (0.0, 3.0)}.items():
+        X_SO = scene.X_SO(name)
+        X_SO[:2, 3] += shift
+        loop.place_object(context, name, X_SO)
+    save(loop.diagram.GetOutputPort("overlay_image").Eval(context).data, "board_loop.png")
+
+
+MOVED = {
+    "mug": (0.006, -0.003, 0.2),
+    "banana": (-0.008, 0.012, -0.15),
+    "bowl": (4e-4, -3e-4, 0.0),
+    "screwdriver": (3e-3, 0.0, 0.0),
+}
+"""How far objects stand from their places in the picture of the overlay: x, y [m], turn [rad]."""
+
+
+def overlay() -> None:
+    """Writes what the overlay shows after a placement check of a scene that is nearly built."""
+    scene, panda = load_scene("tabletop_six"), load_station("panda_tabletop")
+    X_WC = Pose((-0.03, -0.42, 0.66), rpy_deg=(-137.0, 0.0, -47.0))
+    camera = Camera(X_WC=X_WC, width=960, height=640, focal=(1000.0, 1000.0))
+    document = dataclasses.replace(panda.document, cameras={"board": camera})
+    loop = build_board_loop(scene, dataclasses.replace(panda, document=document))
+    context = loop.diagram.CreateDefaultContext()
+    for name, (x, y, turn) in MOVED.items():
+        X_SO = scene.X_SO(name)
+        X_SO[:3, :3] = rot_z(turn) @ X_SO[:3, :3]
+        X_SO[:2, 3] += x, y
+        loop.place_object(context, name, X_SO)
+    pixels = loop.diagram.GetOutputPort("camera.board.color_image").Eval(context).data[..., :3]
+    photo = np.ascontiguousarray(pixels)
+    check = check_placement(scene, photo, loop.intrinsics)
+    assert check.camera is not None, check.reason
+    X_SC = check.camera.X_SC.matrix()
+    save(Overlay(scene, loop.intrinsics).draw(photo, X_SC, placement=check), "overlay.png")
+
+
 def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
-    kinds = {"station": station, "pages": pages}
+    kinds = {"station": station, "board": board, "overlay": overlay, "pages": pages}
     for name in sys.argv[1:] or kinds:
         if name not in kinds:
             raise SystemExit(f"there are no pictures {name!r}, only {', '.join(kinds)}")

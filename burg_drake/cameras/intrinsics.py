@@ -14,10 +14,8 @@ import numpy as np
 
 from burg_drake.core.errors import FieldError, InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.station.station import Camera
+from burg_drake.station.station import HALF_PIXEL, Camera
 
-HALF_PIXEL = 0.5
-"""From OpenCV's image coordinates to those of Drake [pixels]."""
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
 
@@ -84,7 +82,8 @@ class Intrinsics:
         if (width, height) != (self.width, self.height):
             raise InvalidInputError(
                 f"{source} has {width} x {height} pixels, the intrinsics are of"
-                f" {self.width} x {self.height}; calibrate at that resolution"
+                f" {self.width} x {self.height}; calibrate at that resolution (for another one"
+                " cameras scale, bin or cut)"
             )
 
     def project(self, p_CQ: Array) -> Array:
@@ -99,7 +98,7 @@ class Intrinsics:
         import cv2
 
         p = np.asarray(p_CQ, dtype=float)
-        if self.is_pinhole:
+        if self.is_pinhole or not p.size:
             return p[..., :2] / p[..., 2:] * self.focal + self.center
         flat = np.ascontiguousarray(p.reshape(-1, 1, 3))
         pixels, _ = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), self.K, self.coefficients)
@@ -115,7 +114,8 @@ class Intrinsics:
         # 40 rounds: OpenCV's 5 leave some hundredths of a pixel in the corners of a wide lens.
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
         flat = np.ascontiguousarray(q.reshape(-1, 1, 2))
-        straight = cv2.undistortPointsIter(flat, self.K, self.coefficients, None, self.K, criteria)
+        undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 4, OpenCV 5
+        straight = undistort(flat, self.K, self.coefficients, R=None, P=self.K, criteria=criteria)
         return np.asarray(straight).reshape(q.shape)
 
 

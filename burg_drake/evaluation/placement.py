@@ -63,7 +63,7 @@ def held_instances(
 
 def _distance_between(scene: Scene, name: str, X_SG: Array, gripper: Gripper) -> Array:
     """(N,) distance from G to what of an instance lies between the fingers [m]; inf if nothing."""
-    from burg_drake.grasping.rays import RayCaster
+    from burg_drake.objects.rays import RayCaster
 
     mesh = scene.library.surface(scene.instance(name).object)
     rays = RayCaster(np.asarray(mesh.vertices), np.asarray(mesh.faces))

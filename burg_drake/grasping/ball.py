@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from burg_drake.core.frames import Array
-from burg_drake.grasping.rays import Indices
+from burg_drake.objects.rays import Indices
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
-from burg_drake.grasping.rays import Indices
 from burg_drake.grasping.surface import Surface
+from burg_drake.objects.rays import Indices
 
 FINGER_CLEARANCE = 0.001
 """Room that each open finger keeps to its contact [m], so that the open hand can be placed."""

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.grasping.indentation import indentation
 from burg_drake.grasping.jaws import PANDA_JAWS, Jaws
-from burg_drake.grasping.rays import Indices
 from burg_drake.grasping.surface import Surface
+from burg_drake.objects.rays import Indices
 
 SPRINGS, LATTICE = 55, 34
 """Springs of a pad, in a Fibonacci lattice: no two of them share a row or a column of the pad, so

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from burg_drake.core.errors import InvalidInputError, MeshError
 from burg_drake.core.frames import Array
-from burg_drake.grasping.rays import Indices, RayCaster
+from burg_drake.objects.rays import Indices, RayCaster
 
 if TYPE_CHECKING:
     import trimesh

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Box, Mesh, Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 
+from burg_drake.core.colors import distinct_colors
 from burg_drake.core.frames import Array, rot_z
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.hulls import hull_mesh
@@ -23,7 +24,6 @@ from burg_drake.visualization.hydroelastic_view import (
     cut_open,
     pressure_colors,
 )
-from burg_drake.visualization.palette import piece_colors
 from burg_drake.visualization.portrait import best_yaw, camera_rotation, upright
 from burg_drake.visualization.thumbnails import exploded
 
@@ -174,7 +174,7 @@ def draw_exhibit(meshcat: Meshcat, exhibit: Exhibit, placed: PlacedRow, unit: fl
 def _draw_pieces(
     meshcat: Meshcat, path: str, pieces: tuple[tuple[Array, NDArray[np.int64]], ...]
 ) -> None:
-    colors = piece_colors(len(pieces))
+    colors = distinct_colors(len(pieces))
     for i, ((vertices, faces), color) in enumerate(zip(pieces, colors, strict=True)):
         meshcat.SetTriangleMesh(
             f"{path}/{i:03d}", vertices.T, faces.T.astype(np.int32), Rgba(*color)

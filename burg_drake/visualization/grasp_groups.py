@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.colors import CATEGORIES
 from burg_drake.core.outcome import Outcome
 from burg_drake.visualization.color_scale import BINS, ColorScale, scale_of
 from burg_drake.visualization.palette import (
-    CATEGORIES,
     GROUPS,
     OTHERS,
     UNJUDGED,

@@ -5,12 +5,10 @@ The hues are those of Okabe and Ito, "Color Universal Design" (2008).
 
 from __future__ import annotations
 
-import colorsys
 from dataclasses import dataclass
 
+from burg_drake.core.colors import Rgba
 from burg_drake.core.outcome import Outcome
-
-Rgba = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -78,18 +76,8 @@ GROUPS = (
 
 UNJUDGED = Group("not judged", (0.34, 0.71, 0.91, 1.0), ())
 
-CATEGORIES: tuple[Rgba, ...] = (
-    (0.0, 0.45, 0.70, 1.0),
-    (0.90, 0.62, 0.0, 1.0),
-    (0.0, 0.62, 0.45, 1.0),
-    (0.80, 0.47, 0.65, 1.0),
-    (0.34, 0.71, 0.91, 1.0),
-    (0.84, 0.37, 0.0, 1.0),
-    (0.94, 0.89, 0.26, 1.0),
-)
-"""For names without an order, the most frequent first; there are no more hues that stay apart."""
 OTHERS: Rgba = (0.35, 0.35, 0.35, 0.6)
-"""Of all names beyond those."""
+"""Of all names beyond the `CATEGORIES`."""
 UNKNOWN: Rgba = (0.62, 0.62, 0.62, 0.6)
 """Where there is no value."""
 
@@ -99,18 +87,3 @@ def group_of(outcome: Outcome | None) -> Group:
     if outcome is None:
         return UNJUDGED
     return next((g for g in GROUPS if outcome in g.outcomes), UNJUDGED)
-
-
-GOLDEN_TURN = 0.381966
-"""Golden angle as a share of a turn: further hues fall into the largest gaps between the others."""
-FIRST_HUE = 0.56
-TONES = ((0.56, 0.60), (0.42, 0.62), (0.68, 0.55), (0.50, 0.42))
-"""Lightness and saturation of pieces in turn, as there are few hues that eyes tell apart."""
-
-
-def piece_colors(count: int) -> list[tuple[float, float, float]]:
-    """Colours (red, green, blue in [0, 1]) for convex pieces, all different."""
-    return [
-        colorsys.hls_to_rgb((FIRST_HUE + i * GOLDEN_TURN) % 1.0, *TONES[i % len(TONES)])
-        for i in range(count)
-    ]

@@ -34,13 +34,13 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo
 
+from burg_drake.core.colors import distinct_colors
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, make_pose, rot_z, transform_points
 from burg_drake.objects.hulls import hull_mesh
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
-from burg_drake.visualization.palette import piece_colors
 from burg_drake.visualization.portrait import (
     best_yaw,
     camera_rotation,
@@ -160,7 +160,7 @@ class ObjectRenderer:
         visual = self._library.path(entry.mesh)
         try:
             self._register(name, False, [(Mesh(str(visual)), np.zeros(3), None)])
-            colors = piece_colors(len(paths))
+            colors = distinct_colors(len(paths))
             offsets = exploded(self._hulls[name], EXPLODED)
             shapes = [Convex(str(path)) for path in paths]
             self._register(name, True, list(zip(shapes, offsets, colors, strict=True)))

@@ -8,6 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from burg_drake.core.colors import CATEGORIES
 from burg_drake.core.outcome import Outcome
 from burg_drake.visualization.color_map import map_colors
 from burg_drake.visualization.color_scale import BINS
@@ -18,7 +19,7 @@ from burg_drake.visualization.grasp_groups import (
     by_number,
     by_outcome,
 )
-from burg_drake.visualization.palette import CATEGORIES, OTHERS, UNKNOWN, group_of
+from burg_drake.visualization.palette import OTHERS, UNKNOWN, group_of
 
 
 def members(groups: tuple[GraspGroup, ...]) -> list[int]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from burg_drake.core.colors import distinct_colors
 from burg_drake.core.errors import MissingDependencyError, UnknownNameError
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.system_libraries import missing_render_libraries
 from burg_drake.visualization import thumbnails
-from burg_drake.visualization.palette import piece_colors
 from burg_drake.visualization.thumbnails import (
     BACKGROUND,
     FILL,
@@ -90,7 +90,7 @@ def test_pieces_are_seen_in_their_colours(renderer: ObjectRenderer) -> None:
     picture = renderer.pieces("screwdriver")
     check_framing(picture)
     inside = picture.pixels[picture.cover == 1.0] / 255.0
-    colors = np.array(piece_colors(6))
+    colors = np.array(distinct_colors(6))
 
     def chroma(values: np.ndarray) -> np.ndarray:
         return values / np.linalg.norm(values, axis=-1, keepdims=True)
@@ -132,7 +132,7 @@ def test_missing_system_libraries_are_named(
 
 @pytest.mark.parametrize("count", [1, 2, 25, 65])
 def test_piece_colours_are_distinct(count: int) -> None:
-    colors = np.array(piece_colors(count))
+    colors = np.array(distinct_colors(count))
     assert colors.shape == (count, 3) and (colors >= 0.0).all() and (colors <= 1.0).all()
     distance = np.abs(colors[:, None] - colors[None]).max(axis=2) + 9.0 * np.eye(count)
     assert distance.min() > 0.06  # 15 of 255

@@ -1,0 +1,1 @@
+"""The live view's page and its server."""

@@ -1,0 +1,127 @@
+"""`burg-drake camera placement`: how far each object stands from its place."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import add_scene, add_verb, positive
+
+if TYPE_CHECKING:
+    from burg_drake.cameras.placement_document import Placement, PlacementCheck
+
+NO_BOARD = 2
+"""Exit code where nothing could be measured."""
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb to the group `camera`."""
+    parser = add_verb(
+        group,
+        "placement",
+        run_placement,
+        "measure on a photo of the finished scene how far each object stands from its target",
+        "burg-drake camera placement tabletop_six photo.png --intrinsics K.yaml",
+        "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml -o placement.yaml",
+        "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml --depth depth.png",
+        "",
+        "Exit code 1 if an object is not seen, or its measurement is doubtful; 2 if there is no",
+        "board in the photo.",
+    )
+    add_scene(parser)
+    parser.add_argument("photo", metavar="PHOTO", help="image of the scene on its board")
+    parser.add_argument(
+        "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"
+    )
+    parser.add_argument(
+        "--depth",
+        metavar="FILE",
+        help="depth image of the same camera, to align the objects with: 16-bit .png or .npy",
+    )
+    parser.add_argument(
+        "--depth-unit",
+        metavar="M",
+        type=positive,
+        help="unit of the depth image's numbers in metres"
+        " (default: 0.001 for whole numbers, 1 for others)",
+    )
+    parser.add_argument("-o", "--output", metavar="FILE", help="placement file to write (.yaml)")
+    parser.add_argument(
+        "--overlay", metavar="FILE", help="image to write: the photo with targets and errors"
+    )
+
+
+def run_placement(arguments: argparse.Namespace) -> int:
+    """Measures, prints a line an object, and writes what is asked for."""
+    from burg_drake.cameras.image_file import read_image
+    from burg_drake.cameras.intrinsics_file import load_intrinsics
+    from burg_drake.cameras.placement import check_placement
+    from burg_drake.cameras.placement_depth_file import read_depth
+    from burg_drake.cameras.placement_document import image_of_file, save_placement
+    from burg_drake.core.files import require_writable
+    from burg_drake.scene.scene import load_scene
+
+    for path in filter(None, (arguments.output, arguments.overlay)):
+        require_writable(path)
+    scene, intrinsics = load_scene(arguments.scene), load_intrinsics(arguments.intrinsics)
+    photo = read_image(arguments.photo)
+    intrinsics.require_size(photo.shape[1], photo.shape[0], arguments.photo)
+    depth = None
+    if arguments.depth:
+        depth = read_depth(arguments.depth, arguments.depth_unit)
+        intrinsics.require_size(depth.shape[1], depth.shape[0], arguments.depth)
+    check = check_placement(
+        scene,
+        photo,
+        intrinsics,
+        depth=depth,
+        image_source=image_of_file(arguments.photo),
+        depth_source=image_of_file(arguments.depth) if arguments.depth else None,
+    )
+    for line in table(check):
+        print(line)
+    if arguments.output:
+        save_placement(check, arguments.output)
+        print(f"wrote {arguments.output}")
+    if check.camera is None:
+        print(f"burg-drake: {arguments.photo}: {check.reason}", file=sys.stderr)
+        return NO_BOARD
+    if arguments.overlay:
+        _write_overlay(arguments.overlay, check, scene, photo)
+        print(f"wrote {arguments.overlay}")
+    return 0 if all(p.status == "measured" for p in check.instances.values()) else 1
+
+
+def table(check: PlacementCheck) -> list[str]:
+    """A line an object."""
+    wide = max((len(name) for name in check.instances), default=0)
+    return [f"{name:<{wide}}  {_words(p)}" for name, p in check.instances.items()]
+
+
+def _words(placement: Placement) -> str:
+    """What a placement says, in millimetres and degrees."""
+    if placement.displacement is None or placement.displacement_sd is None:
+        return f"not seen: {placement.reason}"
+    (x, y), deviation = placement.displacement, placement.displacement_sd
+    words = (
+        f"off by {1e3 * math.hypot(x, y):5.1f} mm"
+        f" (x {1e3 * x:+6.1f}, y {1e3 * y:+6.1f}, ± {1e3 * max(deviation):.1f})"
+    )
+    if placement.angle is not None and placement.angle_sd is not None:
+        words += f", turned {math.degrees(placement.angle):+7.1f} ± "
+        words += f"{math.degrees(placement.angle_sd):.1f} deg"
+    return words + (f"; uncertain: {placement.reason}" if placement.reason else "")
+
+
+def _write_overlay(path: str, check: PlacementCheck, scene: Any, photo: Any) -> None:
+    """The photo with each object's target, and what is left to do."""
+    from burg_drake.cameras.image_file import write_image
+    from burg_drake.cameras.overlay import Overlay
+    from burg_drake.cameras.overlay_style import OverlayStyle
+
+    assert check.camera is not None
+    overlay = Overlay(scene, check.intrinsics, OverlayStyle(opacity=0.15))
+    X_SC = check.camera.X_SC.matrix()
+    write_image(path, overlay.draw(photo, X_SC, placement=check))

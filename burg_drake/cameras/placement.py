@@ -1,0 +1,147 @@
+"""The placement check: from an image of the finished scene, how far each object stands from its
+target. The board is seen, so that the camera's place is known; objects stand as the scene lets
+them, and are displaced in the plane of the board and turned about the vertical.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.cameras.board_pose import estimate_board
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.placement_board import board_picture
+from burg_drake.cameras.placement_depth import DepthAligner, check_depth
+from burg_drake.cameras.placement_document import (
+    CameraPlace,
+    CheckedImage,
+    CheckedScene,
+    Placement,
+    PlacementCheck,
+    software_versions,
+)
+from burg_drake.cameras.placement_locate import Aligner, locate
+from burg_drake.cameras.placement_shape import scene_shapes
+from burg_drake.cameras.placement_silhouette import SilhouetteAligner
+from burg_drake.cameras.placement_verdict import placement_of, unseen
+from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.undistortion import Undistortion
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.scene.scene import Scene
+
+NO_CONTRAST = "the board's paper and ink look alike in the photo; give it more light"
+
+
+def check_placement(
+    scene: Scene,
+    image: NDArray[np.uint8],
+    intrinsics: Intrinsics,
+    *,
+    depth: NDArray[np.float32] | None = None,
+    estimate: BoardEstimate | None = None,
+    image_source: CheckedImage | None = None,
+    depth_source: CheckedImage | None = None,
+) -> PlacementCheck:
+    """Measures how far the objects of a real scene stand from their targets.
+
+    Args:
+        scene: the targets.
+        image: (H, W, 3) RGB photo of the scene on its board.
+        intrinsics: of the camera.
+        depth: (H, W) distances along the optical axis [m] of the same camera, 0 or NaN where there
+            is none. Objects are then aligned with these, and the photo only serves to find the
+            board.
+        estimate: where the camera is; from the photo's markers if None.
+        image_source, depth_source: what the document calls the images; their pixels' hash if None.
+
+    Raises:
+        InvalidInputError: an image of another size than the intrinsics', or not an image; depth
+            that is not in metres; markers that do not fit on the board.
+    """
+    color = _checked_image(image, intrinsics)
+    if depth is not None:
+        depth = check_depth(depth, intrinsics)
+    if estimate is None:
+        estimate = estimate_board(color, intrinsics, scene.board)
+    instances, reason = _measured(scene, color, depth, intrinsics, estimate)
+    return PlacementCheck(
+        scene=CheckedScene(name=scene.name, path=str(scene.path), content=scene.content),
+        taken=datetime.now().astimezone().isoformat(timespec="seconds"),
+        method="silhouette" if depth is None else "depth",
+        image=image_source or CheckedImage(content=content_hash(color)),
+        depth=None if depth is None else depth_source or CheckedImage(content=content_hash(depth)),
+        intrinsics=intrinsics,
+        camera=_camera(estimate),
+        reason=reason,
+        instances=instances,
+        versions=software_versions(),
+    )
+
+
+def _measured(
+    scene: Scene,
+    color: NDArray[np.uint8],
+    depth: NDArray[np.float32] | None,
+    intrinsics: Intrinsics,
+    estimate: BoardEstimate,
+) -> tuple[dict[str, Placement], str]:
+    """Placements by name; and why nothing was measured, if so."""
+    aligner = _aligner(scene, color, depth, intrinsics, estimate)
+    if isinstance(aligner, str):
+        names = (*scene.instances, *scene.background)
+        return {name: unseen(scene, name, aligner) for name in names}, aligner
+    shapes = scene_shapes(scene)
+    unit: Literal["pixels", "metres"] = "pixels" if depth is None else "metres"
+    located = locate(aligner, shapes)
+    return {
+        name: placement_of(scene, name, shapes[name], found, estimate.covariance, unit)
+        for name, found in located.items()
+    }, ""
+
+
+def _aligner(
+    scene: Scene,
+    color: NDArray[np.uint8],
+    depth: NDArray[np.float32] | None,
+    intrinsics: Intrinsics,
+    estimate: BoardEstimate,
+) -> Aligner | str:
+    """What objects are aligned by; or why nothing can be measured."""
+    if not estimate.valid:
+        return f"the board was not found: {estimate.reason}" if estimate.reason else "no board"
+    view = View(intrinsics.K, (intrinsics.width, intrinsics.height), estimate.X_SC)
+    straight = Undistortion(intrinsics)
+    if depth is not None:
+        return DepthAligner(view, straight.depth(depth))
+    image = straight.color(color).astype(float)
+    picture = board_picture(scene.board, image, intrinsics.K, estimate.X_SC)
+    return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
+
+
+def _checked_image(image: NDArray[np.uint8], intrinsics: Intrinsics) -> NDArray[np.uint8]:
+    """(H, W, 3) RGB."""
+    image = np.asarray(image)
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4):
+        raise InvalidInputError(
+            f"the photo is an array {image.shape} of {image.dtype}; give (H, W, 3) of uint8, RGB"
+        )
+    intrinsics.require_size(image.shape[1], image.shape[0], "the photo")
+    return np.ascontiguousarray(image[..., :3])
+
+
+def _camera(estimate: BoardEstimate) -> CameraPlace | None:
+    if not estimate.valid:
+        return None
+    error, covariance = estimate.reprojection_error, np.asarray(estimate.covariance)
+    return CameraPlace(
+        X_SC=Pose.from_matrix(estimate.X_SC, quaternion=True),
+        reprojection_error=float(error) if np.isfinite(error) else None,
+        covariance=tuple(covariance.ravel().tolist()) if np.isfinite(covariance).all() else (),
+        markers=len(estimate.ids),
+    )

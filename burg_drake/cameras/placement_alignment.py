@@ -1,0 +1,63 @@
+"""What an alignment of an object with an image found out, whatever it was aligned by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.placement_contour import Contour
+from burg_drake.core.frames import Array
+
+SECTORS = 36
+"""Neighbourhoods around an outline within which errors may be alike."""
+
+DIFFERENT = (0.003, np.deg2rad(5.0))
+"""Displacement [m] and turn [rad] from which on two alignments mean different places."""
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """An object that was aligned.
+
+    Attributes:
+        q: (3,) displacement, see `Shape.displacement`.
+        covariance: (3, 3) of `q`, but for the camera's error.
+        camera: (3, 6) by how much `q` changes with the camera's error, as in `BoardEstimate`.
+        agreement: share of what should be seen that the result agrees with.
+        coverage: share of all that was looked at that agrees, also of what cannot tell.
+        residual: root mean square that is left of what agrees; pixels, or metres for depth.
+        measurements: number of those that agree.
+        ambiguous: another place fits almost as well.
+    """
+
+    q: Array
+    covariance: Array
+    camera: Array
+    agreement: float
+    coverage: float
+    residual: float
+    measurements: int
+    ambiguous: bool = False
+
+    def spread(self, camera: Array) -> Array:
+        """(3, 3) covariance of `q` with the camera's error.
+
+        Args:
+            camera: (6, 6) covariance of the camera's pose; NaN where it is not known.
+        """
+        known = np.where(np.isfinite(camera), camera, 0.0)
+        return self.covariance + self.camera @ known @ self.camera.T
+
+
+def apart(a: Alignment, b: Alignment) -> bool:
+    """Whether two alignments mean different places."""
+    turn = (a.q[2] - b.q[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(np.hypot(*(a.q - b.q)[:2]) > DIFFERENT[0] or abs(turn) > DIFFERENT[1])
+
+
+def sectors(contour: Contour) -> NDArray[np.int64]:
+    """(N,) number of the neighbourhood around the outline that each point belongs to."""
+    x, y = (contour.pixels - contour.pixels.mean(axis=0)).T if len(contour) else np.empty((2, 0))
+    return np.floor(np.arctan2(y, x) / (2.0 * np.pi) * SECTORS).astype(np.int64)

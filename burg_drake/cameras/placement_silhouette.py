@@ -1,0 +1,146 @@
+"""Aligns an object with a photo by its outline: from pixels away down to hundredths of one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.placement_alignment import Alignment, sectors
+from burg_drake.cameras.placement_board import BoardPicture
+from burg_drake.cameras.placement_contour import Contour, outline
+from burg_drake.cameras.placement_edges import (
+    REACH,
+    Edges,
+    far_edges,
+    lines,
+    near_edges,
+)
+from burg_drake.cameras.placement_fit import Fit, fit
+from burg_drake.cameras.placement_shape import Shape
+from burg_drake.cameras.placement_view import View
+from burg_drake.core.frames import Array
+
+FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
+"""How far `far_edges` looks, round by round, as a share of the image's width."""
+NEAR_ROUNDS = 8
+SETTLED = 0.02
+"""Steps that move no point of the outline farther than this end the rounds [pixels]."""
+AGREES = 1.5
+"""An edge that is within this of the outline agrees with it [pixels]."""
+LOST = 0.03
+"""Farther away than this from where it began an alignment has gone astray [m]."""
+MIN_EDGES = 12
+SHADED = 0.15
+"""Standard deviation of the share by which an object is darker at its very edge than beside it."""
+GROWN = 0.1
+"""Standard deviation of how much too large all of an outline may look: bright paper outshines dark
+edges, ink spreads, the mesh is coarse [pixels]."""
+SHIFTED = 0.06
+"""Standard deviation of a shift of the whole outline that nothing explains [pixels]."""
+
+
+class SilhouetteAligner:
+    """Aligns objects with one photo.
+
+    Args:
+        view: its camera.
+        image: (H, W, 3) without lens distortion [8-bit levels].
+        picture: the board without objects.
+    """
+
+    def __init__(self, view: View, image: Array, picture: BoardPicture) -> None:
+        self.view = view
+        self.evidence = picture.evidence
+        self._image: NDArray[np.float32] = np.ascontiguousarray(image, dtype=np.float32)
+        self._picture = picture
+
+    def align(self, shape: Shape, q: Array, others: Array, *, far: bool = True) -> Alignment | None:
+        """Aligns an object.
+
+        Args:
+            shape: the object.
+            q: (3,) displacement to start from.
+            others: (H, W) depth of other objects, infinity where there is none.
+            far: it may be many pixels off.
+
+        Returns:
+            None if the photo does not determine where it is.
+        """
+        near = self._roughly(shape, q, others) if far else q
+        return None if near is None else self._exactly(shape, near, others)
+
+    def _roughly(self, shape: Shape, q: Array, others: Array) -> Array | None:
+        """The displacement to a pixel or so, from many away; None without an outline."""
+        for share in FAR:
+            contour = outline(self.view, shape, q, others)
+            if len(contour) < MIN_EDGES:
+                return None
+            on = lines(contour, self._image, self._picture, others, share * self.view.size[0])
+            solved = _solve(shape, contour, far_edges(on, self._picture))
+            if solved is None:
+                break
+            q = q + _limited(solved.step)
+        return q
+
+    def _exactly(self, shape: Shape, q: Array, others: Array) -> Alignment | None:
+        """The alignment, from a displacement that is a few pixels off."""
+        start, result = q, None
+        for _ in range(NEAR_ROUNDS):
+            contour = outline(self.view, shape, q, others)
+            if len(contour) < MIN_EDGES:
+                return None
+            edges = near_edges(
+                lines(contour, self._image, self._picture, others, REACH), self._picture
+            )
+            solved = _solve(shape, contour, edges)
+            if solved is None or np.linalg.norm(q[:2] - start[:2]) > LOST:
+                return None
+            q = q + _limited(solved.step)
+            result = _result(q, contour, edges, solved)
+            if np.abs(contour.along @ solved.step).max() < SETTLED:
+                break
+        return result
+
+
+def _solve(shape: Shape, contour: Contour, edges: Edges) -> Fit | None:
+    used = edges.found
+    if used.sum() < MIN_EDGES:
+        return None
+    reach = float(np.linalg.norm(np.ptp(shape.p_SV[:, :2], axis=0))) / 2
+    unit = np.array([1e-3, 1e-3, 1e-3 / reach])
+    return fit(
+        contour.along[used],
+        edges.offset[used],
+        edges.deviation[used],
+        sectors(contour)[used],
+        shape.symmetric,
+        unit,
+        np.column_stack([-SHADED * edges.shading[used], np.full(used.sum(), GROWN)]),
+    )
+
+
+def _limited(step: Array) -> Array:
+    """No round moves an object farther than edges were looked for, or turns it out of sight."""
+    return np.clip(step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
+
+
+def _result(q: Array, contour: Contour, edges: Edges, solved: Fit) -> Alignment:
+    used: NDArray[np.bool_] = edges.found
+    left = edges.offset[used] - contour.along[used] @ solved.step
+    agrees = (np.abs(left) < AGREES) & (solved.weights > 0.0)
+    shifted = SHIFTED * solved.gain @ contour.normals[used]
+    return Alignment(
+        q,
+        solved.covariance + shifted @ shifted.T,
+        -solved.gain @ contour.camera[used],
+        float(agrees.sum() / max(edges.looked.sum(), 1)),
+        float(agrees.sum() / max(len(contour), 1)),
+        _rms(left[agrees], edges.deviation[used][agrees]),
+        int(agrees.sum()),
+    )
+
+
+def _rms(left: Array, deviation: Array) -> float:
+    """Root mean square, in which clear edges count more; NaN of nothing."""
+    weight = deviation**-2.0
+    return float(np.sqrt((weight * left**2).sum() / weight.sum())) if len(left) else float("nan")

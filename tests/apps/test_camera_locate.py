@@ -1,0 +1,76 @@
+"""`burg-drake camera locate`: a station's camera, located by its own picture."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from burg_drake.apps.arguments import Parser, add_group
+from burg_drake.apps.camera_locate import add_to
+from burg_drake.cameras.intrinsics import of_camera
+from burg_drake.cameras.intrinsics_file import save_intrinsics
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import rotation_angle
+from burg_drake.core.resources import resolve
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.station import load_station
+from burg_drake.system_libraries import missing_render_libraries
+
+Capture = pytest.CaptureFixture[str]
+
+pytestmark = pytest.mark.skipif(
+    bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
+)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`photo.png` and `nothing.png` of the camera, and its `K.yaml`."""
+    folder = tmp_path_factory.mktemp("pictures")
+    station = load_station("panda_tabletop")
+    built = build_station_diagram(load_scene("tabletop_six"), station, robot="none", cameras=True)
+    port = built.diagram.GetOutputPort("camera.board.color_image")
+    pixels = port.Eval(built.diagram.CreateDefaultContext()).data[..., :3]
+    Image.fromarray(np.ascontiguousarray(pixels)).save(folder / "photo.png")
+    Image.new("RGB", (640, 480)).save(folder / "nothing.png")
+    Image.new("RGB", (320, 240)).save(folder / "small.png")
+    save_intrinsics(of_camera(station.camera("board")), folder / "K.yaml")
+    return folder
+
+
+def locate(folder: Path, *words: str) -> int:
+    parser = Parser()
+    add_to(add_group(parser.add_subparsers(), "camera", "cameras"))
+    arguments: argparse.Namespace = parser.parse_args(
+        ["camera", "locate", "tabletop_six", *words, "--intrinsics", str(folder / "K.yaml")]
+    )
+    return int(arguments.run(arguments))
+
+
+def test_lines_make_a_station_document(pictures: Path, tmp_path: Path, capsys: Capture) -> None:
+    photo = str(pictures / "photo.png")
+    assert locate(pictures, photo, photo, "--name", "seen") == 0
+    out, err = capsys.readouterr()
+    assert "photo.png: " in err and "markers" in err and "of the mean" in err
+    text = resolve("panda_tabletop", "stations").read_text(encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(text[: text.index("cameras:")] + out, encoding="utf-8")
+    document = load_station(tmp_path / "mine.yaml").document
+    truth = load_station("panda_tabletop").camera("board")
+    seen = document.cameras["seen"]
+    X_CD = np.linalg.inv(truth.X_WC.matrix()) @ seen.X_WC.matrix()
+    assert np.linalg.norm(X_CD[:3, 3]) < 1e-3
+    assert rotation_angle(X_CD[:3, :3]) < np.deg2rad(0.05)
+    assert replace(seen, X_WC=truth.X_WC) == replace(truth, center=truth.principal_point)
+
+
+def test_a_picture_without_a_board(pictures: Path, capsys: Capture) -> None:
+    with pytest.raises(InvalidInputError, match="the camera cannot be located: "):
+        locate(pictures, str(pictures / "nothing.png"))
+    with pytest.raises(InvalidInputError, match=r"small\.png has 320 x 240 pixels"):
+        locate(pictures, str(pictures / "small.png"))

@@ -1,0 +1,92 @@
+"""`burg-drake camera placement`: from files to a table, a document and a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.intrinsics_file import save_intrinsics
+from burg_drake.cameras.placement_document import load_placement
+from burg_drake.system_libraries import missing_render_libraries
+
+Capture = pytest.CaptureFixture[str]
+INTRINSICS = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
+SCENE = """\
+version: 1
+name: two
+library: household
+instances:
+  - object: mug
+    X_SO: {translation: [0.20, 0.21, 0.0]}
+  - object: can
+    X_SO: {translation: [0.38, 0.21, 0.0]}
+"""
+
+
+def run(*words: str | Path) -> int:
+    return main(["camera", "placement", *map(str, words)])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A scene of two objects, and intrinsics."""
+    (tmp_path / "two.yaml").write_text(SCENE)
+    save_intrinsics(INTRINSICS, tmp_path / "K.yaml")
+    return tmp_path
+
+
+@pytest.mark.skipif(
+    bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
+)
+def test_a_photo_becomes_a_table_a_document_and_a_picture(folder: Path, capsys: Capture) -> None:
+    from burg_drake.cameras.placement_photo import ScenePhotographer
+    from burg_drake.core.frames import make_pose
+    from burg_drake.scene.scene import load_scene
+
+    scene = load_scene(folder / "two.yaml")
+    X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.29, 0.21, 0.7))  # straight down
+    moved = scene.X_SO("can") @ make_pose(p_AB=(0.01, 0.0, 0.0))
+    photo = ScenePhotographer(scene).take(X_SC, INTRINSICS, {"can": moved})
+    cv2.imwrite(str(folder / "photo.png"), photo.color[..., ::-1])
+    files = (folder / "placement.yaml", folder / "check.png")
+    words = (folder / "two.yaml", folder / "photo.png", "--intrinsics", folder / "K.yaml")
+    assert run(*words, "-o", files[0], "--overlay", files[1]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0].startswith("mug  off by   0.")
+    assert printed[1].startswith("can  off by  10.") or printed[1].startswith("can  off by   9.9")
+    assert "turned" not in printed[1]
+    check = load_placement(files[0])
+    assert check.image.file == "photo.png"
+    assert check.scene.content == scene.content
+    assert check.instances["can"].displacement == pytest.approx((0.01, 0.0), abs=4e-4)
+    picture = cv2.imread(str(files[1]))
+    assert picture.shape == (480, 640, 3)
+    assert (picture != photo.color[..., ::-1]).any()
+
+
+def test_a_photo_without_a_board_says_so(folder: Path, capsys: Capture) -> None:
+    cv2.imwrite(str(folder / "grey.png"), np.full((480, 640, 3), 128, np.uint8))
+    words = (folder / "two.yaml", folder / "grey.png", "--intrinsics", folder / "K.yaml")
+    assert run(*words, "-o", folder / "placement.yaml") == 2
+    printed = capsys.readouterr()
+    assert "grey.png: the board was not found" in printed.err
+    assert "mug  not seen: the board was not found" in printed.out
+    assert load_placement(folder / "placement.yaml").camera is None
+
+
+def test_files_that_cannot_be_used_are_named(folder: Path, capsys: Capture) -> None:
+    cv2.imwrite(str(folder / "small.png"), np.zeros((240, 320, 3), np.uint8))
+    (folder / "text.png").write_text("hello")
+    end = ("--intrinsics", folder / "K.yaml")
+    for name, message in (
+        ("small.png", "small.png has 320 x 240 pixels, the intrinsics are of 640 x 480"),
+        ("text.png", "text.png is not an image that can be read"),
+        ("none.png", "cannot read image"),
+    ):
+        assert run(folder / "two.yaml", folder / name, *end) == 2
+        assert message in capsys.readouterr().err

@@ -1,0 +1,216 @@
+"""Poses from images with known truth, their covariance, and what is said about bad pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.cameras.board_pose import BoardPose, estimate_board
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.synthetic import Look, board_depth, board_image, covers_of
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.scene.markers import Markers
+from burg_drake.scene.scene import Board
+from tests.cameras.board_views import CAMERA, SMALL, error, view
+
+BOARD = Board()
+LITTLE = Board(size=(0.3, 0.21))  # 4 x 3 markers
+VIEW = view((0.29, 0.2), 0.75, 25.0, 40.0, 15.0)
+NEAR = view((0.15, 0.1), 0.4, 25.0, 200.0, 100.0)
+
+
+@pytest.fixture(scope="module")
+def poses() -> BoardPose:
+    return BoardPose(BOARD, CAMERA)
+
+
+@pytest.fixture(scope="module")
+def clean() -> np.ndarray:
+    return board_image(BOARD, CAMERA, VIEW)
+
+
+def near(estimate: BoardEstimate, truth: np.ndarray, mm: float, degrees: float) -> bool:
+    off = error(estimate.X_SC, truth)
+    return (
+        estimate.valid
+        and 1e3 * np.linalg.norm(off[3:]) < mm
+        and np.degrees(np.linalg.norm(off[:3])) < degrees
+    )
+
+
+def test_a_clean_image_gives_the_pose_to_hundredths_of_a_millimetre(
+    poses: BoardPose, clean: np.ndarray
+) -> None:
+    estimate = poses.estimate(clean)
+    assert near(estimate, VIEW, 0.08, 0.008), 1e3 * error(estimate.X_SC, VIEW)
+    assert estimate.reason == ""
+    assert estimate.reprojection_error < 0.03
+    assert len(estimate.ids) == 54
+    p_C = (BOARD.layout.p_SQ - VIEW[:3, 3]) @ VIEW[:3, :3]
+    assert np.abs(CAMERA.project(p_C) - estimate.corners).max() < 0.1
+    assert np.isnan(estimate.scale)
+
+
+def test_gray_rgb_and_rgba_are_the_same_picture(poses: BoardPose, clean: np.ndarray) -> None:
+    alpha = np.full((*clean.shape[:2], 1), 255, np.uint8)
+    X_SC = [poses.estimate(i).X_SC for i in (clean, np.concatenate([clean, alpha], axis=2))]
+    assert np.array_equal(*X_SC)
+    assert near(poses.estimate(clean[:, :, 1]), VIEW, 0.08, 0.008)
+
+
+@pytest.mark.parametrize(("share", "mm", "degrees"), [(0.55, 0.2, 0.016), (0.9, 0.8, 0.06)])
+def test_hidden_markers_and_noise(
+    poses: BoardPose, share: float, mm: float, degrees: float
+) -> None:
+    rng = np.random.default_rng(3)
+    covers, seen = covers_of(BOARD.layout, share, rng)
+    image = board_image(BOARD, CAMERA, VIEW, covers=covers, look=Look(noise=4.0, blur=0.6), rng=rng)
+    estimate = poses.estimate(image)
+    assert near(estimate, VIEW, mm, degrees), 1e3 * error(estimate.X_SC, VIEW)
+    assert set(estimate.ids) <= set(seen)
+
+
+def test_partly_hidden_markers_that_no_detector_reads_take_part(poses: BoardPose) -> None:
+    covers, seen = covers_of(BOARD.layout, 0.9, np.random.default_rng(5), partial=True)
+    estimate = poses.estimate(board_image(BOARD, CAMERA, VIEW, covers=covers))
+    assert len(estimate.ids) > 2 * len(seen)
+    assert near(estimate, VIEW, 0.2, 0.016)
+
+
+def test_a_lens_that_distorts() -> None:
+    lens = replace(CAMERA, distortion=(0.12, -0.25, 0.001, -0.0015, 0.1))
+    image = board_image(BOARD, lens, VIEW)
+    assert near(estimate_board(image, lens, BOARD), VIEW, 0.1, 0.01)
+    ignored = estimate_board(image, CAMERA, BOARD)
+    assert not ignored.valid or "intrinsics" in ignored.reason
+    assert not near(ignored, VIEW, 0.5, 0.05)
+
+
+def test_the_covariance_is_that_of_the_errors() -> None:
+    board_pose, rng = BoardPose(LITTLE, SMALL), np.random.default_rng(0)
+    image = board_image(LITTLE, SMALL, NEAR, look=Look(blur=0.6)).astype(float)
+    normalised = []
+    for _ in range(40):
+        noisy = np.clip(np.rint(image + rng.normal(0.0, 8.0, image.shape)), 0, 255)
+        estimate = board_pose.estimate(noisy.astype(np.uint8))
+        off = error(estimate.X_SC, NEAR)
+        normalised.append(off @ np.linalg.solve(estimate.covariance, off))
+    # Chi-square of 6 degrees of freedom: the mean of 40 is 6 with a standard deviation of 0.55; the
+    # covariance also has a share for errors that stay the same.
+    assert 2.5 < np.mean(normalised) < 9.0
+
+
+def test_dark_and_blurred_pictures(poses: BoardPose) -> None:
+    rng = np.random.default_rng(1)
+    dark = board_image(BOARD, CAMERA, VIEW, look=Look(gain=0.25, noise=2.0, blur=0.6), rng=rng)
+    assert near(poses.estimate(dark), VIEW, 0.3, 0.025)
+    blurred = board_image(BOARD, CAMERA, VIEW, look=Look(blur=1.5, noise=2.0), rng=rng)
+    assert near(poses.estimate(blurred), VIEW, 0.6, 0.05)
+
+
+def test_nothing_in_sight(poses: BoardPose) -> None:
+    estimate = poses.estimate(np.full((480, 640, 3), 128, np.uint8))
+    assert not estimate.valid
+    assert np.isnan(estimate.X_SC).all()
+    assert estimate.reason == "no marker of the board in sight"
+
+
+@pytest.mark.parametrize(
+    ("markers", "reason"),
+    [
+        (
+            Markers(dictionary="4X4_250", side=0.057, spacing=0.019),
+            "another board: 5 markers of 4X4_250 in sight, this one has ARUCO_MIP_36h12",
+        ),
+        (
+            Markers(first_id=100),
+            "another board: 10 markers of ARUCO_MIP_36h12 with ids 100, 101, 102 ... in sight, this"
+            " one has 0 to 11; is first_id right?",
+        ),
+        (
+            Markers(side=0.044, spacing=0.017),
+            "another board: its markers are 0.96 times as large for their distances as this one's"
+            " (side 45 mm, spacing 15 mm)",
+        ),
+        (
+            Markers(count=(3, 3)),
+            "another board: only 0 of 9 markers in sight stand where this one has them; are"
+            " columns, rows and first_id right?",
+        ),
+    ],
+)
+def test_another_board(markers: Markers, reason: str) -> None:
+    image = board_image(replace(LITTLE, markers=markers), SMALL, NEAR)
+    estimate = estimate_board(image, SMALL, LITTLE)
+    assert not estimate.valid
+    assert estimate.reason == reason
+
+
+def test_much_smaller_markers_at_the_same_distances() -> None:
+    board = replace(LITTLE, markers=Markers(side=0.03, spacing=0.03, count=(4, 3)))
+    reason = estimate_board(board_image(board, SMALL, NEAR), SMALL, LITTLE).reason
+    assert reason.startswith("another board: its markers are 0.6")
+
+
+def test_the_size_of_the_print_by_depth_and_by_a_known_place() -> None:
+    image = board_image(LITTLE, SMALL, NEAR, scale=(0.97, 0.97))
+    for known in ({"depth": board_depth(SMALL, NEAR)}, {"X_SC_known": NEAR}):
+        estimate = estimate_board(image, SMALL, LITTLE, **known)
+        assert estimate.scale == pytest.approx(0.97, abs=0.001)
+        assert estimate.reason == (
+            "the board is printed at 0.97 of its size: print it at 100 %, or with --measured-mm"
+        )
+    assert estimate_board(image, SMALL, LITTLE).reason == ""  # an image alone does not show it
+    measured = BoardPose(LITTLE, SMALL, (0.97, 0.97)).estimate(image, X_SC_known=NEAR)
+    assert measured.scale == pytest.approx(1.0, abs=0.001)
+    assert measured.reason == ""
+    assert near(measured, NEAR, 0.1, 0.02)
+
+
+def test_a_print_that_is_longer_along_one_axis() -> None:
+    image = board_image(LITTLE, SMALL, NEAR, scale=(1.0, 1.012))
+    estimate = estimate_board(image, SMALL, LITTLE)
+    assert estimate.valid
+    assert estimate.reason == (
+        "the board is printed 1.012 times as long along y as along x: measure it and print with"
+        " --measured-mm, or check the intrinsics"
+    )
+    measured = BoardPose(LITTLE, SMALL, (1.0, 1.012)).estimate(image)
+    assert measured.reason == ""
+    assert near(measured, NEAR, 0.1, 0.02)
+
+
+def test_one_small_marker_has_two_poses() -> None:
+    board = Board(size=(0.1, 0.1), markers=Markers(count=(1, 1), side=0.03))
+    far = view((0.05, 0.05), 0.8, 5.0, 30.0, 10.0)
+    rng = np.random.default_rng(0)
+    image = board_image(board, CAMERA, far, look=Look(noise=10.0, blur=0.8), rng=rng)
+    estimate = estimate_board(image, CAMERA, board)
+    assert not estimate.valid
+    assert estimate.reason == (
+        "1 marker in sight fit two poses alike; come nearer or show more of the board"
+    )
+    close = view((0.05, 0.05), 0.12, 35.0, 30.0, 10.0)
+    assert near(estimate_board(board_image(board, CAMERA, close), CAMERA, board), close, 0.2, 0.1)
+
+
+def test_pictures_that_are_none_of_this_camera(poses: BoardPose) -> None:
+    with pytest.raises(InvalidInputError, match="the image has 320 x 240 pixels, the intrinsics"):
+        poses.estimate(np.zeros((240, 320, 3), np.uint8))
+    with pytest.raises(InvalidInputError, match="3 or 4 channels, not 2"):
+        poses.estimate(np.zeros((480, 640, 2), np.uint8))
+    with pytest.raises(InvalidInputError, match="of uint8, not"):
+        poses.estimate(np.zeros((480, 640, 3)))
+    with pytest.raises(InvalidInputError, match="the depth image is"):
+        poses.estimate(np.zeros((480, 640, 3), np.uint8), depth=np.zeros((240, 320), np.float32))
+    with pytest.raises(InvalidInputError, match="must be positive"):
+        BoardPose(BOARD, CAMERA, (1.0, 0.0))
+
+
+def test_intrinsics_of_another_camera_are_doubtful(clean: np.ndarray) -> None:
+    wrong = Intrinsics(width=640, height=480, focal=(600.0, 660.0), center=(360.0, 200.0))
+    estimate = estimate_board(clean, wrong, BOARD)
+    assert not estimate.valid or "intrinsics" in estimate.reason

@@ -1,0 +1,248 @@
+"""Calibration from corners with known truth; images are in `test_charuco` and the app's tests."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from burg_drake.cameras.calibration import Calibration, calibrate, calibrate_views, displacement
+from burg_drake.cameras.calibration_check import advice, coverage, is_useless
+from burg_drake.cameras.calibration_live import ViewCollector
+from burg_drake.cameras.charuco import CharucoTarget, CharucoView
+from burg_drake.cameras.charuco_image import target_image
+from burg_drake.cameras.frame_source import Frame
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.lens_fit import fit_lens
+from burg_drake.cameras.lens_uncertainty import image_grid, uncertainty
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import Array, make_pose
+
+TARGET = CharucoTarget()
+PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 604.0), center=(325.0, 236.0))
+LENSES = {
+    "pinhole": PINHOLE,
+    "radial4": replace(PINHOLE, distortion=(-0.25, 0.08, 0.001, -0.0005)),
+    "radial": replace(PINHOLE, distortion=(0.12, -0.25, 0.0004, 0.0008, 0.4)),
+    "rational": replace(PINHOLE, distortion=(0.4, 0.05, 0.0002, -0.0003, 0.002, 0.9, 0.1, 0.005)),
+}
+
+
+def looking(rng: np.random.Generator, tilt: float = 0.7) -> Array:
+    """X_TC of a camera anywhere over the target."""
+    axis = rng.normal(size=2)
+    turn = np.array([*(axis / np.linalg.norm(axis) * rng.uniform(0.2, 1.0) * tilt), 0.0])
+    R = cv2.Rodrigues(turn)[0] @ cv2.Rodrigues(np.array([0.0, 0.0, rng.uniform(0.0, 6.0)]))[0]
+    distance = rng.uniform(0.2, 0.4)
+    aside = rng.uniform(-0.3, 0.3, 2) * distance
+    return make_pose(R, np.array([*TARGET.size, 0.0]) / 2.0 - R @ [*aside, distance])
+
+
+def seen(
+    intrinsics: Intrinsics, X_TC: Array, noise: float, rng: np.random.Generator, name: str = "view"
+) -> CharucoView:
+    """Corners where the camera sees them, without any image."""
+    X_CT = np.linalg.inv(X_TC)
+    pixels = intrinsics.project(TARGET.p_TQ @ X_CT[:3, :3].T + X_CT[:3, 3])
+    size = (intrinsics.width, intrinsics.height)
+    inside = ((pixels > 5) & (pixels < np.array(size) - 5)).all(axis=1)
+    corners = pixels[inside] + rng.normal(0.0, noise, (inside.sum(), 2))
+    return CharucoView(name, size, np.flatnonzero(inside).astype(np.int32), corners, 0.8, 40.0)
+
+
+def views_of(
+    intrinsics: Intrinsics, count: int, noise: float, seed: int = 0, tilt: float = 0.7
+) -> list[CharucoView]:
+    rng = np.random.default_rng(seed)
+    views: list[CharucoView] = []
+    while len(views) < count:
+        view = seen(intrinsics, looking(rng, tilt), noise, rng, f"view {len(views)}")
+        if len(view.ids) > 20:
+            views.append(view)
+    return views
+
+
+def largest_deviation(truth: Intrinsics, found: Intrinsics) -> float:
+    """Between where both show the same, over the image [pixels]."""
+    pixels = image_grid(truth)
+    straight = (truth.undistort(pixels) - truth.center) / truth.focal
+    rays = np.column_stack([straight, np.ones(len(straight))])
+    return float(np.linalg.norm(found.project(rays) - pixels, axis=1).max())
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_exact_corners_give_the_exact_camera(model: str) -> None:
+    found = calibrate_views(views_of(LENSES[model], 12, 0.0), TARGET, model=model)
+    # Corners go to OpenCV in 32 bits.
+    assert largest_deviation(LENSES[model], found.intrinsics) < 0.02
+    assert found.rms < 1e-3 and not found.rejected and found.model == model
+    assert found.intrinsics.residual == found.rms
+
+
+@pytest.mark.parametrize("model", ["radial4", "radial", "rational"])
+def test_the_lens_model_is_the_one_that_the_corners_support(model: str) -> None:
+    found = calibrate_views(views_of(LENSES[model], 25, 0.05, seed=1), TARGET)
+    assert found.model == model
+    assert largest_deviation(LENSES[model], found.intrinsics) < 0.5
+    # Uniform over x and y: root mean square of the length is sqrt(2) times the noise.
+    assert found.rms == pytest.approx(0.05 * np.sqrt(2.0), rel=0.05)
+
+
+@pytest.mark.parametrize("model", ["radial4", "radial", "rational"])
+def test_standard_deviations_are_those_of_opencv(model: str) -> None:
+    views = views_of(LENSES[model], 12, 0.1)
+    found = calibrate_views(views, TARGET, model=model)
+    flags = {"radial4": cv2.CALIB_FIX_K3, "radial": 0, "rational": cv2.CALIB_RATIONAL_MODEL}[model]
+    guess = found.intrinsics
+    k = np.array([*guess.distortion, 0.0])[: max(5, len(guess.distortion))]
+    _, _, _, _, _, deviations, _, _ = cv2.calibrateCameraExtended(
+        [TARGET.p_TQ[v.ids].astype(np.float32) for v in views],
+        [v.corners.astype(np.float32) for v in views],
+        (640, 480),
+        guess.K.copy(),
+        k,
+        flags=flags | cv2.CALIB_USE_INTRINSIC_GUESS,
+    )
+    ours = [deviation for _, deviation in found.parameters.values()]
+    assert np.allclose(ours, np.ravel(deviations)[: len(ours)], rtol=0.02)
+
+
+def test_uncertainty_is_the_scatter_of_many_calibrations() -> None:
+    """Monte Carlo: the same views with other noise, over and over."""
+    truth, pixels = LENSES["radial4"], image_grid(PINHOLE, 5, 4)
+    exact = views_of(truth, 8, 0.0)
+    straight = (truth.undistort(pixels) - truth.center) / truth.focal
+    rays = np.column_stack([straight, np.ones(len(straight))])
+    grid = image_grid(truth)
+    all_rays = (truth.undistort(grid) - truth.center) / truth.focal
+    all_rays = np.column_stack([all_rays, np.ones(len(grid))])
+    rng = np.random.default_rng(1)
+    off, expected = [], []
+    for _ in range(40):
+        noisy = [
+            replace(v, corners=v.corners + rng.normal(0.0, 0.2, v.corners.shape)) for v in exact
+        ]
+        fit = fit_lens(noisy, TARGET, "radial4")
+        found = fit.intrinsics
+        # The turn of the camera that explains most of the difference over the image.
+        step = 1e-6
+        by_turn = [
+            (truth.project(all_rays @ cv2.Rodrigues(step * axis)[0].T) - grid).ravel() / step
+            for axis in np.eye(3)
+        ]
+        difference = (found.project(all_rays) - grid).ravel()
+        turn = np.linalg.lstsq(np.transpose(by_turn), difference, rcond=None)[0]
+        R = cv2.Rodrigues(-turn)[0]
+        off.append(np.linalg.norm(found.project(rays @ R.T) - pixels, axis=1))
+        calibration = Calibration(found, TARGET, "radial4", (), (), fit.covariance)
+        expected.append(uncertainty(calibration, pixels))
+    scatter = np.sqrt(np.mean(np.square(off), axis=0))
+    assert np.allclose(scatter, np.mean(expected, axis=0), rtol=0.4)
+    assert scatter.mean() == pytest.approx(np.mean(expected), rel=0.2)
+
+
+def test_views_that_do_not_count_are_left_out_with_the_reason() -> None:
+    views = views_of(LENSES["radial4"], 15, 0.05)
+    rng = np.random.default_rng(5)
+    zoomed = replace(PINHOLE, focal=(800.0, 804.0))
+    blurred = replace(seen(PINHOLE, looking(rng), 0.0, rng, "blurred"), blur=6.0)
+    large = replace(views[3], name="large", size=(1280, 960), corners=2.0 * views[3].corners)
+    twin = replace(views[4], name="twin", corners=views[4].corners + 0.5)
+    bent = replace(views[5], name="bent", corners=views[5].corners[::-1] * [1.0, 0.97])
+    others = [bent, large, blurred, twin, seen(zoomed, looking(rng), 0.0, rng, "zoomed")]
+    found = calibrate_views([*views, *others], TARGET, rejected=[("blank", "shows nothing")])
+    reasons = dict(found.rejected)
+    assert set(reasons) == {"blank", "bent", "large", "blurred", "twin", "zoomed"}
+    assert reasons["blank"] == "shows nothing"
+    assert reasons["large"] == "has 1280 x 960 pixels, the others 640 x 480"
+    assert reasons["blurred"] == "is blurred: its edges by 6.0 pixels"
+    assert reasons["twin"] == "shows the target where view 4 does"
+    assert "pixels off, the median" in reasons["zoomed"] and "pixels off" in reasons["bent"]
+    assert largest_deviation(LENSES["radial4"], found.intrinsics) < 0.5
+    assert [used.view.name for used in found.views] == [view.name for view in views]
+
+
+def test_wrong_corners_are_left_out_without_their_view() -> None:
+    views = views_of(LENSES["radial4"], 15, 0.05)
+    corners = views[2].corners.copy()
+    corners[[1, 7]] += [[6.0, -3.0], [0.0, 4.0]]
+    views[2] = replace(views[2], corners=corners)
+    found = calibrate_views(views, TARGET)
+    assert not found.rejected
+    assert set(views[2].ids) - set(found.views[2].view.ids) == set(views[2].ids[[1, 7]])
+    assert largest_deviation(LENSES["radial4"], found.intrinsics) < 0.5
+
+
+def test_too_few_views_are_refused() -> None:
+    views = views_of(PINHOLE, 2, 0.0)
+    with pytest.raises(InvalidInputError) as raised:
+        calibrate_views(views, TARGET, rejected=[("a.png", "does not show the target")])
+    assert str(raised.value) == (
+        "2 of 3 images can be used, 3 are needed and 15 are good; a.png does not show the target"
+    )
+    with pytest.raises(InvalidInputError, match="0 of 1 images can be used"):
+        calibrate([np.zeros((48, 64, 3), dtype=np.uint8)], TARGET)
+    with pytest.raises(UnknownNameError, match="lens model 'radial5' does not exist"):
+        calibrate_views(views, TARGET, model="radial5")
+
+
+def test_views_without_tilt_are_known_to_tell_little() -> None:
+    straight = calibrate_views(views_of(LENSES["radial4"], 12, 0.1, tilt=0.02), TARGET)
+    tilted = calibrate_views(views_of(LENSES["radial4"], 25, 0.1), TARGET)
+    assert any("tilt the target by 20 to 45 degrees" in line for line in advice(straight))
+    assert straight.parameters["fx"][1] > 20 * tilted.parameters["fx"][1]
+    assert is_useless(straight) and not is_useless(tilted)
+    assert not any("tilt" in line for line in advice(tilted))
+
+
+def test_advice_names_edges_without_corners() -> None:
+    views = views_of(LENSES["radial4"], 25, 0.05)
+    kept = []
+    for view in views:
+        inside = view.corners[:, 0] < 500
+        kept.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
+    found = calibrate_views([v for v in kept if len(v.ids) > 15], TARGET)
+    assert any("no corners were seen at the right edge of the image" in a for a in advice(found))
+    few = calibrate_views(views[:5], TARGET)
+    assert "5 views are few: take 15 to 30" in advice(few)
+
+
+def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:
+    views = views_of(PINHOLE, 5, 0.0)
+    counts = coverage(views, (640, 480))
+    brute = np.zeros_like(counts)
+    for u, v in np.concatenate([view.corners for view in views]):
+        brute[int((v + 0.5) // 80), int((u + 0.5) // 80)] += 1
+    assert np.array_equal(counts, brute) and counts.sum() == sum(len(v.ids) for v in views)
+
+
+def test_displacement_of_views() -> None:
+    view = views_of(PINHOLE, 1, 0.0)[0]
+    moved = replace(view, corners=view.corners + np.array([3.0, 4.0]))
+    assert displacement(view, moved) == pytest.approx(5.0 / 800.0)
+    part = replace(view, ids=view.ids[:3], corners=view.corners[:3])
+    assert displacement(view, part) == float("inf")
+
+
+def test_live_views_are_still_and_different() -> None:
+    camera = Intrinsics(width=320, height=240, focal=(350.0, 350.0), center=(160.0, 120.0))
+    rng = np.random.default_rng(3)
+    X_TC = looking(rng, 0.2)
+    X_TC[:3, 3] = [0.08, 0.11, -0.25]
+    image = target_image(TARGET, camera, X_TC)
+    collector = ViewCollector(TARGET)
+
+    def offer(picture: np.ndarray) -> tuple[bool, str]:
+        return collector.offer(Frame(picture, None, 0.0, "camera 0"))
+
+    assert offer(np.zeros_like(image)) == (False, "the image does not show the target")
+    assert offer(image) == (False, "hold still")  # nothing to compare it with yet
+    assert offer(image)[0]
+    assert not offer(image)[0] and len(collector.views) == 1  # the same again
+    moved = np.roll(image, 40, axis=1)
+    assert offer(moved) == (False, "hold still")
+    taken, word = offer(moved)
+    assert taken and word.startswith("bring the target to the ")
+    assert [view.name for view in collector.views] == ["view 1", "view 2"]

@@ -1,0 +1,91 @@
+"""Markers are found, told apart, and in the right order of corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from burg_drake.cameras.board_pose import grey_image
+from burg_drake.cameras.detection import MarkerDetector, other_markers
+from burg_drake.cameras.edge_refinement import moved
+from burg_drake.cameras.edge_views import view_edges
+from burg_drake.cameras.marker_edges import REACH, marker_edges
+from burg_drake.cameras.synthetic import board_image
+from burg_drake.scene.markers import Markers
+from burg_drake.scene.scene import Board
+from tests.cameras.board_views import SMALL, view
+
+BOARD = Board(size=(0.3, 0.21), markers=Markers(first_id=20))
+NEAR = view((0.15, 0.105), 0.52, 20.0, 200.0, 100.0)
+
+
+def test_corners_are_those_of_the_layout() -> None:
+    seen = MarkerDetector(BOARD.layout).detect(grey_image(board_image(BOARD, SMALL, NEAR)))
+    assert len(seen.index) == 12
+    p_C = (BOARD.layout.p_SQ[seen.index] - NEAR[:3, 3]) @ NEAR[:3, :3]
+    assert np.abs(SMALL.project(p_C) - seen.corners).max() < 1.5
+
+
+def test_a_marker_that_is_there_twice_is_left_out() -> None:
+    image = grey_image(board_image(BOARD, SMALL, NEAR))
+    double = np.hstack([image, image])
+    assert len(MarkerDetector(BOARD.layout).detect(double).index) == 0
+
+
+def test_markers_of_others_are_named() -> None:
+    image = grey_image(board_image(BOARD, SMALL, NEAR))
+    other = other_markers(image, Board(markers=Markers(dictionary="5X5_250")).layout)
+    assert other is not None
+    assert other.dictionary == "ARUCO_MIP_36h12"
+    assert set(other.ids) == set(range(20, 32))
+    assert other_markers(np.full_like(image, 128), BOARD.layout) is None
+
+
+def test_edges_are_all_changes_of_color() -> None:
+    layout = BOARD.layout
+    edges = marker_edges(layout)
+    white = np.pad(~layout.black, ((0, 0), (1, 1), (1, 1)), constant_values=True)
+    across = (white[:, :, 1:] != white[:, :, :-1]).sum(), (white[:, 1:] != white[:, :-1]).sum()
+    assert [(edges.axis == axis).sum() for axis in (0, 1)] == list(across)
+    # What lies a quarter of a cell before and behind an edge, looked up in the layout.
+    cell = layout.side / layout.cells
+    for side, step in ((-0.25, -0.5), (0.25, 0.5)):
+        p = edges.p_SE[:, :2] + side * cell * np.eye(2)[edges.axis]
+        upper_left = layout.p_SQ[edges.marker, 0, :2]
+        column, row = np.floor((p - upper_left) * [1, -1] / cell).astype(int).T
+        is_white = white[edges.marker, row + 1, column + 1]
+        assert np.array_equal(is_white, edges.steps[:, 1, REACH] * step > 0)
+    # Every beginning is spread over all markers.
+    assert np.ptp(np.bincount(edges.marker[:60], minlength=12)) <= 1
+
+
+def test_motion_and_print_are_derivatives() -> None:
+    lens = SMALL.__class__(
+        width=320,
+        height=240,
+        focal=(420, 410),
+        center=(160, 118),
+        distortion=(0.1, -0.2, 1e-3, 2e-3),
+    )
+    edges = marker_edges(BOARD.layout)
+    which = np.arange(len(edges.marker))
+    views = view_edges(edges, which, lens, NEAR)
+    normal = views.across / np.linalg.norm(views.across, axis=1, keepdims=True)
+    h = 1e-5
+    for k, unit in enumerate(np.eye(6)):
+        ahead, back = (
+            view_edges(edges, views.which, lens, moved(NEAR, s * h * unit)) for s in (1, -1)
+        )
+        change = ((ahead.at - back.at) * normal).sum(axis=1) / (2 * h)
+        assert np.allclose(change, views.motion[:, k], rtol=1e-3, atol=0.05), k
+    longer = marker_edges(BOARD.layout, (1 - h, 1 + h))
+    change = ((view_edges(longer, views.which, lens, NEAR).at - views.at) * normal).sum(axis=1) / h
+    assert np.allclose(change, views.print[:, 0], rtol=1e-2, atol=0.05)
+
+
+def test_a_point_in_sight_stays_while_the_camera_turns_about_it() -> None:
+    point, turn = np.array([0.15, 0.1, 0.0]), np.array([0.1, -0.2, 0.15])
+    arm = NEAR[:3, 3] - point
+    X_SC = moved(NEAR, np.r_[turn, np.cross(turn, arm)], point)
+    before, after = ((point - X[:3, 3]) @ X[:3, :3] for X in (NEAR, X_SC))
+    assert np.allclose(before, after)
+    assert np.allclose(moved(NEAR, np.r_[turn, 0, 0, 0])[:3, 3], NEAR[:3, 3])

@@ -1,0 +1,88 @@
+"""Intrinsics against OpenCV's and Drake's own arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from pydrake.systems.sensors import CameraInfo
+
+from burg_drake.cameras.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.station.station import Camera
+
+PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 610.0), center=(315.0, 241.0))
+RADIAL = replace(PINHOLE, distortion=(-0.3, 0.1, 0.001, -0.002, -0.01))
+RATIONAL = replace(PINHOLE, distortion=(0.35, 0.02, 0.0002, -0.0003, 0.004, 0.75, 0.12, 0.01))
+
+
+def some_points() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    z = rng.uniform(0.3, 2.0, 50)
+    return np.column_stack([rng.uniform(-0.4, 0.4, 50) * z, rng.uniform(-0.3, 0.3, 50) * z, z])
+
+
+def by_hand(intrinsics: Intrinsics, p_C: np.ndarray) -> np.ndarray:
+    """The formula of OpenCV's documentation (calib3d, "detailed description")."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = (*intrinsics.distortion, *[0.0] * 8)[:8]
+    x, y = p_C[:, 0] / p_C[:, 2], p_C[:, 1] / p_C[:, 2]
+    r2 = x * x + y * y
+    radial = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return np.column_stack([u, v]) * intrinsics.focal + intrinsics.center
+
+
+@pytest.mark.parametrize("intrinsics", [PINHOLE, RADIAL, RATIONAL])
+def test_projection_is_the_formula(intrinsics: Intrinsics) -> None:
+    p_C = some_points()
+    assert np.allclose(intrinsics.project(p_C), by_hand(intrinsics, p_C), atol=1e-9)
+    assert intrinsics.project(p_C[None, :, None]).shape == (1, 50, 1, 2)
+
+
+@pytest.mark.parametrize("intrinsics", [PINHOLE, RADIAL, RATIONAL])
+def test_undistorted_pixels_are_those_of_a_pinhole_camera(intrinsics: Intrinsics) -> None:
+    p_C = some_points()
+    straight = intrinsics.undistort(by_hand(intrinsics, p_C))
+    assert np.abs(straight - by_hand(PINHOLE, p_C)).max() < 1e-3
+
+
+def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
+    info = camera_info(PINHOLE)
+    assert (info.center_x(), info.center_y()) == (315.5, 241.5)
+    assert of_camera_info(info) == PINHOLE
+    # A centred camera: Drake's principal point is half of the size, ours the middle pixel's centre.
+    centred = of_camera_info(CameraInfo(640, 480, 600.0, 600.0, 320.0, 240.0))
+    assert centred.center == (319.5, 239.5) == of_camera(Camera(X_WC=Pose())).center
+    with pytest.raises(InvalidInputError, match="no lens distortion"):
+        camera_info(RADIAL)
+
+
+def test_images_of_another_size_are_refused() -> None:
+    PINHOLE.require_size(640, 480, "photo.png")
+    with pytest.raises(
+        InvalidInputError, match=r"photo\.png has 1280 x 960 pixels, the intrinsics"
+    ):
+        PINHOLE.require_size(1280, 960, "photo.png")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"focal": (0.0, 600.0)}, "must be positive"),
+        ({"width": 0}, "must be positive"),
+        ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model takes 0, 4, 5, 8"),
+    ],
+)
+def test_what_no_camera_has(change: dict[str, object], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        replace(PINHOLE, **change)  # type: ignore[arg-type]
+
+
+def test_k_is_what_opencv_takes() -> None:
+    p_C = some_points()
+    pixels, _ = cv2.projectPoints(p_C, np.zeros(3), np.zeros(3), RADIAL.K, RADIAL.coefficients)
+    assert np.allclose(pixels[:, 0], by_hand(RADIAL, p_C))

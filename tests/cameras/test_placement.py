@@ -1,0 +1,111 @@
+"""The placement check on rendered photos, whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.cameras.placement import check_placement
+from burg_drake.cameras.placement_photo import Photo, ScenePhotographer
+from burg_drake.cameras.placement_shape import scene_shapes
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array
+from burg_drake.core.schema import dump_document
+from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.system_libraries import missing_render_libraries
+from tests.cameras.placement_views import INTRINSICS, X_SC
+
+needs_renderer = pytest.mark.skipif(
+    bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
+)
+TRUTH = {
+    "mug": (0.012, -0.008, 15.0),
+    "box": (0.006, 0.012, 9.0),
+    "bowl": (-0.015, 0.0, 0.0),
+}
+"""Displacements [m, deg]; the banana is missing."""
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    whole = load_scene("tabletop_six")
+    kept = tuple(i for i in whole.document.instances if i.object in (*TRUTH, "banana"))
+    return Scene(replace(whole.document, instances=kept), whole.library, whole.path)
+
+
+@pytest.fixture(scope="module")
+def photo(scene: Scene) -> Photo:
+    shapes = scene_shapes(scene)
+    X_SO: dict[str, Array | None] = {
+        name: shapes[name].placed(np.array([x, y, np.deg2rad(turn)]))
+        for name, (x, y, turn) in TRUTH.items()
+    }
+    taken = ScenePhotographer(scene).take(X_SC, INTRINSICS, X_SO | {"banana": None})
+    rng = np.random.default_rng(0)
+    color = np.clip(np.round(taken.color + rng.normal(0, 3, taken.color.shape)), 0, 255)
+    depth = np.round(taken.depth + rng.normal(0, 1e-3, taken.depth.shape), 3)
+    return replace(taken, color=color.astype(np.uint8), depth=depth.astype(np.float32))
+
+
+@needs_renderer
+@pytest.mark.parametrize("method", ["silhouette", "depth"])
+def test_rendered_objects_are_measured(scene: Scene, photo: Photo, method: str) -> None:
+    depth = photo.depth if method == "depth" else None
+    check = check_placement(scene, photo.color, INTRINSICS, depth=depth)
+    assert check.method == method
+    assert check.camera is not None
+    for name, (x, y, turn) in TRUTH.items():
+        found = check.instances[name]
+        assert found.status == "measured", (name, found.reason)
+        assert found.displacement is not None
+        assert found.displacement_sd is not None
+        assert np.hypot(found.displacement[0] - x, found.displacement[1] - y) < 6e-4, name
+        off = np.abs(np.array(found.displacement) - (x, y)) / found.displacement_sd
+        assert off.max() < 5.0, name
+        if name == "bowl":
+            assert found.angle is None
+        else:
+            assert found.angle is not None
+            assert abs(np.rad2deg(found.angle) - turn) < 0.6, name
+    banana = check.instances["banana"]
+    assert (banana.status, banana.displacement) == ("not_seen", None)
+    assert banana.reason == "nothing like it stands within 50 mm of its target"
+
+
+def test_without_a_board_nothing_is_measured_and_the_reason_is_said(scene: Scene) -> None:
+    check = check_placement(scene, np.full((480, 640, 3), 128, np.uint8), INTRINSICS)
+    assert check.camera is None
+    assert check.reason.startswith("the board was not found")
+    assert {p.status for p in check.instances.values()} == {"not_seen"}
+    assert "displacement" not in dump_document(check)
+
+
+def test_objects_out_of_view_are_not_seen(scene: Scene) -> None:
+    away = X_SC.copy()
+    away[:3, 3] += (3.0, 0.0, 0.0)
+    depth = np.full((480, 640), 1.0, np.float32)
+    estimate = BoardEstimate(X_SC=away, valid=True)
+    image = np.zeros((480, 640, 3), np.uint8)
+    check = check_placement(scene, image, INTRINSICS, depth=depth, estimate=estimate)
+    assert {p.reason for p in check.instances.values()} == {"it is out of view"}
+    dark = check_placement(scene, image, INTRINSICS, estimate=estimate)
+    assert dark.reason == "the board's paper and ink look alike in the photo; give it more light"
+
+
+def test_inputs_that_cannot_be_used_are_named(scene: Scene) -> None:
+    image = np.zeros((480, 640, 3), np.uint8)
+    with pytest.raises(InvalidInputError, match="the photo has 320 x 240 pixels, the intrinsics"):
+        check_placement(scene, np.zeros((240, 320, 3), np.uint8), INTRINSICS)
+    with pytest.raises(InvalidInputError, match=r"the photo is an array \(480, 640\) of float64"):
+        check_placement(scene, np.zeros((480, 640)), INTRINSICS)
+    small = np.ones((240, 320), np.float32)
+    with pytest.raises(InvalidInputError, match="the depth image has 320 x 240 pixels"):
+        check_placement(scene, image, INTRINSICS, depth=small)
+    millimetres = np.full((480, 640), 800.0, np.float32)
+    with pytest.raises(InvalidInputError, match="median of 800; give metres"):
+        check_placement(scene, image, INTRINSICS, depth=millimetres)
+    with pytest.raises(InvalidInputError, match="no distance above 0"):
+        check_placement(scene, image, INTRINSICS, depth=np.zeros((480, 640), np.float32))

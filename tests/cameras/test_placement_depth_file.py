@@ -1,0 +1,37 @@
+"""Depth images from files, in metres whatever they are written in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from burg_drake.cameras.placement_depth_file import read_depth
+from burg_drake.core.errors import InvalidInputError
+
+METRES = np.array([[0.5, 0.75], [0.0, 1.25]])
+
+
+def test_millimetres_and_metres_are_told_by_type(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "d.png"), (METRES * 1000).astype(np.uint16))
+    np.save(tmp_path / "whole.npy", (METRES * 1000).astype(np.uint16))
+    np.save(tmp_path / "metres.npy", np.where(METRES > 0, METRES, np.nan))
+    for name in ("d.png", "whole.npy", "metres.npy"):
+        np.testing.assert_allclose(read_depth(tmp_path / name), METRES, rtol=1e-6)
+    np.testing.assert_allclose(read_depth(tmp_path / "d.png", 1e-4), METRES / 10, rtol=1e-6)
+
+
+def test_what_is_not_depth_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"no\.png does not exist"):
+        read_depth(tmp_path / "no.png")
+    (tmp_path / "text.npy").write_text("hello")
+    with pytest.raises(InvalidInputError, match=r"text\.npy is not a numpy array"):
+        read_depth(tmp_path / "text.npy")
+    (tmp_path / "text.png").write_text("hello")
+    with pytest.raises(InvalidInputError, match=r"text\.png is not an image"):
+        read_depth(tmp_path / "text.png")
+    cv2.imwrite(str(tmp_path / "color.png"), np.zeros((4, 4, 3), np.uint8))
+    with pytest.raises(InvalidInputError, match=r"color.png is an array \(4, 4, 3\) of uint8"):
+        read_depth(tmp_path / "color.png")

@@ -1,0 +1,83 @@
+"""Depth buffers, against ray casting by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from burg_drake.cameras.placement_raster import Window, depth_buffer, window_around
+
+K = np.array([[500.0, 0.0, 31.5], [0.0, 480.0, 23.5], [0.0, 0.0, 1.0]])
+ALL = Window(0, 0, 64, 48)
+
+
+def pixels(p_CV: np.ndarray) -> np.ndarray:
+    return p_CV[:, :2] / p_CV[:, 2:] * K[[0, 1], [0, 1]] + K[:2, 2]
+
+
+def rays(window: Window) -> np.ndarray:
+    v, u = np.mgrid[: window.shape[0], : window.shape[1]].astype(float)
+    at = window.image(np.stack([u, v], axis=-1))
+    return np.dstack([(at - K[:2, 2]) / K[[0, 1], [0, 1]], np.ones(window.shape)])
+
+
+def brute_force(p_CV: np.ndarray, faces: np.ndarray, window: Window) -> np.ndarray:
+    """Moeller and Trumbore's intersection of every ray with every triangle."""
+    nearest = np.full(window.shape, np.inf)
+    d = rays(window)
+    for a, b, c in p_CV[faces]:
+        p = np.cross(d, c - a)
+        det = p @ (b - a)
+        u = p @ -a / det
+        q = np.cross(-a, b - a)
+        v = d @ q / det
+        t = (c - a) @ q / det
+        nearest = np.where(
+            (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), np.minimum(nearest, t), nearest
+        )
+    return nearest
+
+
+def test_overlapping_triangles_are_as_ray_casting_has_them() -> None:
+    rng = np.random.default_rng(1)
+    p_CV = np.column_stack([rng.uniform(-0.08, 0.08, (60, 2)), rng.uniform(0.8, 1.2, 60)])
+    faces = np.arange(60).reshape(20, 3)
+    for window in (ALL, Window(10, 5, 30, 30, 2.0), Window(8, 8, 40, 32, 0.5)):
+        found = depth_buffer(p_CV, pixels(p_CV), faces, window)
+        true = brute_force(p_CV, faces, window)
+        assert found.shape == window.shape
+        assert np.isfinite(true).mean() > 0.2
+        np.testing.assert_allclose(found, true, rtol=1e-9)
+
+
+def test_a_sphere_has_the_depth_of_a_sphere() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.03)
+    center = np.array([0.004, -0.006, 1.0])
+    p_CV = ball.vertices + center
+    d = rays(ALL)
+    b, c = d @ center, center @ center - 0.03**2
+    a = (d**2).sum(axis=-1)
+    root = b**2 - a * c
+    true = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+    found = depth_buffer(p_CV, pixels(p_CV), ball.faces, ALL)
+    both = np.isfinite(found) & np.isfinite(true) & (root > 0.1 * root.max())
+    assert (np.isfinite(found) != np.isfinite(true)).sum() < 0.02 * np.isfinite(true).sum()
+    np.testing.assert_allclose(found[both], true[both], atol=2e-4)
+
+
+def test_what_lies_behind_or_outside_is_not_drawn() -> None:
+    behind = np.array([[-0.1, -0.1, -1.0], [0.1, -0.1, -1.0], [0.0, 0.1, 1.0]])
+    at = np.array([[0.0, 0.0], [60.0, 0.0], [30.0, 40.0]])
+    assert np.isinf(depth_buffer(behind, at, np.array([[0, 1, 2]]), ALL)).all()
+    empty = window_around(np.array([[100.0, 100.0], [120.0, 130.0]]), 2.0, (64, 48), 1.0)
+    assert empty.shape[0] * empty.shape[1] == 0
+    front = np.abs(behind)
+    assert depth_buffer(front, at, np.array([[0, 1, 2]]), empty).size == 0
+
+
+def test_windows_convert_there_and_back() -> None:
+    window = Window(7, 3, 20, 10, 3.0)
+    at = np.array([[7.0, 3.0], [9.25, 4.5]])
+    np.testing.assert_allclose(window.image(window.raster(at)), at)
+    # the first pixel is three raster pixels wide, and its middle is that of the second of them
+    np.testing.assert_allclose(window.raster(at[0]), [1.0, 1.0])
