@@ -20,9 +20,9 @@ from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.marker_edges import MarkerEdges
 from burg_drake.core.frames import Array
 
-FIRST, LATER, LAST = 160, 320, 1000
+FIRST, LATER, LAST = 160, 320, 800
 """Edges that the rounds look at: the pose is coarse at first, and a few suffice."""
-BLURS = (0.1, 0.4, 1.2, 3.0)
+BLURS = (0.1, 0.5, 2.5)
 """Variances of lens and pixel together to begin with [pixels^2]; a pixel alone has 1/12."""
 LEAST_BLUR, MOST_BLUR = 0.08, 9.0
 KNOWN = 0.5
