@@ -23,7 +23,7 @@ from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.evaluation.mode import MODES
 from burg_drake.station.engine import ENGINES
 
-GROUPS = (["library"], ["scene"], ["grasps"], ["hand"])
+GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"])
 HELP = (
     [],
     *GROUPS,
@@ -31,8 +31,12 @@ HELP = (
     *(["library", "import-ycb"],),
     *(["scene", v] for v in ("show", "validate", "settle", "import-burg")),
     *(["grasps", v] for v in ("sample", "score", "show", "convert", "stats")),
+    *(["camera", v] for v in ("target", "calibrate", "show", "convert", "list")),
+    *(["camera", v] for v in ("locate", "placement")),
+    *(["station", v] for v in ("list", "check", "show")),
     *(["hand", v] for v in ("list", "check")),
     *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
+    *([v] for v in ("printout", "ar", "ros")),
 )
 
 
