@@ -167,6 +167,7 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
             print(file=sys.stderr)
         with _deaf_to_interrupts():
             closing.close()
+        actions.wait_for_check()  # OpenCV must not be at work when Python ends
     if scripted or arguments.check or arguments.snapshot:
         finish(live, actions, check=arguments.check, snapshot=arguments.snapshot)
     if interrupted and (arguments.frames or arguments.seconds):
@@ -253,12 +254,12 @@ def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
 
 def _require_places(arguments: argparse.Namespace) -> None:
     """Refuses results that cannot be written, before anything else is done."""
-    from burg_drake.cameras.recording import require_video_path
+    from burg_drake.cameras.recording_files import require_video_path
     from burg_drake.cameras.snapshot import require_new_folder
     from burg_drake.core.files import writable_folder
 
     if arguments.record is not None:
-        require_video_path(arguments.record)
+        require_video_path(arguments.record, plain=arguments.plain)
     if arguments.snapshot is not None:
         require_new_folder(arguments.snapshot)
     if not arguments.no_browser:

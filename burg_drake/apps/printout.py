@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.arguments import add_scene, add_verb, not_negative, number
+from burg_drake.apps.arguments import add_scene, add_verb, measured_mm, not_negative
 
 
 def add_to(verbs: Any) -> None:
@@ -43,8 +43,8 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument(
         "--measured-mm",
-        metavar="MM[,MM]",
-        type=measured,
+        metavar="X[,Y]",
+        type=measured_mm,
         default=(100.0, 100.0),
         help="length of the printed rulers of 100 mm along x and y of the page; all is drawn larger"
         " by what is missing",
@@ -53,14 +53,6 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--no-names", action="store_true", help="do not write the objects' names beside them"
     )
-
-
-def measured(text: str) -> tuple[float, float]:
-    """`MM` or `MM,MM`."""
-    values = [number(part) for part in text.split(",")]
-    if len(values) > 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not MM or MM,MM, such as 98.5 or 98.5,99.2")
-    return values[0], values[-1]
 
 
 def run_printout(arguments: argparse.Namespace) -> int:

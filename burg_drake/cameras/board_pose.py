@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from burg_drake.cameras.detection import Detection, MarkerDetector, other_marker
 from burg_drake.cameras.edge_refinement import EdgeRefinement, Refined
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.marker_edges import marker_edges
+from burg_drake.cameras.other_board import OtherBoard
 from burg_drake.cameras.print_size import (
     LEAST_DEVIATION,
     deformation,
@@ -67,6 +69,7 @@ class BoardPose:
         self._detector = MarkerDetector(self._layout)
         self._edges = marker_edges(self._layout, scale)
         self._refinement = EdgeRefinement(self._edges, self._p_SQ, intrinsics)
+        self._other_board = OtherBoard(board, intrinsics, scale)
 
     def estimate(
         self,
@@ -92,6 +95,18 @@ class BoardPose:
                 f"the depth image is {np.shape(depth)}, the image {grey.shape}; give one of the"
                 " same camera"
             )
+        try:
+            return self._look(grey, depth, X_SC_known)
+        except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
+            return BoardEstimate(reason="what is in sight of the board does not determine a pose")
+
+    def _look(
+        self,
+        grey: NDArray[np.uint8],
+        depth: NDArray[np.floating[Any]] | None,
+        X_SC_known: Array | None,
+    ) -> BoardEstimate:
+        """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
         if not len(seen.index):
             return BoardEstimate(reason=self._why_nothing(grey, seen))
@@ -106,7 +121,7 @@ class BoardPose:
         printed = deformation(refined)
         if printed.growth:
             return BoardEstimate(reason=self._other_size(1.0 + printed.growth))
-        return self._estimate(refined, printed.stretch, depth, X_SC_known)
+        return self._estimate(grey, refined, printed.stretch, depth, X_SC_known)
 
     def _refine(
         self, grey: NDArray[np.uint8], poses: list[Array], found: NDArray[np.intp]
@@ -134,12 +149,17 @@ class BoardPose:
 
     def _estimate(
         self,
+        grey: NDArray[np.uint8],
         refined: Refined,
         stretch: float,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
         """What to tell about a pose."""
+        contrast = float(np.median(refined.fits.contrast[refined.weight > 0.0]))
+        wrong = self._other_board.beyond(grey, refined.X_SC, contrast)
+        if wrong:
+            return BoardEstimate(reason=wrong)
         used, corners, error = self._seen_corners(refined)
         p_SQ = self._p_SQ[used]
         scale = float("nan")
@@ -147,10 +167,13 @@ class BoardPose:
             scale = scale_by_depth(p_SQ, self.intrinsics, refined.X_SC, depth)
         if X_SC_known is not None:
             scale = scale_by_height(refined.X_SC, X_SC_known)
+        if abs(scale - 1.0) > LEAST_DEVIATION:
+            return BoardEstimate(reason=_other_scale(scale), scale=scale)
+        blank = self._other_board.blank(grey, refined.X_SC, contrast, used) if len(used) else ""
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,
-            reason=_doubts(error, scale, stretch),
+            reason=blank or _doubts(error, stretch),
             reprojection_error=error,
             covariance=refined.covariance,
             ids=tuple(int(i) for i in self._layout.ids[used]),
@@ -229,8 +252,6 @@ def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Raises:
         InvalidInputError: it is of another shape or type.
     """
-    import cv2
-
     image = np.asarray(image)
     if image.dtype != np.uint8 or image.ndim not in (2, 3):
         raise InvalidInputError(
@@ -256,13 +277,16 @@ def _apart(one: Refined, other: Refined) -> bool:
     return bool(np.arccos(np.clip((np.trace(difference) - 1.0) / 2.0, -1.0, 1.0)) > 0.01)
 
 
-def _doubts(error: float, scale: float, stretch: float) -> str:
+def _other_scale(scale: float) -> str:
+    """What is wrong with a print of another size: distances by it are false by as much."""
+    return (
+        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give what its"
+        " rulers measure with --measured-mm"
+    )
+
+
+def _doubts(error: float, stretch: float) -> str:
     """What is doubtful about a pose; empty if all is well."""
-    if abs(scale - 1.0) > LEAST_DEVIATION:
-        return (
-            f"the board is printed at {scale:.3g} of its size: print it at 100 %, or with"
-            " --measured-mm"
-        )
     if stretch:
         return (
             f"the board is printed {1.0 + stretch:.3f} times as long along y as along x: measure it"

@@ -188,6 +188,7 @@ def _best(views: list[CharucoView], target: CharucoTarget, radial: LensFit) -> L
     """
     best = min(fit_lens(views, target, "radial4"), radial, key=lambda fit: fit.information(True))
     rational = fit_lens(views, target, "rational", radial)
+    rational = fit_lens(views, target, "rational", rational)  # OpenCV 4 ends before the minimum
     worst = [float(uncertainty(fit, image_grid(fit.intrinsics)).max()) for fit in (best, rational)]
     supported = rational.information(False) < best.information(False)
     return rational if supported and worst[1] <= worst[0] else best

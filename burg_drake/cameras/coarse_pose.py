@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.edge_views import image_points
+from burg_drake.cameras.edge_views import cross, image_points
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.core.frames import Array, inverse
 
@@ -20,7 +20,8 @@ MISPLACED = 3.0
 blurred markers are found within one."""
 RIVAL = (3.0, 0.5)
 """The second pose is a rival of the first up to so many times its error, plus so much [pixels]."""
-
+FAR = (10.0, 5.0)
+"""The same before the second pose is refined [pixels]."""
 SAME = 1e-3
 """Poses that differ by less are one [-, m]."""
 
@@ -69,9 +70,11 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
     import cv2
 
     p, q = p_SQ.reshape(-1, 3), np.ascontiguousarray(straight.reshape(-1, 2))
-    _, rotations, translations, _ = cv2.solvePnPGeneric(p, q, K, None, flags=cv2.SOLVEPNP_IPPE)
-    found = []
-    for rotation, translation in zip(rotations, translations, strict=True):
+    _, rotations, translations, errors = cv2.solvePnPGeneric(p, q, K, None, flags=cv2.SOLVEPNP_IPPE)
+    found: list[tuple[float, Array]] = []
+    for rotation, translation, rough in zip(rotations, translations, errors.ravel(), strict=True):
+        if found and rough > FAR[0] * found[0][0] + FAR[1]:
+            continue  # no refinement makes it a rival
         rotation, translation = cv2.solvePnPRefineLM(p, q, K, None, rotation, translation)
         X_CS = np.eye(4)
         X_CS[:3, :3], X_CS[:3, 3] = cv2.Rodrigues(rotation)[0], translation.ravel()
@@ -135,6 +138,6 @@ def _growth(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -
     by_S = by_C @ X_SC[:3, :3].T
     outward = (p_SQ - p_SQ.mean(axis=1, keepdims=True)).reshape(-1, 3)
     grow = np.einsum("nij,nj->ni", by_S, outward)[..., None]
-    J = np.concatenate([np.cross(by_S, q_S[:, None]), -by_S, grow], axis=2).reshape(-1, 7)
+    J = np.concatenate([cross(by_S, q_S[:, None]), -by_S, grow], axis=2).reshape(-1, 7)
     x = np.linalg.lstsq(J, (straight.reshape(-1, 2) - at).ravel(), rcond=None)[0]
     return 1.0 + float(x[6])

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from burg_drake.cameras.edge_views import EdgeViews
 from burg_drake.cameras.marker_edges import AROUND, REACH, MarkerEdges
@@ -51,7 +50,7 @@ class EdgeFits:
 
 
 def fit_edges(
-    grey: NDArray[np.uint8], edges: MarkerEdges, views: EdgeViews, blur: float
+    grey: NDArray[np.uint8], edges: MarkerEdges, views: EdgeViews, blur: float | Array
 ) -> EdgeFits:
     """Fits brightness, contrast and offset of each edge.
 
@@ -59,41 +58,43 @@ def fit_edges(
         grey: (H, W) image.
         edges: table.
         views: N of them.
-        blur: variance of lens and pixel together [pixels^2].
+        blur: variance of lens and pixel together [pixels^2], of all edges or (N,) of each.
     """
+    blur = np.reshape(blur, (-1, 1))
     in_row = (np.abs(views.across[:, 0]) >= np.abs(views.across[:, 1]))[:, None]
     nearest = np.rint(views.at).astype(np.intp)
-    window = WINDOW if blur < BLURRED else 2 * WINDOW
+    window = np.where(blur < BLURRED, WINDOW, 2 * WINDOW)
     columns = nearest[:, :1] + np.where(in_row, window, 0)
     rows = nearest[:, 1:] + np.where(in_row, 0, window)
     dx, dy = columns - views.at[:, :1], rows - views.at[:, 1:]
-    u = views.across[:, :1] * dx + views.across[:, 1:] * dy
-    v = views.along[:, :1] * dx + views.along[:, 1:] * dy
+    # Half the memory and time of doubles, and 1e-5 pixels at worst.
+    u = (views.across[:, :1] * dx + views.across[:, 1:] * dy).astype(np.float32)
+    v = (views.along[:, :1] * dx + views.along[:, 1:] * dy).astype(np.float32)
     sigma = np.sqrt(blur)
-    sigma_u = sigma * np.linalg.norm(views.across, axis=1, keepdims=True)
-    sigma_v = sigma * np.linalg.norm(views.along, axis=1, keepdims=True)
+    sigma_u = (sigma * np.sqrt((views.across**2).sum(axis=1, keepdims=True))).astype(np.float32)
+    sigma_v = (sigma * np.sqrt((views.along**2).sum(axis=1, keepdims=True))).astype(np.float32)
 
-    before, behind = ndtr((-0.5 - v) / sigma_v), ndtr((v - 0.5) / sigma_v)
+    before, behind = _gaussian((-0.5 - v) / sigma_v)[0], _gaussian((v - 0.5) / sigma_v)[0]
     share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of the rows of cells
-    wide = (sigma_u * WIDE_CELL).max() < sigma
-    reach = 1 if wide and blur < BLURRED else REACH
+    wide = bool((sigma_u * WIDE_CELL < sigma).all() and (blur < BLURRED).all())
+    reach = 1 if wide else REACH
     near = slice(REACH - reach, REACH + reach + 1)
     steps = share @ edges.steps[views.which][:, :, near]
-    z = (u[..., None] - AROUND[near]) / sigma_u[..., None]
-    bell = steps * np.exp(-0.5 * z * z) / np.sqrt(2.0 * np.pi)
-    shape = (steps * ndtr(z)).sum(axis=-1)
+    z = (u[..., None] - AROUND[near].astype(np.float32)) / sigma_u[..., None]
+    below, density = _gaussian(z)
+    bell = steps * density
+    shape = np.einsum("nwk,nwk->nw", steps, below)
     slope = bell.sum(axis=-1) / sigma  # derivatives by the distance in pixels
-    bend = -(bell * z).sum(axis=-1) / blur
+    bend = np.einsum("nwk,nwk->nw", bell, z) / -blur
     return _fit(grey[rows, columns].astype(float), shape, slope, bend)
 
 
 def _fit(values: Array, shape: Array, slope: Array, bend: Array) -> EdgeFits:
     """Least squares of `values = brightness + contrast (shape - offset slope)`, edge by edge."""
-    values, shape, slope, bend = (
-        part - part.mean(axis=1, keepdims=True) for part in (values, shape, slope, bend)
-    )
-    aa, ab, bb = (shape**2).sum(axis=1), (shape * slope).sum(axis=1), (slope**2).sum(axis=1)
-    va, vb = (values * shape).sum(axis=1), (values * slope).sum(axis=1)
+    parts = np.stack([values, shape, slope, bend])
+    values, shape, slope, bend = parts - parts.mean(axis=2, keepdims=True)
+    aa, ab, bb = _dot(shape, shape), _dot(shape, slope), _dot(slope, slope)
+    va, vb = _dot(values, shape), _dot(values, slope)
     det = np.maximum(aa * bb - ab**2, 1e-12)
     contrast = (va * bb - vb * ab) / det
     tilt = (vb * aa - va * ab) / det
@@ -103,6 +104,24 @@ def _fit(values: Array, shape: Array, slope: Array, bend: Array) -> EdgeFits:
         offset=-tilt / np.where(np.abs(contrast) < LEAST_CONTRAST, LEAST_CONTRAST, contrast),
         contrast=contrast,
         information=det / np.maximum(aa, 1e-12),
-        noise=np.sqrt((rest**2).sum(axis=1) / (len(WINDOW) - 3)),
-        widening=np.stack([(rest * half_bend).sum(axis=1), (half_bend**2).sum(axis=1)], axis=1),
+        noise=np.sqrt(_dot(rest, rest) / (len(WINDOW) - 3)),
+        widening=np.stack([_dot(rest, half_bend), _dot(half_bend, half_bend)], axis=1),
     )
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """Scalar products (N,) of rows."""
+    return np.asarray(np.einsum("nw,nw->n", one, other))
+
+
+def _gaussian(z: Array) -> tuple[Array, Array]:
+    """The normal distribution and its density, the former within 1e-7 (Abramowitz and Stegun,
+    Handbook of Mathematical Functions, 1964, 26.2.17): a third of the time of the exact one."""
+    density = np.exp(-0.5 * z * z) * (1.0 / np.sqrt(2.0 * np.pi))
+    t = 1.0 / (1.0 + 0.2316419 * np.abs(z))
+    tail = 1.330274429 * t
+    for coefficient in (-1.821255978, 1.781477937, -0.356563782, 0.319381530):
+        tail += coefficient
+        tail *= t
+    tail *= density
+    return np.where(z > 0.0, 1.0 - tail, tail), density

@@ -59,10 +59,10 @@ def view_edges(
         which, q_S, at, by_C = which[keep], q_S[keep], at[keep], by_C[keep]
     by_S = by_C @ R_SC.T  # pixels per metre
     across, along = _cell_gradients(edges, which, by_S)
-    normal = across / np.linalg.norm(across, axis=1, keepdims=True)
+    normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
     g = np.einsum("ni,nij->nj", normal, by_S)
     # p_CE = R_SC^T (p_SE - p_SC): a rotation w and translation d give R_SC^T (q x w - d).
-    motion = np.hstack([np.cross(g, q_S), -g])
+    motion = np.hstack([cross(g, q_S), -g])
     stretch = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
     growth = (g * edges.from_center[which]).sum(axis=1)
     return EdgeViews(which, at, across, along, motion, np.column_stack([stretch, growth]))
@@ -83,6 +83,12 @@ def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
     points[2, :, 1] += LENS_STEP
     at, right, down = intrinsics.project(points)
     return at, np.stack([right - at, down - at], axis=2) / LENS_STEP @ by_C
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Vector products (..., 3), as `numpy.cross` in a third of its time for few vectors."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def _cell_gradients(

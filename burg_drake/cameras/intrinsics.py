@@ -44,6 +44,15 @@ class Intrinsics:
     residual: float | None = None
 
     def __post_init__(self) -> None:
+        numbers = [self.width, self.height, *self.focal, *self.center, *self.distortion]
+        if not np.isfinite(numbers).all():
+            raise InvalidInputError(
+                "width, height, focal, center and distortion of a camera must be finite"
+            )
+        if not float(self.width).is_integer() or not float(self.height).is_integer():
+            raise InvalidInputError(
+                f"width {self.width} and height {self.height} of a camera must be whole pixels"
+            )
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("width, height and focal of a camera must be positive")
         if len(self.distortion) not in DISTORTION_SIZES:

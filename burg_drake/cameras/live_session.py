@@ -14,13 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
-
 from burg_drake.cameras.event_log import EventLog
 from burg_drake.cameras.frame_reader import FrameReader
 from burg_drake.cameras.frame_source import Frame, FrameSource
+from burg_drake.cameras.picture import Picture, encode_jpeg
 from burg_drake.cameras.placement_document import PlacementCheck
 from burg_drake.cameras.session import (
     Session,
@@ -33,33 +30,10 @@ from burg_drake.cameras.session import (
 )
 from burg_drake.core.errors import BurgError
 
-JPEG_QUALITY = 88
 RATE_OVER = 2.0
 """The rate of frames is counted over the last of these [s]."""
 LASTING = 1.0
 """A pose that comes or goes is an event when it lasts that long [s]."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Picture:
-    """What the view shows.
-
-    Attributes:
-        number: counts pictures; changed settings make a new one of the same frame.
-        sight: the frame and its estimate.
-        overlay: (H, W, 3) RGB.
-        jpeg: the overlay, encoded.
-        settings, placement: that it was drawn with.
-        milliseconds: what stages took, by name.
-    """
-
-    number: int
-    sight: Sight
-    overlay: NDArray[np.uint8]
-    jpeg: bytes
-    settings: ViewSettings
-    placement: PlacementCheck | None
-    milliseconds: dict[str, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -301,9 +275,3 @@ class LiveSession:
             self._told = state
             line = pose_line(sight.estimate, self.session.scene.board)
             self.events.tell(f"{sight.frame.name}: {line}", bad=not state[0])
-
-
-def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
-    """JPEG of an RGB image (H, W, 3)."""
-    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return data.tobytes()

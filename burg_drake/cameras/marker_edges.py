@@ -39,7 +39,7 @@ class MarkerEdges:
 
     p_SE: Array
     axis: NDArray[np.intp]
-    steps: Array
+    steps: NDArray[np.float32]
     marker: NDArray[np.intp]
     from_center: Array
     cell: Array
@@ -66,9 +66,8 @@ def marker_edges(layout: MarkerLayout, scale: tuple[float, float] = (1.0, 1.0)) 
     printed = [*scale, 1.0]
     from_center = (p_SE - layout.p_SQ.mean(axis=1)[marker]) * printed
     p_SE = p_SE * printed
-    return MarkerEdges(
-        p_SE[order], axis[order], steps[order], marker[order], from_center[order], cell
-    )
+    steps = steps[order].astype(np.float32)
+    return MarkerEdges(p_SE[order], axis[order], steps, marker[order], from_center[order], cell)
 
 
 def _edges(layout: MarkerLayout, axis: int) -> tuple[Array, Array, NDArray[np.intp]]:

@@ -6,6 +6,7 @@ them, and are displaced in the plane of the board and turned about the vertical.
 from __future__ import annotations
 
 from datetime import datetime
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.board_estimate import BoardEstimate
 from burg_drake.cameras.board_pose import estimate_board
 from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.placement_alignment import Aligner
 from burg_drake.cameras.placement_board import board_picture
 from burg_drake.cameras.placement_depth import DepthAligner, check_depth
 from burg_drake.cameras.placement_document import (
@@ -24,7 +26,7 @@ from burg_drake.cameras.placement_document import (
     PlacementCheck,
     software_versions,
 )
-from burg_drake.cameras.placement_locate import Aligner, locate
+from burg_drake.cameras.placement_locate import locate
 from burg_drake.cameras.placement_shape import scene_shapes
 from burg_drake.cameras.placement_silhouette import SilhouetteAligner
 from burg_drake.cameras.placement_verdict import placement_of, unseen
@@ -71,7 +73,9 @@ def check_placement(
         estimate = estimate_board(color, intrinsics, scene.board)
     instances, reason = _measured(scene, color, depth, intrinsics, estimate)
     return PlacementCheck(
-        scene=CheckedScene(name=scene.name, path=str(scene.path), content=scene.content),
+        scene=CheckedScene(
+            name=scene.name, path=str(Path(scene.path).absolute()), content=scene.content
+        ),
         taken=datetime.now().astimezone().isoformat(timespec="seconds"),
         method="silhouette" if depth is None else "depth",
         image=image_source or CheckedImage(content=content_hash(color)),
@@ -82,6 +86,11 @@ def check_placement(
         instances=instances,
         versions=software_versions(),
     )
+
+
+def _scene(scene: Scene) -> CheckedScene:
+    path = Path(scene.path).absolute()
+    return CheckedScene(name=scene.name, path=str(path), content=scene.content)
 
 
 def _measured(

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.placement_contour import Contour
+from burg_drake.cameras.placement_raster import Window
+from burg_drake.cameras.placement_shape import Shape
+from burg_drake.cameras.placement_view import View
 from burg_drake.core.frames import Array
 
 SECTORS = 36
@@ -30,6 +34,7 @@ class Alignment:
         residual: root mean square that is left of what agrees; pixels, or metres for depth.
         measurements: number of those that agree.
         ambiguous: another place fits almost as well.
+        turnable: turns from here that fit as well [rad]; see `placement_turns`.
     """
 
     q: Array
@@ -40,6 +45,7 @@ class Alignment:
     residual: float
     measurements: int
     ambiguous: bool = False
+    turnable: tuple[float, ...] = ()
 
     def spread(self, camera: Array) -> Array:
         """(3, 3) covariance of `q` with the camera's error.
@@ -49,6 +55,31 @@ class Alignment:
         """
         known = np.where(np.isfinite(camera), camera, 0.0)
         return self.covariance + self.camera @ known @ self.camera.T
+
+
+class Aligner(Protocol):
+    """Aligns an object with an image."""
+
+    view: View
+    evidence: Array
+    fine: float
+    """Residuals below this tell nothing about which of two alignments is better."""
+    convincing: float
+    """Rating of a place near the target's angle at which no other is tried; at most 3."""
+    better: float
+    """By how much a place far from the target's angle must be rated higher."""
+    clearly: float
+    """By how much a place must be rated higher than any other to be sure."""
+    strict: bool
+    """What stands beside the object speaks against a place."""
+
+    def align(
+        self, shape: Shape, q: Array, others: Array, *, far: bool = True, turn: bool = True
+    ) -> Alignment | None:
+        """Aligns an object; None if the image does not determine where it is."""
+
+    def misfit(self, shape: Shape, q: Array, others: Array, window: Window) -> tuple[float, float]:
+        """What disagrees with an object at a displacement, and its silhouette [raster pixels]."""
 
 
 def apart(a: Alignment, b: Alignment) -> bool:

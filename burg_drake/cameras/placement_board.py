@@ -223,7 +223,7 @@ def _evidence(
     window = (2 * round(cell) + 1,) * 2
     around = cv2.blur(((off <= EXPLAINED) | shadow).astype(float), window)
     pattern = np.clip(cv2.blur(span, window) / 0.2, 0.2, 1.0)
-    result = np.where(alike, -pattern * np.clip((around - 0.6) / 0.3, 0.0, 1.0), 1.0)
+    result = np.where(alike, -pattern * np.clip((around - 0.7) / 0.25, 0.0, 1.0), 1.0)
     result[~alike & shadow] = 0.0
     result[alike & (span > 0.3)] *= 0.3  # almost anything would fit
     return cv2.GaussianBlur(result, (0, 0), 0.7)

@@ -7,31 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.placement_raster import NEAR
 from burg_drake.cameras.placement_shape import Shape
-from burg_drake.cameras.placement_view import View, sampled
+from burg_drake.cameras.placement_view import NEAR, View, sampled
 from burg_drake.core.frames import Array, inverse, transform_points
 
 SPACING = 1.5
 """Between points along the outline [pixels]."""
-FINER = 3
-"""Raster pixels per pixel for what of the contour is outline."""
+BESIDE = np.array([0.6, 1.2, -0.6])
+"""Where, outwards from a point on the outline, all must be free, free and covered [pixels]."""
 EDGE_DEPTH = 2e-3
 """What is nearer by this much than a point on the outline hides it [m]."""
-
-
-class Cover:
-    """Which points of an image a displaced object covers, to a third of a pixel."""
-
-    def __init__(self, view: View, shape: Shape, q: Array) -> None:
-        self._window = view.window(shape, q, 2.0, FINER)
-        self._mask = np.isfinite(view.buffer(shape, q, self._window)).astype(np.float32)
-
-    def __call__(self, pixels: Array) -> NDArray[np.bool_]:
-        """Which (...,) of some image points (..., 2) it covers."""
-        if not self._mask.size:
-            return np.zeros(pixels.shape[:-1], dtype=bool)
-        return sampled(self._mask, self._window.raster(pixels), 0.0) > 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +30,7 @@ class Contour:
         along: (N, 3) pixels along the normal per x, y [m] and angle [rad] of the displacement.
         camera: (N, 6) pixels along the normal per error of the camera, as `BoardEstimate` has it:
             rotation [rad], then translation [m].
-        inside: what the object itself covers.
+        view, shape, q: whose outline.
     """
 
     pixels: Array
@@ -53,7 +38,9 @@ class Contour:
     p_SQ: Array
     along: Array
     camera: Array
-    inside: Cover
+    view: View
+    shape: Shape
+    q: Array
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -61,6 +48,10 @@ class Contour:
     def points(self, offsets: Array) -> Array:
         """(N, T, 2) points on the normals, at distances (T,) from the outline [pixels]."""
         return self.pixels[:, None] + offsets[:, None] * self.normals[:, None]
+
+    def inside(self, pixels: Array) -> NDArray[np.bool_]:
+        """Which (...,) of some image points (..., 2) the object itself covers."""
+        return np.isfinite(self.view.cast(self.shape, self.q, pixels))
 
 
 def outline(view: View, shape: Shape, q: Array, others: Array) -> Contour:
@@ -87,18 +78,18 @@ def outline(view: View, shape: Shape, q: Array, others: Array) -> Contour:
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
     inward = np.einsum("ni,ni->n", normal, m - e[:, 0])
     normal = (normal * np.where(inward > 0.0, -1.0, 1.0)[:, None])[edge]
-    cover = Cover(view, shape, q)
     kept = (p_CQ[:, 2] > NEAR) & ((pixels >= 0.0) & (pixels <= np.array(view.size) - 1.0)).all(1)
-    kept &= ~cover(pixels + 0.6 * normal) & ~cover(pixels + 1.2 * normal)
-    kept &= cover(pixels - 0.6 * normal)
     kept &= sampled(others, pixels, np.inf) > p_CQ[:, 2] - EDGE_DEPTH
+    beside = pixels[kept, None] + BESIDE[:, None] * normal[kept, None]
+    covered = np.isfinite(view.cast(shape, q, beside))
+    kept[kept] = ~covered[:, 0] & ~covered[:, 1] & covered[:, 2]
     p_SQ, pixels, normal = p_SQ[kept], pixels[kept], normal[kept]
     J = np.einsum("ni,nij->nj", normal, view.jacobian(p_SQ))
     arm = p_SQ - shape.p_SR - (q[0], q[1], 0.0)
     turn = arm[:, 0] * J[:, 1] - arm[:, 1] * J[:, 0]
     moved = np.concatenate([-np.cross(p_SQ - view.X_SC[:3, 3], J), -J], axis=1)
     along = np.column_stack([J[:, 0], J[:, 1], turn])
-    return Contour(pixels, normal, p_SQ, along, moved, cover)
+    return Contour(pixels, normal, p_SQ, along, moved, view, shape, q)
 
 
 def _along(view: View, ends: Array) -> tuple[Array, NDArray[np.int64]]:

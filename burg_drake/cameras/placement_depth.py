@@ -11,6 +11,7 @@ from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement_alignment import Alignment, sectors
 from burg_drake.cameras.placement_contour import Contour, outline
 from burg_drake.cameras.placement_fit import Fit, fit
+from burg_drake.cameras.placement_raster import Window
 from burg_drake.cameras.placement_shape import Shape
 from burg_drake.cameras.placement_view import View, part_of, sampled
 from burg_drake.core.errors import InvalidInputError
@@ -35,6 +36,8 @@ ROUNDS = 14
 SURFACE = 5e-4
 """Error of a surface point that noise does not explain [m]."""
 MAX_POINTS = 4000
+UNEVEN = 4e-3
+"""Distance from its surface at which a pixel of the object is not its own, beyond noise [m]."""
 SETTLED = 2e-5
 """Steps below this end the rounds [m]."""
 
@@ -72,6 +75,7 @@ class DepthAligner:
 
     def __init__(self, view: View, depth: NDArray[np.float32]) -> None:
         self.view = view
+        self.convincing, self.better, self.clearly, self.strict = 2.94, 0.02, 0.03, True
         self._depth = depth.astype(float)
         u, v = np.meshgrid(np.arange(view.size[0]), np.arange(view.size[1]))
         fx, fy, cx, cy = view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]
@@ -83,17 +87,20 @@ class DepthAligner:
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
         spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * LEAST_NOISE
         self._noise = max(spread, LEAST_NOISE)
+        self.fine = self._noise
         self._stands = self._valid & (height > HEIGHT * self._noise)
         evidence = np.clip(height / (HEIGHT * self._noise), 0.0, 1.0) * 2.0 - 1.0
         self.evidence = np.where(self._valid, evidence, 0.0)
 
-    def align(self, shape: Shape, q: Array, others: Array, *, far: bool = True) -> Alignment | None:
+    def align(
+        self, shape: Shape, q: Array, others: Array, *, far: bool = True, turn: bool = True
+    ) -> Alignment | None:
         """Aligns an object; see `SilhouetteAligner.align`."""
         start, best = q, None
         for number in range(ROUNDS):
             limit = NEAR[min(number, len(NEAR) - 1)] if far else NEAR[-1]
             found = _Measurements(self, shape, q, others, limit)
-            solved = found.solve()
+            solved = found.solve(turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > 0.05:
                 return None
             q = q + np.clip(solved.step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
@@ -102,6 +109,19 @@ class DepthAligner:
                 break
         assert best is not None
         return best[0].result(q, best[1])
+
+    def misfit(self, shape: Shape, q: Array, others: Array, window: Window) -> tuple[float, float]:
+        """See `SilhouetteAligner.misfit`: distances that the object or the empty board has not."""
+        at = window.pixels()
+        own = self.view.cast(shape, q, at)
+        seen, hides = sampled(self._depth, at, 0.0), sampled(others, at, 0.0)
+        covered = np.isfinite(own)
+        off = np.abs(seen - np.where(covered, own, 0.0)) > HEIGHT * self._noise + UNEVEN
+        wrong = np.where(covered, off, sampled(self._stands, at, 0.0) > 0.0)
+        # nothing can be said where another object is, unless this one stands clearly before it
+        free = np.isinf(hides) | (covered & (hides > own + UNEVEN))
+        wrong &= (seen > 0.0) & free
+        return float(wrong.sum()), float(covered.sum())
 
     def points(self, shape: Shape, q: Array, others: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Points (N, 3) in S that stand near to a displaced object and belong to no other, and
@@ -199,7 +219,7 @@ class _Measurements:
         self._deviation = np.concatenate([self._deviation, EDGE * pixel])
         self._groups = np.concatenate([self._groups, 100_000 + sectors(contour)[falls]])
 
-    def solve(self) -> Fit | None:
+    def solve(self, turn: bool) -> Fit | None:
         """The step that the measurements ask for."""
         if len(self._offset) < 30:
             return None
@@ -210,7 +230,7 @@ class _Measurements:
             self._offset,
             self._deviation,
             self._groups,
-            self._shape.symmetric,
+            self._shape.symmetric or not turn,
             unit,
         )
 

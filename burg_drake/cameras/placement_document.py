@@ -7,15 +7,17 @@ that are not known are None, and left out of the file.
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
 from burg_drake import __version__
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document, save_document
 
 Status = Literal["measured", "uncertain", "not_seen"]
@@ -28,7 +30,8 @@ class CheckedScene:
 
     Attributes:
         name: its name.
-        path: where its document was.
+        path: where its document was; in a file, from the file's folder, or the bare name of a scene
+            that comes with the package.
         content: hash of placement and objects, `Scene.content`.
     """
 
@@ -145,8 +148,28 @@ def load_placement(path: str | Path) -> PlacementCheck:
 
 
 def save_placement(check: PlacementCheck, path: str | Path) -> None:
-    """Writes a placement file; see `core.schema.save_document`."""
+    """Writes a placement file; see `core.schema.save_document`.
+
+    The scene's path in it starts at the file's folder, so that both can move together.
+    """
+    scene = check.scene
+    if scene.path and Path(scene.path).is_absolute():
+        scene = replace(scene, path=_reference(Path(scene.path), Path(path).absolute().parent))
+    check = replace(check, scene=scene)
     save_document(check, path, "Placement check: lengths in m, angles in rad, frame S of the board")
+
+
+def _reference(path: Path, folder: Path) -> str:
+    """What a file in a folder calls a scene: a bare name for those that come along, else a path."""
+    try:
+        if resolve(path.stem, "scenes").samefile(path):
+            return path.stem
+    except (BurgError, OSError):
+        pass
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive
+        return path.as_posix()
 
 
 def image_of_file(path: str | Path) -> CheckedImage:

@@ -8,41 +8,33 @@ a better outline.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement_alignment import Alignment, apart
+from burg_drake.cameras.placement_alignment import Aligner, Alignment, apart
 from burg_drake.cameras.placement_raster import Window
 from burg_drake.cameras.placement_search import Found, find
 from burg_drake.cameras.placement_shape import Shape
+from burg_drake.cameras.placement_turns import with_turns
 from burg_drake.cameras.placement_view import View, part_of
 from burg_drake.core.frames import Array
 
-CONVINCING = 2.8
-"""Sum of agreement, coverage and support of a place near the target's angle at which no other is
-tried."""
 TURNED = np.deg2rad(40.0)
-"""Farther from the target's angle an object must not only look as good, but better [rad]:"""
-BETTER = 0.15
-"""by this in that sum."""
-CLEARLY = 0.08
-"""By how much that sum must be larger than at any other place to be sure."""
+"""Farther from the target's angle an object must not only look as good, but better [rad]."""
+RIM = 0.04
+"""How far beside the silhouette it is looked at for that, as a share of the image's width."""
+WEAK = 0.7
+"""Agreement below which an object is looked for once more, when the others have their places."""
+WORTH_A_TRY = 0.2
+"""The same as `SUPPORTED` of a place that is only roughly known."""
 SUPPORTED = 0.35
 """Mean evidence in the silhouette below which an object is not there."""
 RING = (2.0, 7.0)
 """Where, beside the silhouette, nothing should stand [pixels]."""
 
-
-class Aligner(Protocol):
-    """Aligns an object with an image."""
-
-    view: View
-    evidence: Array
-
-    def align(self, shape: Shape, q: Array, others: Array, *, far: bool = True) -> Alignment | None:
-        """Aligns an object; None if the image does not determine where it is."""
+Placed = tuple[Shape, Array]
+"""An object and its displacement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,32 +65,64 @@ def locate(aligner: Aligner, shapes: dict[str, Shape]) -> dict[str, Located]:
         aligner: of the image.
         shapes: the objects by name.
     """
-    q = _assigned(aligner, shapes)
+    q = _assigned(aligner, shapes, {})
     aligned: dict[str, Alignment] = {}
-    for far in (True, False):
-        for name in list(q):
-            others = _others(aligner.view, shapes, q, name)
-            starts = q[name] if far else [aligned[name].q]
-            best = _best(aligner, shapes[name], starts, others, far)
-            if best is not None and not far:
-                best = replace(best, ambiguous=aligned[name].ambiguous)
-            if best is None:
-                del q[name]
-                aligned.pop(name, None)
-            else:
-                aligned[name], q[name] = best, [best.q]
+    _align(aligner, shapes, q, aligned, list(q), far=True)
+    # one that took another's place left that one without, and itself fits badly
+    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < WEAK]
+    if weak:
+        before = {name: (aligned.pop(name), q.pop(name)) for name in weak if name in aligned}
+        found = _assigned(aligner, {name: shapes[name] for name in weak}, _placed(shapes, aligned))
+        q |= found
+        _align(aligner, shapes, q, aligned, list(found), far=True)
+        for name, (alignment, start) in before.items():
+            if name not in aligned:
+                aligned[name], q[name] = alignment, start
+    _align(aligner, shapes, q, aligned, list(q), far=False)
     return {name: _summed_up(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
 
 
-def _assigned(aligner: Aligner, shapes: dict[str, Shape]) -> dict[str, list[Array]]:
-    """Candidate displacements of the objects that seem to be there, best first."""
+def _placed(shapes: dict[str, Shape], aligned: dict[str, Alignment]) -> dict[str, Placed]:
+    return {name: (shapes[name], alignment.q) for name, alignment in aligned.items()}
+
+
+def _align(
+    aligner: Aligner,
+    shapes: dict[str, Shape],
+    q: dict[str, list[Array]],
+    aligned: dict[str, Alignment],
+    names: list[str],
+    *,
+    far: bool,
+) -> None:
+    """Aligns objects, from their candidates or where they are; leaves out what fails."""
+    for name in names:
+        others = _others(aligner.view, shapes, q, name)
+        starts = q[name] if far else [aligned[name].q]
+        best = _best(aligner, shapes[name], starts, others, far)
+        if best is not None and not far:
+            best = replace(best, ambiguous=aligned[name].ambiguous)
+        if best is None:
+            del q[name]
+            aligned.pop(name, None)
+        else:
+            aligned[name], q[name] = best, [best.q]
+
+
+def _assigned(
+    aligner: Aligner, shapes: dict[str, Shape], placed: dict[str, Placed]
+) -> dict[str, list[Array]]:
+    """Candidate displacements of the objects that seem to be there, best first; not where others
+    are already."""
     view, evidence = aligner.view, aligner.evidence.copy()
+    for shape, q in placed.values():
+        _cover(view, shape, q, evidence)
     waiting = {name: find(view, shape, evidence) for name, shape in shapes.items()}
     assigned: dict[str, list[Array]] = {}
     while waiting:
         rated = {n: _rating(view, shapes[n], found, evidence) for n, found in waiting.items()}
         name = max(rated, key=lambda n: rated[n])
-        if rated[name] < SUPPORTED:
+        if rated[name] < WORTH_A_TRY:
             break
         assigned[name] = [found.q for found in waiting.pop(name)]
         window = _cover(view, shapes[name], assigned[name][0], evidence)
@@ -157,16 +181,27 @@ def _best(
             continue
         support, _ = _support(aligner.view, shape, found.q, aligner.evidence, others)
         rating = found.agreement + found.coverage + support
+        rating -= _against(aligner, shape, found.q, others)
         if abs((found.q[2] + np.pi) % (2.0 * np.pi) - np.pi) > TURNED:
-            rating -= BETTER
+            rating -= aligner.better
         rated.append((rating, found))
-        if rating > CONVINCING:
+        if rating > aligner.convincing:
             break
     if not rated:
         return None
     score, best = max(rated, key=lambda r: r[0])
     rivals = (rating for rating, found in rated if apart(found, best))
-    return replace(best, ambiguous=max(rivals, default=-np.inf) > score - CLEARLY)
+    return replace(best, ambiguous=max(rivals, default=-np.inf) > score - aligner.clearly)
+
+
+def _against(aligner: Aligner, shape: Shape, q: Array, others: Array) -> float:
+    """How much of an image of distances disagrees, as a share of the silhouette; 0 for a photo,
+    where shadows and other things stand out as well."""
+    if not aligner.strict:
+        return 0.0
+    window = aligner.view.window(shape, q, RIM * aligner.view.size[0])
+    wrong, area = aligner.misfit(shape, q, others, window)
+    return min(wrong / max(area, 1.0), 1.0)
 
 
 def _summed_up(
@@ -179,6 +214,8 @@ def _summed_up(
     view, shape = aligner.view, shapes[name]
     at = np.zeros(3) if alignment is None else alignment.q
     others = _others(view, shapes, q, name)
+    if alignment is not None:
+        alignment = with_turns(aligner, shape, alignment, others)
     in_image, seen = view.seen(shape, at, others)
     support, _ = _support(view, shape, at, aligner.evidence, others)
     window = view.window(shape, at, RING[1] + 1.0)

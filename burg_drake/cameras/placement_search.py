@@ -52,13 +52,13 @@ def find(view: View, shape: Shape, evidence: Array) -> list[Found]:
         shape: the object.
         evidence: (H, W) in [-1, 1].
     """
-    search = _Search(view, shape, evidence)
+    search = Search(view, shape, evidence)
     if shape.symmetric:
         return [search.slide(0.0)]
     return search.best(NEAR_TURNS) + search.best(FAR_TURNS)
 
 
-class _Search:
+class Search:
     """Slides one shape over the evidence, at a coarse scale."""
 
     def __init__(self, view: View, shape: Shape, evidence: Array) -> None:
@@ -84,10 +84,14 @@ class _Search:
         off = np.hypot(q[0], q[1]) / RANGE
         return Found(q, score - PRIOR * min(off, 2.0) ** 2)
 
+    def shifted(self, q: Array, reach: float) -> Array:
+        """The best displacement at the angle of another, up to `reach` [m] from it."""
+        return self._step(q, reach)[0]
+
     def _step(self, q: Array, reach: float) -> tuple[Array, float]:
         """One correlation; returns where its peak is, and the mean evidence there."""
         view, scale = self._view, self._scale
-        window = view.window(self._shape, q, 1.0, 1.0)
+        window = view.window(self._shape, q, 1.0)
         window = _aligned(window, scale)
         mask = np.isfinite(view.buffer(self._shape, q, window)).astype(np.float32)
         if mask.sum() < 4:
@@ -103,6 +107,7 @@ class _Search:
         v, u = np.mgrid[: score.shape[0], : score.shape[1]] - pad
         shift = np.stack([u, v], axis=-1) @ np.linalg.inv(J).T
         off = np.linalg.norm(shift, axis=-1)
+        # what is not within the range is not looked for; from outside, the way back is open
         far = np.hypot(q[0] + shift[..., 0], q[1] + shift[..., 1]) / RANGE
         rated = np.where(off <= reach * 1.01, score - PRIOR * far**2, -np.inf)
         best = np.unravel_index(int(rated.argmax()), rated.shape)

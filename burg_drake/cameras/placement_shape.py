@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from burg_drake.cameras.silhouette import MeshOutline
 from burg_drake.core.frames import Array, inverse, make_pose, rot_z, transform_points
+from burg_drake.objects.rays import RayCaster
 from burg_drake.objects.symmetry import sample_surface
 from burg_drake.scene.scene import Scene
 
@@ -63,10 +64,25 @@ class Shape:
         return MeshOutline(self.p_SV, self.faces)
 
     @cached_property
+    def rays(self) -> RayCaster:
+        """The mesh at the target, in S, prepared for rays."""
+        return RayCaster(self.p_SV, self.faces)
+
+    @cached_property
     def surface(self) -> tuple[Array, Array]:
         """Points (N, 3) spread over the surface at the target, and its normals there, in S."""
         mesh = trimesh.Trimesh(self.p_SV, self.faces, process=False)
         return sample_surface(mesh, SAMPLES)
+
+    def looks_alike(self, a: Array, b: Array) -> bool:
+        """Whether two displacements (3,) look the same: a box turned by half a turn."""
+        X_SS = inverse(self.displacement(a)) @ self.displacement(b)
+        points, _ = self.surface
+        return self._itself.holds(transform_points(X_SS, points[::12]))
+
+    @cached_property
+    def _itself(self) -> _Itself:
+        return _Itself(*self.surface)
 
     def displacement(self, q: Array) -> Array:
         """(4, 4) what `q` does to points in S: a turn about the vertical through the target's
@@ -125,15 +141,28 @@ def _middle(points: Array) -> Array:
 def _is_round(surface: trimesh.Trimesh) -> bool:
     """Whether a surface looks the same after any turn about the z axis of its frame."""
     points, normals = sample_surface(surface, SAMPLES)
-    tolerance = ROUND * float(np.linalg.norm(np.ptp(points, axis=0)))
-    beside = 3.0 * float(np.sqrt(surface.area / SAMPLES)) + tolerance
-    tree = cKDTree(points)
-    probe = points[::12]
-    for angle in TURNS:
-        turned = probe @ rot_z(float(angle)).T
-        distance, near = tree.query(turned, k=3)
-        off = np.abs(np.einsum("nki,nki->nk", normals[near], turned[:, None] - points[near]))
-        same = (off.min(axis=1) < tolerance) & (distance[:, 0] < beside)
-        if same.mean() < ROUND_SHARE:
-            return False
-    return True
+    itself = _Itself(points, normals)
+    return all(itself.holds(points[::12] @ rot_z(float(angle)).T) for angle in TURNS)
+
+
+class _Itself:
+    """Tells whether moved points of a surface are points of it.
+
+    Args:
+        points, normals: (N, 3) spread over the surface.
+    """
+
+    def __init__(self, points: Array, normals: Array) -> None:
+        self._points, self._normals = points, normals
+        self._tree = cKDTree(points)
+        self._tolerance = ROUND * float(np.linalg.norm(np.ptp(points, axis=0)))
+        apart = self._tree.query(points[::12], k=2)[0][:, 1]
+        self._beside = 6.0 * float(np.median(apart)) + self._tolerance
+
+    def holds(self, moved: Array) -> bool:
+        """Whether most of some moved points (M, 3) are on the surface."""
+        distance, near = self._tree.query(moved, k=3)
+        away = moved[:, None] - self._points[near]
+        off = np.abs(np.einsum("nki,nki->nk", self._normals[near], away)).min(axis=1)
+        same = (off < self._tolerance) & (distance[:, 0] < self._beside)
+        return bool(same.mean() >= ROUND_SHARE)

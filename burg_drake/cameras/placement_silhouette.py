@@ -16,8 +16,9 @@ from burg_drake.cameras.placement_edges import (
     near_edges,
 )
 from burg_drake.cameras.placement_fit import Fit, fit
+from burg_drake.cameras.placement_raster import Window
 from burg_drake.cameras.placement_shape import Shape
-from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.placement_view import View, sampled
 from burg_drake.core.frames import Array
 
 FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
@@ -29,14 +30,17 @@ AGREES = 1.5
 """An edge that is within this of the outline agrees with it [pixels]."""
 LOST = 0.03
 """Farther away than this from where it began an alignment has gone astray [m]."""
+FINE = 0.1
+"""Residuals below this are as good as none [pixels]."""
 MIN_EDGES = 12
 SHADED = 0.15
 """Standard deviation of the share by which an object is darker at its very edge than beside it."""
 GROWN = 0.1
 """Standard deviation of how much too large all of an outline may look: bright paper outshines dark
 edges, ink spreads, the mesh is coarse [pixels]."""
-SHIFTED = 0.06
-"""Standard deviation of a shift of the whole outline that nothing explains [pixels]."""
+SHIFTED, TWISTED = 0.4, 0.2
+"""Standard deviation of a shift of the whole outline that nothing explains, and of one of its two
+ends against each other, as shares of the residual, which is `FINE` at least."""
 
 
 class SilhouetteAligner:
@@ -50,11 +54,15 @@ class SilhouetteAligner:
 
     def __init__(self, view: View, image: Array, picture: BoardPicture) -> None:
         self.view = view
+        self.convincing, self.better, self.clearly, self.strict = 2.8, 0.15, 0.08, False
         self.evidence = picture.evidence
+        self.fine = FINE
         self._image: NDArray[np.float32] = np.ascontiguousarray(image, dtype=np.float32)
         self._picture = picture
 
-    def align(self, shape: Shape, q: Array, others: Array, *, far: bool = True) -> Alignment | None:
+    def align(
+        self, shape: Shape, q: Array, others: Array, *, far: bool = True, turn: bool = True
+    ) -> Alignment | None:
         """Aligns an object.
 
         Args:
@@ -62,12 +70,25 @@ class SilhouetteAligner:
             q: (3,) displacement to start from.
             others: (H, W) depth of other objects, infinity where there is none.
             far: it may be many pixels off.
+            turn: its angle may change.
 
         Returns:
             None if the photo does not determine where it is.
         """
         near = self._roughly(shape, q, others) if far else q
-        return None if near is None else self._exactly(shape, near, others)
+        return None if near is None else self._exactly(shape, near, others, turn)
+
+    def misfit(self, shape: Shape, q: Array, others: Array, window: Window) -> tuple[float, float]:
+        """What of a raster disagrees with a displaced object, but for where others are.
+
+        Returns:
+            That, and the object's silhouette [raster pixels].
+        """
+        at = window.pixels()
+        own = np.isfinite(self.view.cast(shape, q, at))
+        free = np.isinf(sampled(others, at, 0.0))
+        evidence = np.where(free, sampled(self.evidence, at, 0.0), 0.0)
+        return float(np.maximum(np.where(own, -evidence, evidence), 0.0).sum()), float(own.sum())
 
     def _roughly(self, shape: Shape, q: Array, others: Array) -> Array | None:
         """The displacement to a pixel or so, from many away; None without an outline."""
@@ -82,7 +103,7 @@ class SilhouetteAligner:
             q = q + _limited(solved.step)
         return q
 
-    def _exactly(self, shape: Shape, q: Array, others: Array) -> Alignment | None:
+    def _exactly(self, shape: Shape, q: Array, others: Array, turn: bool) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
         start, result = q, None
         for _ in range(NEAR_ROUNDS):
@@ -92,7 +113,7 @@ class SilhouetteAligner:
             edges = near_edges(
                 lines(contour, self._image, self._picture, others, REACH), self._picture
             )
-            solved = _solve(shape, contour, edges)
+            solved = _solve(shape, contour, edges, turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > LOST:
                 return None
             q = q + _limited(solved.step)
@@ -102,7 +123,7 @@ class SilhouetteAligner:
         return result
 
 
-def _solve(shape: Shape, contour: Contour, edges: Edges) -> Fit | None:
+def _solve(shape: Shape, contour: Contour, edges: Edges, turn: bool = True) -> Fit | None:
     used = edges.found
     if used.sum() < MIN_EDGES:
         return None
@@ -113,7 +134,7 @@ def _solve(shape: Shape, contour: Contour, edges: Edges) -> Fit | None:
         edges.offset[used],
         edges.deviation[used],
         sectors(contour)[used],
-        shape.symmetric,
+        shape.symmetric or not turn,
         unit,
         np.column_stack([-SHADED * edges.shading[used], np.full(used.sum(), GROWN)]),
     )
@@ -128,16 +149,27 @@ def _result(q: Array, contour: Contour, edges: Edges, solved: Fit) -> Alignment:
     used: NDArray[np.bool_] = edges.found
     left = edges.offset[used] - contour.along[used] @ solved.step
     agrees = (np.abs(left) < AGREES) & (solved.weights > 0.0)
-    shifted = SHIFTED * solved.gain @ contour.normals[used]
+    residual = _rms(left[agrees], edges.deviation[used][agrees])
+    normals = contour.normals[used]
+    rough = max(residual, FINE) if np.isfinite(residual) else AGREES
+    shifted = SHIFTED * rough * solved.gain @ normals
+    twisted = TWISTED * rough * solved.gain @ (normals * _ends(contour.pixels[used])[:, None])
     return Alignment(
         q,
-        solved.covariance + shifted @ shifted.T,
+        solved.covariance + shifted @ shifted.T + twisted @ twisted.T,
         -solved.gain @ contour.camera[used],
         float(agrees.sum() / max(edges.looked.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
-        _rms(left[agrees], edges.deviation[used][agrees]),
+        residual,
         int(agrees.sum()),
     )
+
+
+def _ends(pixels: Array) -> Array:
+    """(N,) 1 or -1, to which end of its longest extent each point of an outline belongs."""
+    away = pixels - pixels.mean(axis=0)
+    _, axes = np.linalg.eigh(away.T @ away)
+    return np.where(away @ axes[:, 1] > 0.0, 1.0, -1.0)
 
 
 def _rms(left: Array, deviation: Array) -> float:

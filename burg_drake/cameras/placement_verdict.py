@@ -20,6 +20,8 @@ WELL = 0.4
 """Share that must be seen to be sure of a measurement."""
 AGREEMENT = 0.6
 """Share of the outline, or of the points before the board, that must fit."""
+CLEAR = 0.85
+"""Agreement at which an object as dark as ink, or as bright as paper, may stand on it."""
 SUPPORT = 0.45
 """Mean evidence in the silhouette from which on it is filled."""
 SPILL = 0.35
@@ -108,7 +110,7 @@ def _doubt(shape: Shape, found: Located, deviation: Array, unit: str) -> str:
             f"only {100 * alignment.agreement:.0f} % of its outline fit what is seen:"
             " is it another object, or in another pose?"
         )
-    if found.support < SUPPORT:
+    if found.support < SUPPORT and alignment.agreement < CLEAR:
         return (
             "the board is seen where it should hide it: is it another object, or in another pose?"
         )
@@ -118,6 +120,9 @@ def _doubt(shape: Shape, found: Located, deviation: Array, unit: str) -> str:
         return "something stands out beside it: is it another object, or in another pose?"
     if alignment.ambiguous:
         return "another place fits almost as well"
+    if alignment.turnable:
+        turn = np.rad2deg(max(alignment.turnable, key=abs))
+        return f"turned by another {turn:+.0f} deg it fits as well"
     if found.seen < WELL:
         return f"only {100 * found.seen:.0f} % of it can be seen"
     if deviation[:2].max() > LOOSE:

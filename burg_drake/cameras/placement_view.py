@@ -9,9 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.placement_raster import NEAR, Window, depth_buffer, window_around
+from burg_drake.cameras.placement_raster import Window, window_around
 from burg_drake.cameras.placement_shape import Shape
 from burg_drake.core.frames import Array, inverse, transform_points
+
+NEAR = 1e-3
+"""Depth of what is nearer to the camera's plane, or behind it [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,15 +52,39 @@ class View:
         y = np.stack([zero, fy / z, -fy * p_CQ[:, 1] / z**2], axis=-1)
         return np.stack([x, y], axis=1) @ self.X_CS[:3, :3]
 
-    def buffer(self, shape: Shape, q: Array, window: Window) -> Array:
-        """Depth of a displaced shape in a window; see `depth_buffer`."""
-        p_CV, pixels = self.project(transform_points(shape.displacement(q), shape.p_SV))
-        return depth_buffer(p_CV, pixels, shape.faces, window)
+    def cast(self, shape: Shape, q: Array, pixels: Array) -> Array:
+        """Depth of a displaced shape at image points.
 
-    def window(self, shape: Shape, q: Array, margin: float, scale: float = 1.0) -> Window:
+        Args:
+            shape: the object.
+            q: (3,) its displacement.
+            pixels: (..., 2).
+
+        Returns:
+            (...,) distance along the optical axis [m]; infinity where the shape is not.
+        """
+        at = pixels.reshape(-1, 2)
+        rays = np.ones((len(at), 3))
+        rays[:, :2] = (at - self.K[:2, 2]) / self.K[[0, 1], [0, 1]]
+        length = np.linalg.norm(rays, axis=1)
+        X_OC = inverse(shape.displacement(q)) @ self.X_SC
+        way = (rays / length[:, None]) @ X_OC[:3, :3].T
+        origins = np.broadcast_to(X_OC[:3, 3], way.shape)
+        _, distance = shape.rays.first_hits(origins, way)
+        return (distance / length).reshape(pixels.shape[:-1])
+
+    def buffer(self, shape: Shape, q: Array, window: Window) -> Array:
+        """Depth of a displaced shape at the pixels of a window's raster; see `cast`."""
+        return self.cast(shape, q, window.pixels())
+
+    def window(self, shape: Shape, q: Array, margin: float) -> Window:
         """The part of the image around a displaced shape."""
         _, pixels = self.project(transform_points(shape.displacement(q), shape.p_SV))
-        return window_around(pixels, margin, self.size, scale)
+        return self.window_of(pixels, margin)
+
+    def window_of(self, pixels: Array, margin: float) -> Window:
+        """The part of the image around some of its points (N, 2)."""
+        return window_around(pixels, margin, self.size, 1.0)
 
     def depth(self, placed: Iterable[tuple[Shape, Array]]) -> Array:
         """(H, W) depth of the nearest of several displaced shapes; infinity where there is none."""
@@ -86,7 +113,7 @@ class View:
         extent = np.ceil(pixels.max(axis=0)).astype(int) + 2 - low
         scale = min(1.0, 200.0 / extent.max())
         whole = Window(int(low[0]), int(low[1]), int(extent[0]), int(extent[1]), scale)
-        depth = depth_buffer(p_CV, pixels, shape.faces, whole)
+        depth = self.buffer(shape, q, whole)
         rows, columns = np.nonzero(np.isfinite(depth))
         at = np.round(whole.image(np.stack([columns, rows], axis=-1))).astype(int)
         inside = ((at >= 0) & (at < self.size)).all(axis=1)

@@ -19,6 +19,8 @@ from burg_drake.core.frames import Array
 GATE = 33.1
 """Squared Mahalanobis distance from which on a pose is another than before: a chi-square of 6
 degrees of freedom exceeds it once in 100,000 times."""
+LATER = 1e-3
+"""Share of the period by which updates are later than those of what holds the image."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +64,21 @@ class PoseFilter(LeafSystem):
 
     Args:
         period: time between updates [s].
+        offset: of the updates from whole periods [s], below `period`; a thousandth of it if not
+            given. Systems that are updated at the same moment see each other as they were before
+            it, so that without an offset a filter behind a held image is one image late.
         window: number of estimates that the mean is as good as.
         patience: estimates in a row that make a new pose.
         hold: updates without a fitting estimate for which the last pose stays valid.
     """
 
     def __init__(
-        self, period: float, window: float = 8.0, patience: int = 2, hold: int = 5
+        self,
+        period: float,
+        window: float = 8.0,
+        patience: int = 2,
+        hold: int = 5,
+        offset: float | None = None,
     ) -> None:
         super().__init__()
         if period <= 0.0 or window < 1.0 or patience < 1 or hold < 0:
@@ -76,12 +86,18 @@ class PoseFilter(LeafSystem):
                 "a pose filter takes a period above 0 [s], a window and patience of at least 1, and"
                 " hold of at least 0"
             )
+        offset = LATER * period if offset is None else offset
+        if not 0.0 <= offset < period:
+            raise InvalidInputError(
+                f"offset {offset:g} of a pose filter must be from 0 to below its period"
+                f" {period:g} [s]"
+            )
         # The variance of an exponential mean with this factor is 1 / window of one estimate's.
         self._keep = (window - 1.0) / (window + 1.0)
         self._patience, self._hold = patience, hold
         self._input = self.DeclareAbstractInputPort("estimate", AbstractValue.Make(BoardEstimate()))
         self._state = self.DeclareAbstractState(AbstractValue.Make(Track()))
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period, 0.0, self._update)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
         state = {self.abstract_state_ticket(self._state)}
         self.DeclareAbstractOutputPort(
             "X_SC", lambda: AbstractValue.Make(RigidTransform()), self._calc_X_SC, state

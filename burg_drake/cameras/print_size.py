@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.edge_refinement import Refined
+from burg_drake.cameras.edge_refinement import Refined, alike_by_blur
 from burg_drake.cameras.edge_views import NEAREST
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.core.frames import Array
@@ -22,7 +22,8 @@ SIGNIFICANT = 6.0
 LEAST_STRETCH = 0.003
 """Unequal scale that is not worth telling; printers feed paper within about that [-]."""
 LEAST_GROWTH = 0.01
-"""Size of markers against their distances that is not worth telling: ink spreads [-]."""
+"""Size of markers against their distances that is not worth telling: ink spreads, and in blurred
+images, for which it rises with the blur's width, light does [-]."""
 LEAST_DEVIATION = 0.01
 """Uniform scale that is not worth telling; depth cameras err by as much [-]."""
 FEWEST_DEPTHS = 12
@@ -55,9 +56,14 @@ def deformation(refined: Refined) -> Deformation:
         return Deformation()
     x = inverse @ (J.T @ e)
     variance = ((e - J @ x) ** 2).sum() / max(refined.weight.sum() - 8.0, 1.0)
+    variance *= alike_by_blur(refined.blur)
     value = x[6:] * [2.0, 1.0]  # a stretch makes y longer and x shorter by the same share
-    sd = np.sqrt(np.diag(inverse)[6:] * variance) * [2.0, 1.0]
-    told = np.abs(value) > np.maximum(SIGNIFICANT * sd, [LEAST_STRETCH, LEAST_GROWTH])
+    spread = np.diag(inverse)[6:] * variance
+    if not (spread > 0.0).all():  # singular but for rounding
+        return Deformation()
+    sd = np.sqrt(spread) * [2.0, 1.0]
+    least = [LEAST_STRETCH, LEAST_GROWTH * np.sqrt(alike_by_blur(refined.blur))]
+    told = np.abs(value) > np.maximum(SIGNIFICANT * sd, least)
     return Deformation(*(float(v) for v in np.where(told, value, 0.0)))
 
 

@@ -51,14 +51,14 @@ class SceneOverlay(LeafSystem):
         Args:
             scene: whose objects.
             intrinsics: of the camera.
-            style: the default one if None.
+            style: for good, as part of the system; the default one if None.
 
         Raises:
             UnknownNameError: a mesh file of the library is missing.
         """
         super().__init__()
         self.set_name("scene_overlay")
-        self.overlay = Overlay(scene, intrinsics, style)
+        self._overlay = Overlay(scene, intrinsics, style)
         blank = ImageRgba8U(intrinsics.width, intrinsics.height)
         self._color_image = self.DeclareAbstractInputPort("color_image", Value(blank))
         self._X_SC = self.DeclareAbstractInputPort("X_SC", Value(RigidTransform()))
@@ -76,7 +76,7 @@ class SceneOverlay(LeafSystem):
 
     def _draw(self, context: Context, output: AbstractValue) -> None:
         image = self._required(context, self._color_image).data
-        size = self.overlay.intrinsics
+        size = self._overlay.intrinsics
         size.require_size(image.shape[1], image.shape[0], "the image at port color_image")
         colors = np.ascontiguousarray(image[..., :3])
         estimate = self._optional(context, self._estimate)
@@ -85,9 +85,9 @@ class SceneOverlay(LeafSystem):
             valid = self._valid.Eval(context)[0] > 0.5
         if valid:
             X_SC = self._required(context, self._X_SC).GetAsMatrix4()
-            drawn = self.overlay.draw(colors, X_SC, placement=self._checked(context))
+            drawn = self._overlay.draw(colors, X_SC, placement=self._checked(context))
         else:
-            drawn = self.overlay.notice(colors, (estimate and estimate.reason) or NO_POSE)
+            drawn = self._overlay.notice(colors, (estimate and estimate.reason) or NO_POSE)
         result = ImageRgba8U(size.width, size.height)
         result.mutable_data[:] = _opaque(drawn)
         output.set_value(result)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from burg_drake.cameras.pose_filter import PoseFilter, Track
 
 T = TypeVar("T")
+LARGEST = 1e6
+"""No setting is a larger number."""
 LEVEL = 0.01
 """Objects whose undersides differ by less stand on the same level [m]."""
 
@@ -199,15 +201,16 @@ def changed_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any]
         InvalidInputError: no such setting, or a value of another type or out of bounds.
         UnknownNameError: see `checked_settings`.
     """
+    known = asdict(ViewSettings())
     for name, value in changes.items():
-        if name not in ViewSettings.__dataclass_fields__:
-            raise InvalidInputError(
-                f"no setting {name!r}; {nearest(name, ViewSettings.__dataclass_fields__)}"
-            )
-        old = getattr(before, name)
+        if name not in known:
+            raise InvalidInputError(f"no setting {name!r}; {nearest(name, known)}")
+        wanted = type(known[name])
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not (is_number if isinstance(old, float) else isinstance(value, type(old))):
-            raise InvalidInputError(f"{name} must be a {type(old).__name__}, not {value!r}")
+        if not (is_number if wanted is float else isinstance(value, wanted)):
+            raise InvalidInputError(f"{name} must be a {wanted.__name__}, not {value!r}")
+        if wanted is float and not abs(value) < LARGEST:  # integers may be too large for a float
+            raise InvalidInputError(f"{name} is out of bounds")
     return checked_settings(scene, replace(before, **changes))
 
 

@@ -3,9 +3,9 @@ known about both. The picture is stored without loss, so that it can be looked a
 
 from __future__ import annotations
 
-import os
+import secrets
 import shutil
-import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,7 +61,9 @@ class SnapshotDocument:
         taken: when the snapshot was made, ISO 8601 with time zone.
         time: of the picture since the source was opened [s].
         intrinsics: of the camera.
-        board: where the board was seen.
+        board: where the board was seen, by this picture alone.
+        X_SC_drawn: pose that the overlay was drawn at, where it is not that of `board` but the mean
+            of several pictures (`ViewSettings.steady`).
         placement: how far the objects stand from their places, if that was measured.
         versions: of the software.
     """
@@ -74,6 +76,7 @@ class SnapshotDocument:
     time: float = 0.0
     intrinsics: Intrinsics
     board: SeenBoard = SeenBoard()
+    X_SC_drawn: Pose | None = None
     placement: PlacementCheck | None = None
     versions: dict[str, str] = field(default_factory=dict)
 
@@ -123,16 +126,14 @@ def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
     beside = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+        beside = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
+        beside.mkdir()
         _write_image(beside / IMAGE, snapshot.image)
         _write_image(beside / OVERLAY, snapshot.overlay)
         if snapshot.depth is not None:
             np.save(beside / DEPTH, snapshot.depth.astype(np.float32))
         save_document(snapshot.document, beside / DOCUMENT)
         save_document(snapshot.document.intrinsics, beside / INTRINSICS)
-        umask = os.umask(0)
-        os.umask(umask)
-        beside.chmod(0o777 & ~umask)
         beside.rename(folder)
     except OSError as error:
         raise InvalidInputError(
@@ -161,7 +162,8 @@ def load_snapshot(folder: str | Path) -> Snapshot:
 
     Raises:
         DocumentError: no snapshot there, or one that does not fit the schema.
-        InvalidInputError: a picture is missing, damaged, or of another size than the intrinsics.
+        InvalidInputError: a picture or the depth is missing, damaged, or of another size than the
+            intrinsics.
     """
     folder = Path(folder)
     if not (folder / DOCUMENT).is_file():
@@ -170,14 +172,20 @@ def load_snapshot(folder: str | Path) -> Snapshot:
     image, overlay = (_read_image(folder / name) for name in (IMAGE, OVERLAY))
     height, width = image.shape[:2]
     document.intrinsics.require_size(width, height, str(folder / IMAGE))
-    depth = np.load(folder / DEPTH) if (folder / DEPTH).is_file() else None
+    depth = _read_depth(folder / DEPTH, (height, width)) if (folder / DEPTH).exists() else None
     return Snapshot(document=document, image=image, overlay=overlay, depth=depth)
 
 
-def numbered(folder: str | Path, prefix: str, suffix: str = "") -> Path:
-    """The first of `prefix_001`, `prefix_002`, ... in a folder that does not exist."""
+def numbered(
+    folder: str | Path,
+    prefix: str,
+    suffix: str = "",
+    *,
+    taken: Callable[[Path], bool] = Path.exists,
+) -> Path:
+    """The first of `prefix_001`, `prefix_002`, ... in a folder that is not taken."""
     number = 1
-    while (path := Path(folder) / f"{prefix}_{number:03d}{suffix}").exists():
+    while taken(path := Path(folder) / f"{prefix}_{number:03d}{suffix}"):
         number += 1
     return path
 
@@ -190,9 +198,14 @@ def describe_snapshot(
     source: str,
     taken: str,
     time: float,
+    X_SC_drawn: Array | None = None,
     placement: PlacementCheck | None = None,
 ) -> SnapshotDocument:
     """The document of a snapshot."""
+    if X_SC_drawn is None or not estimate.valid or np.array_equal(X_SC_drawn, estimate.X_SC):
+        drawn = None
+    else:
+        drawn = Pose.from_matrix(X_SC_drawn, quaternion=True)
     return SnapshotDocument(
         scene=scene_document(scene),
         library=scene.library.name,
@@ -201,6 +214,7 @@ def describe_snapshot(
         time=time,
         intrinsics=intrinsics,
         board=seen_board(estimate),
+        X_SC_drawn=drawn,
         placement=placement,
         versions=software_versions(),
     )
@@ -223,3 +237,15 @@ def _read_image(path: Path) -> NDArray[np.uint8]:
     if image is None:
         raise InvalidInputError(f"{path} is missing or no image; take the snapshot again")
     return np.ascontiguousarray(image[..., ::-1])
+
+
+def _read_depth(path: Path, shape: tuple[int, int]) -> Array:
+    try:
+        depth = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InvalidInputError(f"{path} is damaged; take the snapshot again") from error
+    if depth.shape != shape:
+        raise InvalidInputError(
+            f"{path} is of shape {depth.shape}, its picture of {shape}; take the snapshot again"
+        )
+    return np.asarray(depth)

@@ -8,6 +8,7 @@ a table; covers may lie on it, and blur, noise, uneven light and lens distortion
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,15 +77,34 @@ def board_image(
     Raises:
         InvalidInputError: the camera looks past the table; noise without `rng`.
     """
-    import cv2
-
     if look.noise > 0.0 and rng is None:
         raise InvalidInputError("noise needs a random generator; give rng")
     sheet = _Sheet(board, np.empty((0, 5)) if covers is None else np.asarray(covers, float), scale)
     image = area_means(sheet, intrinsics, np.asarray(X_SC, dtype=float))
-    light = look.gain * (
-        1.0 + look.gradient * (np.arange(intrinsics.width) / intrinsics.width - 0.5)
-    )
+    return spoiled(image, look, rng)
+
+
+def spoiled(
+    image: NDArray[np.floating[Any] | np.uint8],
+    look: Look,
+    rng: np.random.Generator | None = None,
+) -> NDArray[np.uint8]:
+    """(H, W, 3) an image under another light, blurred, and with noise, in this order.
+
+    Args:
+        image: (H, W, 3).
+        look: what spoils it.
+        rng: for noise.
+
+    Raises:
+        InvalidInputError: noise without `rng`.
+    """
+    import cv2
+
+    if look.noise > 0.0 and rng is None:
+        raise InvalidInputError("noise needs a random generator; give rng")
+    width = image.shape[1]
+    light = look.gain * (1.0 + look.gradient * (np.arange(width) / width - 0.5))
     image = image * light[None, :, None]
     if look.blur > 0.0:
         image = cv2.GaussianBlur(image, (0, 0), look.blur, borderType=cv2.BORDER_REPLICATE)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
-from burg_drake.cameras.live_session import LiveSession, Picture
+from burg_drake.cameras.live_session import LiveSession
+from burg_drake.cameras.picture import Picture
 from burg_drake.cameras.recording import Recording
+from burg_drake.cameras.recording_files import RecordingFiles
 from burg_drake.cameras.session import Session
 from burg_drake.cameras.snapshot import (
     Snapshot,
@@ -20,6 +23,9 @@ from burg_drake.core.errors import BurgError, InvalidInputError
 
 DEFAULT_RATE = 30.0
 """Of recordings from sources that do not tell theirs [frames a second]."""
+LOWEST_RATE, HIGHEST_RATE = 1.0, 240.0
+"""Of recordings, whatever a source says of itself: files that count time in ticks of 1/90000 s may
+give that as their rate, which no codec takes [frames a second]."""
 
 
 class ViewActions:
@@ -68,6 +74,7 @@ class ViewActions:
             source=sight.frame.name,
             taken=_now(),
             time=sight.frame.time,
+            X_SC_drawn=sight.X_SC,
             placement=picture.placement,
         )
         snapshot = Snapshot(
@@ -89,20 +96,22 @@ class ViewActions:
             path: of the video; `SCENE_recording_001.mp4` and so on if not given.
 
         Raises:
-            InvalidInputError: it cannot be written, or a recording is being written already.
+            InvalidInputError: it cannot be written, files of that name exist, or a recording is
+                being written already.
         """
         with self._lock:
             if self.recording is not None:
                 raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
             if path is None:
-                path = self._free("recording", ".mp4")
+                path = self._free("recording", ".mp4", taken=self._is_recorded)
+            rate = self.live.source.fps or DEFAULT_RATE
             self.recording = Recording(
                 path,
                 self.session.intrinsics,
                 scene_document(self.session.scene),
                 source=self.live.source.name,
                 started=_now(),
-                frames_per_second=self.live.source.fps or DEFAULT_RATE,
+                frames_per_second=min(max(rate, LOWEST_RATE), HIGHEST_RATE),
                 plain=self._plain,
             )
             self.live.events.tell(f"recording {path}")
@@ -175,12 +184,24 @@ class ViewActions:
                 self.recording.add(
                     picture.overlay, sight.estimate, sight.frame.time, sight.frame.image
                 )
-            except BurgError as error:
+            except Exception as error:  # whatever it is, the view goes on
                 self.live.events.tell(f"recording ended: {error}", bad=True)
-                self.recording = None
+                self._save_what_there_is()
 
-    def _free(self, what: str, suffix: str = "") -> Path:
-        return numbered(self.folder, f"{self.session.scene.name}_{what}", suffix)
+    def _save_what_there_is(self) -> None:
+        """Finishes a recording that cannot go on; whoever reads the events learns where it is."""
+        try:
+            self.stop_recording()
+        except Exception as error:
+            self.live.events.tell(str(error), bad=True)
+
+    def _is_recorded(self, path: Path) -> bool:
+        return RecordingFiles(path, self._plain).existing() is not None
+
+    def _free(
+        self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
+    ) -> Path:
+        return numbered(self.folder, f"{self.session.scene.name}_{what}", suffix, taken=taken)
 
 
 def _now() -> str:

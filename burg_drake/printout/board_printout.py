@@ -126,6 +126,7 @@ def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout
         sheet, homeless = place_names(sheet, tiling)
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
     warnings += _lost(sheet, tiling)
+    warnings += _without_white(size, layout)
     warnings += [f"there is no room for the words {words!r}" for words in homeless]
     pdf = _document(scene, sheet, tiling, settings)
     return Printout(pdf, tiling, settings, tuple(warnings))
@@ -164,6 +165,20 @@ def _lost(sheet: Sheet, tiling: Tiling) -> list[str]:
                 " page; larger pages have room"
             )
     return warnings
+
+
+def _without_white(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
+    """Markers at the sheet's edge: detectors need white around them, a cell wide at least."""
+    corners = layout.p_SQ[..., :2].reshape(-1, 2)
+    white = min(corners.min(), (np.array(size) - corners).min())
+    cell = layout.side / layout.cells
+    if white > cell - ROUNDING:
+        return []
+    return [
+        f"markers are {1e3 * white:.1f} mm from the board's edge; cut out, on a dark table, they"
+        f" lack the white around them that detectors need: leave {1e3 * cell:.1f} mm, by a larger"
+        " board or smaller markers"
+    ]
 
 
 def _stretch(settings: PrintSettings) -> Array:

@@ -40,8 +40,8 @@ class Markers:
     first_id: int = 0
 
     def __post_init__(self) -> None:
-        if self.side <= 0.0 or self.spacing <= 0.0:
-            raise InvalidInputError("side and spacing of markers must be above 0 [m]")
+        if not (0.0 < self.side < np.inf and 0.0 < self.spacing < np.inf):
+            raise InvalidInputError("side and spacing of markers must be above 0 and finite [m]")
         if self.count is not None and min(self.count) < 1:
             raise FieldError(f"count {list(self.count)} needs a column and a row at least", "count")
         if self.first_id < 0:

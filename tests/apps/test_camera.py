@@ -16,6 +16,7 @@ from burg_drake.cameras.frame_source import Image
 from burg_drake.cameras.image_file import write_image
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.intrinsics_file import load_intrinsics, save_intrinsics
+from burg_drake.cameras.opencv_log import quiet
 
 Capture = pytest.CaptureFixture[str]
 TRUTH = Intrinsics(width=320, height=240, focal=(330.0, 332.0), center=(163.0, 117.0))
@@ -80,7 +81,8 @@ def test_live_views_are_taken_from_whatever_moves(
 ) -> None:
     """A video in which the target is held still in each place for three frames."""
     video = tmp_path / "held.avi"
-    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (320, 240))
+    with quiet():
+        writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (320, 240))
     for tilt in TURNS:
         for distance in (0.24, 0.24, 0.24, 0.32, 0.32, 0.32):
             writer.write(photo(tilt, distance))

@@ -41,7 +41,7 @@ def test_out_of_bounds_is_a_warning(tmp_path: Path, capsys: Capture) -> None:
         (["--page", "A44"], "page 'A44' does not exist; did you mean 'A4'? Known: A0, A1, A2"),
         (["--page", "100x100"], "page '100x100': it must be at least 180 x 140 mm"),
         (["--measured-mm", "9.85"], "a ruler of 100 mm measured 9.85 mm; it must be 80 to 125 mm"),
-        (["--measured-mm", "98,99,100"], "argument --measured-mm: '98,99,100' is not MM or MM,MM"),
+        (["--measured-mm", "98,99,100"], "argument --measured-mm: '98,99,100' is not X or X,Y"),
         (["--measured-mm", "98,"], "argument --measured-mm: '' is not a finite number"),
         (["--margin-mm", "45"], "margins of 45 mm leave too little of page A4"),
         (["-o", "board.png"], "board.png: only PDF is written; end the name with .pdf"),

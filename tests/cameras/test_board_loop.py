@@ -240,6 +240,22 @@ def test_with_a_filter(scene: Scene, station: Station, loop: BoardLoop, context:
     assert np.abs(drawn - output(loop, context, "overlay_image")).mean() < 1.0
 
 
+def test_a_filter_is_not_an_image_late(station: Station) -> None:
+    """Images at a rate, and a filter of the same: it has the pose of the image that is held."""
+    empty = SceneDocument(name="empty", library="household")
+    scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
+    pose_filter = PoseFilter(period=0.1, patience=1)
+    loop = build_board_loop(scene, station, style=PLAIN, period=0.1, filter=pose_filter)
+    simulator = Simulator(loop.diagram)
+    context = simulator.get_mutable_context()
+    for k, roll in enumerate((0.0, 40.0, 80.0)):
+        loop.place_camera(context, looking(0.8, 70, roll, 0))
+        simulator.AdvanceTo(0.1 * k + 0.05)
+        held, filtered = (output(loop, context, f"board.X_SC{end}") for end in ("", "_filtered"))
+        assert errors(loop, context)[0] < 1.0
+        assert np.abs(filtered - held).max() < 1e-9
+
+
 def test_ports_of_the_station_are_there(loop: BoardLoop) -> None:
     inputs = {loop.diagram.get_input_port(i).get_name() for i in range(2)}
     assert inputs == {"applied_forces", "placement"}

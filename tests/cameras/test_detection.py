@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from burg_drake.cameras.board_pose import grey_image
@@ -9,8 +10,9 @@ from burg_drake.cameras.detection import MarkerDetector, other_markers
 from burg_drake.cameras.edge_refinement import moved
 from burg_drake.cameras.edge_views import view_edges
 from burg_drake.cameras.marker_edges import REACH, marker_edges
+from burg_drake.cameras.quadrilaterals import read_cells
 from burg_drake.cameras.synthetic import board_image
-from burg_drake.scene.markers import Markers
+from burg_drake.scene.markers import Markers, marker_dictionary
 from burg_drake.scene.scene import Board
 from tests.cameras.board_views import SMALL, view
 
@@ -23,6 +25,35 @@ def test_corners_are_those_of_the_layout() -> None:
     assert len(seen.index) == 12
     p_C = (BOARD.layout.p_SQ[seen.index] - NEAR[:3, 3]) @ NEAR[:3, :3]
     assert np.abs(SMALL.project(p_C) - seen.corners).max() < 1.5
+
+
+def test_the_same_markers_are_found_as_by_opencv() -> None:
+    image = board_image(BOARD, SMALL, NEAR).astype(float)
+    noisy = image + np.random.default_rng(0).normal(0.0, 6.0, image.shape)
+    grey = grey_image(np.clip(noisy, 0, 255).astype(np.uint8))
+    for turns in range(4):
+        turned = np.ascontiguousarray(np.rot90(grey, turns))
+        seen = MarkerDetector(BOARD.layout).detect(turned)
+        opencv = cv2.aruco.ArucoDetector(marker_dictionary(BOARD.layout.dictionary))
+        corners, ids, _ = opencv.detectMarkers(turned)
+        by_id = dict(zip(ids.ravel().tolist(), corners, strict=True))
+        assert set(BOARD.layout.ids[seen.index]) == set(by_id) == set(range(20, 32))
+        for index, found in zip(seen.index, seen.corners, strict=True):
+            assert np.abs(by_id[BOARD.layout.ids[index]][0] - found).max() < 1.5
+
+
+def test_cells_of_a_quadrilateral_are_read_in_the_order_of_its_corners() -> None:
+    black = np.random.default_rng(2).random((8, 8)) < 0.5
+    picture = np.where(black, 30, 220).astype(np.uint8).repeat(12, axis=0).repeat(12, axis=1)
+    corners = np.array([[20.0, 30.0], [150.0, 14.0], [170.0, 160.0], [10.0, 140.0]])
+    square = np.array([[0, 0], [96, 0], [96, 96], [0, 96]]) - 0.5
+    H = cv2.getPerspectiveTransform(square.astype(np.float32), corners.astype(np.float32))
+    seen = cv2.warpPerspective(picture, H, (180, 180), borderValue=128)
+    turned = np.stack([np.roll(corners, -turns, axis=0) for turns in range(4)])
+    cells, contrast = read_cells(seen, turned, 8)
+    for turns in range(4):
+        assert np.array_equal(cells[turns], np.rot90(black, turns))
+    assert np.all(np.abs(contrast - 190.0) < 5.0)
 
 
 def test_a_marker_that_is_there_twice_is_left_out() -> None:

@@ -74,6 +74,10 @@ def test_images_of_another_size_are_refused() -> None:
     [
         ({"focal": (0.0, 600.0)}, "must be positive"),
         ({"width": 0}, "must be positive"),
+        ({"focal": (np.nan, 600.0)}, "must be finite"),
+        ({"center": (320.0, np.inf)}, "must be finite"),
+        ({"distortion": (0.1, np.nan, 0.0, 0.0)}, "must be finite"),
+        ({"width": 640.5}, "width 640.5 and height 480 of a camera must be whole pixels"),
         ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model takes 0, 4, 5, 8"),
     ],
 )

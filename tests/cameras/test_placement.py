@@ -16,7 +16,7 @@ from burg_drake.core.frames import Array
 from burg_drake.core.schema import dump_document
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.system_libraries import missing_render_libraries
-from tests.cameras.placement_views import INTRINSICS, X_SC
+from tests.cameras.placement_views import INTRINSICS, X_SC, looking
 
 needs_renderer = pytest.mark.skipif(
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
@@ -109,3 +109,37 @@ def test_inputs_that_cannot_be_used_are_named(scene: Scene) -> None:
         check_placement(scene, image, INTRINSICS, depth=millimetres)
     with pytest.raises(InvalidInputError, match="no distance above 0"):
         check_placement(scene, image, INTRINSICS, depth=np.zeros((480, 640), np.float32))
+
+
+@needs_renderer
+@pytest.mark.parametrize("turn", [0.0, 150.0])
+def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_handle(
+    turn: float,
+) -> None:
+    whole = load_scene("tabletop_six")
+    mug = next(i for i in whole.document.instances if i.object == "mug")
+    alone = Scene(replace(whole.document, instances=(mug,)), whole.library, whole.path)
+    shape = scene_shapes(alone)["mug"]
+    handle = np.deg2rad(turn)
+    X_SO = shape.placed(np.array([0.005, 0.005, handle]))
+    # seen from the side, and from opposite to the handle, which the mug then hides
+    p_SM, p_SH = X_SO[:3, 3], shape.placed(np.array([0.005, 0.005, handle]))[:3, 0]
+    side = p_SM + 0.6 * np.array([-p_SH[1], p_SH[0], 0.0]) + (0.0, 0.0, 0.35)
+    behind = p_SM - 0.7 * p_SH + (0.0, 0.0, 0.2)
+    found = []
+    for p_SC in (side, behind):
+        X = looking(p_SC, p_SM)
+        photo = ScenePhotographer(alone).take(X, INTRINSICS, {"mug": X_SO}, supersampling=1)
+        estimate = BoardEstimate(X_SC=X, valid=True)
+        check = check_placement(
+            alone, photo.color, INTRINSICS, depth=photo.depth, estimate=estimate
+        )
+        found.append(check.instances["mug"])
+    seen, hidden = found
+    assert seen.status == "measured" or turn > 0.0, seen.reason
+    if seen.status == "measured":
+        assert seen.displacement == pytest.approx((0.005, 0.005), abs=3e-4)
+        assert seen.angle is not None
+        assert np.rad2deg(seen.angle) == pytest.approx(turn, abs=0.5)
+    assert hidden.status == "uncertain"
+    assert "turned by another" in hidden.reason or "another place" in hidden.reason

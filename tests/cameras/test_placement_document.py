@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from burg_drake.cameras.placement_document import (
 )
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import make_pose, rot_z
+from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
 
 CHECK = PlacementCheck(
@@ -86,3 +88,14 @@ def test_files_go_by_name_and_hash(tmp_path: Path) -> None:
     assert entry == CheckedImage(file="a.png", content=digest)
     with pytest.raises(InvalidInputError, match=r"cannot read .*b\.png"):
         image_of_file(tmp_path / "b.png")
+
+
+def test_a_scene_beside_the_file_keeps_its_path_when_both_move(tmp_path: Path) -> None:
+    for given, kept in (
+        (tmp_path / "scenes" / "two.yaml", "../scenes/two.yaml"),
+        (resolve("tabletop_six", "scenes"), "tabletop_six"),
+    ):
+        check = replace(CHECK, scene=replace(CHECK.scene, path=str(given)))
+        (tmp_path / "trial").mkdir(exist_ok=True)
+        save_placement(check, tmp_path / "trial" / "placement.yaml")
+        assert load_placement(tmp_path / "trial" / "placement.yaml").scene.path == kept

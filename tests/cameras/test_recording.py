@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,8 +14,10 @@ import pytest
 
 from burg_drake.cameras.board_estimate import BoardEstimate
 from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.opencv_log import quiet
 from burg_drake.cameras.placement_document import CheckedScene
-from burg_drake.cameras.recording import Recording, RecordingDocument, read_poses
+from burg_drake.cameras.recorded_poses import read_poses
+from burg_drake.cameras.recording import Recording, RecordingDocument
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.schema import load_document
@@ -29,7 +35,8 @@ def plate(level: int) -> np.ndarray:
 
 def levels(path: Path) -> list[int]:
     """Red of every frame of a video."""
-    capture, found = cv2.VideoCapture(str(path)), []
+    with quiet():
+        capture, found = cv2.VideoCapture(str(path)), []
     while (frame := capture.read())[0]:
         assert frame[1].shape == (48, 64, 3)
         blue, green, red = frame[1].mean(axis=(0, 1))
@@ -51,9 +58,9 @@ def test_pictures_stand_as_long_as_they_did(tmp_path: Path, suffix: str) -> None
     assert levels(path) == [50, 100, 100, 100, 100, 150, 200]
     assert levels(tmp_path / f"take_plain{suffix}") == [60, 110, 110, 110, 110, 160, 210]
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
-        [f"take{suffix}", f"take_plain{suffix}", "take.csv", "take.yaml"]
+        [f"take{suffix}", f"take_plain{suffix}", "take.csv", "take.recording.yaml"]
     )
-    document = load_document(tmp_path / "take.yaml", RecordingDocument)
+    document = load_document(tmp_path / "take.recording.yaml", RecordingDocument)
     assert document.video == path.name and document.plain == f"take_plain{suffix}"
     assert document.intrinsics == CAMERA and document.scene == SCENE
 
@@ -113,3 +120,78 @@ def test_bad_places(tmp_path: Path) -> None:
     (tmp_path / "b.csv").write_text("a,b\n1,2\n")
     with pytest.raises(DocumentError, match=r"b\.csv is not the table of a recording"):
         read_poses(tmp_path / "b.csv")
+
+
+def record(path: Path, **options: Any) -> Path | None:
+    recording = Recording(path, CAMERA, SCENE, **options)
+    recording.add(plate(50), SEEN, 0.0, plate(0))
+    return recording.close()
+
+
+def test_a_scene_of_the_same_name_stays(tmp_path: Path) -> None:
+    scene = tmp_path / "my_scene.yaml"
+    scene.write_text("name: mine")
+    assert record(tmp_path / "my_scene.mp4") == tmp_path / "my_scene.mp4"
+    assert scene.read_text() == "name: mine"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["a.mp4", "a_plain.mp4", "a.csv", "a.recording.yaml", ".a.partial.mp4", ".a.partial.csv"],
+)
+def test_no_file_is_replaced(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InvalidInputError, match="exists; give a recording a new name") as raised:
+        record(tmp_path / "a.mp4", plain=True)
+    assert str(raised.value).startswith(str(tmp_path / name))
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_a_file_that_is_made_meanwhile_stays(tmp_path: Path) -> None:
+    recording = Recording(tmp_path / "a.avi", CAMERA, SCENE)
+    recording.add(plate(50), SEEN, 0.0, plate(0))
+    (tmp_path / "a.csv").write_text("mine")
+    with pytest.raises(InvalidInputError, match=r"a\.csv exists by now; .*\.a\.partial\.avi"):
+        recording.close()
+    assert (tmp_path / "a.csv").read_text() == "mine" and not (tmp_path / "a.avi").exists()
+    assert levels(tmp_path / ".a.partial.avi") == [50]
+
+
+def test_what_cannot_be_begun_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"64 x 48 pixels at 90000 images a second"):
+        record(tmp_path / "a.mp4", frames_per_second=90000.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+QUIET = """\
+import sys
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.opencv_log import quiet
+from burg_drake.cameras.placement_document import CheckedScene
+from burg_drake.cameras.recording import Recording
+from burg_drake.cameras.sources import open_source
+from burg_drake.core.errors import InvalidInputError
+
+camera = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))
+scene = CheckedScene(name="two", content="abc")
+for begin in (
+    lambda: Recording(sys.argv[1] + "/a.mp4", camera, scene, frames_per_second=90000.0),
+    lambda: open_source("http://127.0.0.1:9/none.mjpg"),
+):
+    try:
+        begin()
+    except InvalidInputError as error:
+        print(error)
+"""
+
+
+def test_nothing_but_errors_of_ours_is_said(tmp_path: Path) -> None:
+    """In a process that records before it opens a camera: FFmpeg decides at its first use how much
+    it writes to the terminal."""
+    command = [sys.executable, "-c", QUIET, str(tmp_path)]
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("OPENCV_")}
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert ended.stderr == ""
+    first, second = ended.stdout.splitlines()
+    assert "OpenCV cannot encode" in first and "does not open" in second

@@ -52,7 +52,7 @@ def output(system: SceneOverlay, context: Context) -> np.ndarray:
 def test_output_is_the_overlay_of_the_inputs(system: SceneOverlay, context: Context) -> None:
     result = output(system, context)
     plain = np.full((240, 320, 3), 128, np.uint8)
-    np.testing.assert_array_equal(result[..., :3], system.overlay.draw(plain, X_SC.GetAsMatrix4()))
+    np.testing.assert_array_equal(result[..., :3], system._overlay.draw(plain, X_SC.GetAsMatrix4()))
     assert (result[..., 3] == 255).all() and (result[..., :3] != plain).any()
 
 
@@ -70,13 +70,13 @@ def test_computes_once_for_the_same_inputs(
     system: SceneOverlay, context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[int] = []
-    draw = system.overlay.draw
+    draw = system._overlay.draw
 
     def counted(*args: Any, **options: Any) -> NDArray[np.uint8]:
         calls.append(1)
         return draw(*args, **options)
 
-    monkeypatch.setattr(system.overlay, "draw", counted)
+    monkeypatch.setattr(system._overlay, "draw", counted)
     for time in (0.0, 0.0, 1.0):
         context.SetTime(time)
         output(system, context)
@@ -96,7 +96,7 @@ def test_plain_image_with_the_reason_where_the_pose_is_not_valid(
     system.GetInputPort("estimate").FixValue(context, AbstractValue.Make(reason))
     known = output(system, context)
     plain = np.full((240, 320, 3), 128, np.uint8)
-    np.testing.assert_array_equal(known[..., :3], system.overlay.notice(plain, reason.reason))
+    np.testing.assert_array_equal(known[..., :3], system._overlay.notice(plain, reason.reason))
     assert (known != unknown).any() and (known[60:, :, :3] == 128).all()
     valid.FixValue(context, [1.0])
     assert (output(system, context)[60:, :, :3] != 128).any()
@@ -114,7 +114,7 @@ def test_estimate_alone_says_whether_the_pose_is_valid(
 
 def test_placement_is_drawn(system: SceneOverlay, context: Context) -> None:
     before = output(system, context)
-    scene = system.overlay.scene
+    scene = system._overlay.scene
     bowl = Placement(
         object="bowl",
         status="measured",
@@ -133,7 +133,7 @@ def test_placement_is_drawn(system: SceneOverlay, context: Context) -> None:
     after = output(system, context)
     np.testing.assert_array_equal(
         after[..., :3],
-        system.overlay.draw(
+        system._overlay.draw(
             np.full((240, 320, 3), 128, np.uint8), X_SC.GetAsMatrix4(), placement=check
         ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,11 @@ SEEN = BoardEstimate(
 )
 
 
-def snapshot(estimate: BoardEstimate, depth: np.ndarray | None = None) -> Snapshot:
+def snapshot(
+    estimate: BoardEstimate,
+    depth: np.ndarray | None = None,
+    X_SC_drawn: np.ndarray | None = None,
+) -> Snapshot:
     rng = np.random.default_rng(0)
     image, overlay = rng.integers(0, 256, (2, 48, 64, 3), dtype=np.uint8)
     document = describe_snapshot(
@@ -48,6 +53,7 @@ def snapshot(estimate: BoardEstimate, depth: np.ndarray | None = None) -> Snapsh
         source="camera 0",
         taken="2026-01-02T03:04:05+00:00",
         time=1.25,
+        X_SC_drawn=X_SC_drawn,
     )
     return Snapshot(document=document, image=image, overlay=overlay, depth=depth)
 
@@ -93,6 +99,43 @@ def test_bad_places_and_folders(tmp_path: Path) -> None:
     picture.write_bytes(picture.read_bytes()[:100])
     with pytest.raises(InvalidInputError, match=r"image\.png is missing or no image"):
         load_snapshot(tmp_path / "s")
+
+
+def test_damaged_depth(tmp_path: Path) -> None:
+    save_snapshot(snapshot(SEEN, np.full((48, 64), 0.7)), tmp_path / "s")
+    file = tmp_path / "s" / "depth.npy"
+    whole = file.read_bytes()
+    for broken in (whole[:-5], b"", b"no array", b"\x80\x04N."):
+        file.write_bytes(broken)
+        with pytest.raises(InvalidInputError, match=r"depth\.npy is damaged; take the snapshot"):
+            load_snapshot(tmp_path / "s")
+    np.save(file, np.zeros((48, 63)))
+    with pytest.raises(InvalidInputError, match=r"is of shape \(48, 63\), its picture of \(48, 64"):
+        load_snapshot(tmp_path / "s")
+
+
+def test_the_pose_that_was_drawn_is_told_where_it_is_another(tmp_path: Path) -> None:
+    assert snapshot(SEEN, X_SC_drawn=X_SC).document.X_SC_drawn is None
+    elsewhere = X_SC @ make_pose(np.eye(3), (0.0, 0.0, 1e-4))
+    save_snapshot(snapshot(SEEN, X_SC_drawn=elsewhere), tmp_path / "s")
+    back = load_snapshot(tmp_path / "s").document
+    assert back.X_SC_drawn is not None and back.board.X_SC is not None
+    assert np.allclose(back.X_SC_drawn.matrix(), elsewhere, atol=1e-12)
+    assert np.allclose(back.board.X_SC.matrix(), X_SC, atol=1e-12)
+
+
+def test_permissions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of an ordinary new folder; those of the process, of which the server's threads are
+    part, are not touched."""
+    before = os.umask(0o027)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "umask", lambda mask: pytest.fail(f"umask {mask:o}"))
+            save_snapshot(snapshot(SEEN), tmp_path / "s")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "s").stat().st_mode & 0o777 == 0o750
+    assert all(path.stat().st_mode & 0o777 == 0o640 for path in (tmp_path / "s").iterdir())
 
 
 def test_numbers_of_snapshots(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from burg_drake.cameras import sources_device
 from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
 from burg_drake.cameras.image_file import read_image, write_image
 from burg_drake.cameras.intrinsics import of_camera
+from burg_drake.cameras.opencv_log import quiet
 from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.sources_device import DeviceSource, open_device
 from burg_drake.cameras.sources_simulated import SimulatedSource
@@ -40,7 +41,8 @@ def number_of(image: Image) -> int:
 
 
 def write_video(path: Path, frames: int = 10, codec: str = "MJPG") -> Path:
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 25.0, (64, 48))
+    with quiet():
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 25.0, (64, 48))
     for number in range(frames):
         writer.write(picture(number)[..., ::-1])
     writer.release()
@@ -347,7 +349,8 @@ def test_a_vanished_device_is_lost_and_a_new_one_found(tmp_path: Path, impatient
     hidden = tmp_path / "unplugged.avi"
 
     def open_capture() -> cv2.VideoCapture | None:
-        capture = cv2.VideoCapture(str(path))
+        with quiet():
+            capture = cv2.VideoCapture(str(path))
         return capture if capture.isOpened() else None
 
     with DeviceSource("camera 0", open_capture) as source:

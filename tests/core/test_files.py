@@ -16,7 +16,7 @@ def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path
     assert (tmp_path / "a" / "data.bin").read_bytes() == b"\x00\xff"
 
 
-@pytest.mark.parametrize("step", ["fsync", "chmod", "replace"])
+@pytest.mark.parametrize("step", ["fsync", "replace"])
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_a_failure_at_any_step_leaves_the_old_file_and_no_rest(tmp_path, monkeypatch, step, error):
     path = tmp_path / "results.csv"
@@ -44,6 +44,17 @@ def test_permissions_are_those_of_an_ordinary_new_file(tmp_path: Path):
     finally:
         os.umask(previous)
     assert (tmp_path / "written").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_permissions_of_the_process_are_never_touched(tmp_path, monkeypatch):
+    """They are of all threads: what others write at that moment would be open to everyone."""
+
+    def refuse(mask: int) -> int:
+        raise AssertionError(f"umask {mask:o}")
+
+    monkeypatch.setattr(os, "umask", refuse)
+    atomic_write(tmp_path / "written", "x")
+    assert (tmp_path / "written").read_text() == "x"
 
 
 def test_unwritable_places_are_named(tmp_path: Path):

@@ -80,6 +80,11 @@ def test_what_cannot_be_laid_out(markers: Markers, message: str) -> None:
 def test_documents_are_checked() -> None:
     with pytest.raises(InvalidInputError, match="side and spacing of markers must be above 0"):
         Markers(side=0.0)
+    for wrong in (float("nan"), float("inf")):
+        with pytest.raises(InvalidInputError, match="above 0 and finite"):
+            Markers(side=wrong)
+        with pytest.raises(InvalidInputError, match="above 0 and finite"):
+            Markers(spacing=wrong)
     with pytest.raises(InvalidInputError, match="needs a column and a row"):
         Markers(count=(0, 3))
     assert Board().layout.ids[0] == 0

@@ -5,18 +5,20 @@ set -euo pipefail
 # shellcheck source=tools/setup/apt.sh
 . "$(dirname "$0")/apt.sh"
 
-# want NAME TIME PACKAGE...: installs the packages if they can be downloaded in that time.
+patience=240  # seconds for all of it; the tests have to be done in time, too
+
+# want NAME PACKAGE...: installs the packages, if there is time left for it.
 want() {
-  local name=$1 time=$2 missing=() package
-  shift 2
+  local name=$1 missing=() package
+  shift
   for package in "$@"; do
     dpkg -s "$package" > /dev/null 2>&1 || missing+=("$package")
   done
   [ ${#missing[@]} -gt 0 ] || return 0
-  apt_install_within "$time" "${missing[@]}" ||
+  apt_install_within $((patience - SECONDS)) "${missing[@]}" ||
     say "no $name: tests that need it skip (missing: ${missing[*]})"
 }
 
-want pdftoppm 2m poppler-utils
-want "ROS 1" 4m python3-rospy python3-rosmaster python3-cv-bridge python3-sensor-msgs \
+want pdftoppm poppler-utils
+want "ROS 1" python3-rospy python3-rosmaster python3-cv-bridge python3-sensor-msgs \
   python3-geometry-msgs python3-tf2-msgs

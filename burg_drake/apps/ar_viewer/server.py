@@ -17,7 +17,6 @@ this machine as their host (which stops DNS rebinding), and what acts must come 
 from __future__ import annotations
 
 import errno
-import ipaddress
 import json
 import socket
 import sys
@@ -28,8 +27,14 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
 
+from burg_drake.apps.ar_viewer.requests import (
+    RequestError,
+    address,
+    json_body,
+    picture_number,
+    require_own_host,
+)
 from burg_drake.apps.ar_viewer.status import status
 from burg_drake.cameras.live_session import LiveSession
 from burg_drake.cameras.view_actions import ViewActions
@@ -43,7 +48,6 @@ PATIENCE = 1.0
 """How long a request for a picture waits for a newer one [s]."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
-LONGEST_BODY = 10_000
 BOUNDARY = "picture"
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
@@ -58,18 +62,6 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-
-
-class RequestError(Exception):
-    """A request that is refused.
-
-    Attributes:
-        code: HTTP status.
-    """
-
-    def __init__(self, code: HTTPStatus, message: str) -> None:
-        super().__init__(message)
-        self.code = code
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -136,21 +128,6 @@ class ViewServer(ThreadingHTTPServer):
         if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
             super().handle_error(request, client_address)
 
-    def knows(self, host: str) -> bool:
-        """Whether a `Host` header names this machine.
-
-        A rebound DNS name is a name, so that any plain address will do.
-        """
-        name = urlsplit(f"//{host}").hostname or ""
-        mine = socket.gethostname().lower()
-        if name in ("localhost", self.host.lower(), mine, f"{mine}.local"):
-            return True
-        try:
-            ipaddress.ip_address(name)
-        except ValueError:
-            return False
-        return True
-
 
 class Handler(BaseHTTPRequestHandler):
     """Answers one connection's requests."""
@@ -181,45 +158,17 @@ class Handler(BaseHTTPRequestHandler):
         )
 
     def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
-        url = urlsplit(self.path)
         try:
-            self._require_own_host()
-            if url.path not in routes:
-                raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {url.path}")
-            if self.command == "POST":
-                routes[url.path](self._body())
-            else:
-                routes[url.path]({key: v[-1] for key, v in parse_qs(url.query).items()})
+            require_own_host(self.headers, self.path, self.server.host)
+            path, query = address(self.path)
+            if path not in routes:
+                raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path}")
+            routes[path](json_body(self.headers, self.rfile) if self.command == "POST" else query)
         except RequestError as error:
             self.close_connection = True  # its body may not have been read
             self._send_json({"error": str(error)}, error.code)
         except BurgError as error:
             self._send_json({"error": str(error)}, HTTPStatus.CONFLICT)
-
-    def _require_own_host(self) -> None:
-        host = self.headers.get("Host", "")
-        if not self.server.knows(host):
-            raise RequestError(HTTPStatus.FORBIDDEN, f"this is not {host or 'a nameless host'}")
-        origin = self.headers.get("Origin")
-        if origin is not None and origin != f"http://{host}":
-            raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {origin} are refused")
-        if self.headers.get("Sec-Fetch-Site") == "cross-site" and self.path != "/":
-            raise RequestError(HTTPStatus.FORBIDDEN, "requests from other sites are refused")
-
-    def _body(self) -> dict[str, Any]:
-        """The JSON object of a POST; a form of another site cannot send that type."""
-        if self.headers.get_content_type() != "application/json":
-            raise RequestError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
-        length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > LONGEST_BODY:
-            raise RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
-        try:
-            body = json.loads(self.rfile.read(int(length)))
-        except ValueError as error:
-            raise RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
-        if not isinstance(body, dict):
-            raise RequestError(HTTPStatus.BAD_REQUEST, "send a JSON object")
-        return body
 
     def _send_page(self, path: str, query: dict[str, str]) -> None:
         name, kind = PAGES[path]
@@ -227,7 +176,7 @@ class Handler(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, kind, page)
 
     def _send_picture(self, query: dict[str, str]) -> None:
-        picture = self.server.live.next_picture(_number(query), PATIENCE)
+        picture = self.server.live.next_picture(picture_number(query), PATIENCE)
         if picture is None:
             self._send(HTTPStatus.NO_CONTENT)
         else:
@@ -255,7 +204,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(head.encode() + picture.jpeg + b"\r\n")
 
     def _send_status(self, query: dict[str, str]) -> None:
-        self._send_json(status(self.server.live, self.server.actions, _number(query)))
+        self._send_json(status(self.server.live, self.server.actions, picture_number(query)))
 
     def _change_settings(self, body: dict[str, Any]) -> None:
         self.server.live.change(**body)
@@ -296,13 +245,6 @@ class Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not worth a line."""
-
-
-def _number(query: dict[str, str]) -> int:
-    text = query.get("after", "0")
-    if not text.isdecimal():
-        raise RequestError(HTTPStatus.BAD_REQUEST, f"after={text} is not a number")
-    return int(text)
 
 
 def _taken(host: str, port: int | None) -> str:

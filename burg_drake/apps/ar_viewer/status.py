@@ -6,8 +6,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from burg_drake.cameras.live_session import LiveSession, Picture
+from burg_drake.cameras.live_session import LiveSession
 from burg_drake.cameras.overlay_style import OverlayStyle
+from burg_drake.cameras.picture import Picture
 from burg_drake.cameras.placement_document import Placement, PlacementCheck
 from burg_drake.cameras.session import placing_order, pose_line, position_sd
 from burg_drake.cameras.view_actions import ViewActions

@@ -1,0 +1,121 @@
+"""What browsers send: read, or refused with a word why. Nothing here trusts the sender."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import socket
+from email.message import Message
+from http import HTTPStatus
+from io import BufferedIOBase
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+LONGEST_BODY = 10_000
+LONGEST_NUMBER = 12
+"""Digits; far more than pictures are counted, far fewer than Python refuses to convert."""
+
+
+class RequestError(Exception):
+    """A request that is refused.
+
+    Attributes:
+        code: HTTP status.
+    """
+
+    def __init__(self, code: HTTPStatus, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def names_this_machine(name: str, served: str) -> bool:
+    """Whether a `Host` header names this machine.
+
+    A rebound DNS name is a name, so that any plain address will do.
+
+    Args:
+        name: the header.
+        served: the address that is listened on.
+    """
+    try:
+        host = urlsplit(f"//{name}").hostname or ""
+    except ValueError:
+        return False
+    mine = socket.gethostname().lower()
+    if host in ("localhost", served.lower(), mine, f"{mine}.local"):
+        return True
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def require_own_host(headers: Message, target: str, served: str) -> None:
+    """Refuses what another site may have sent.
+
+    Args:
+        headers: of the request.
+        target: what it asks for.
+        served: the address that is listened on.
+
+    Raises:
+        RequestError: another host is meant, or another site asks.
+    """
+    host = headers.get("Host", "")
+    if not names_this_machine(host, served):
+        raise RequestError(HTTPStatus.FORBIDDEN, f"this is not {host or 'a nameless host'}")
+    origin = headers.get("Origin")
+    if origin is not None and origin != f"http://{host}":
+        raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {origin} are refused")
+    if headers.get("Sec-Fetch-Site") == "cross-site" and target != "/":
+        raise RequestError(HTTPStatus.FORBIDDEN, "requests from other sites are refused")
+
+
+def address(target: str) -> tuple[str, dict[str, str]]:
+    """Path and query of what is asked for; of a repeated field the last value.
+
+    Raises:
+        RequestError: it is no address.
+    """
+    try:
+        url = urlsplit(target)
+        return url.path, {key: values[-1] for key, values in parse_qs(url.query).items()}
+    except ValueError as error:
+        raise RequestError(HTTPStatus.BAD_REQUEST, f"no address: {error}") from error
+
+
+def json_body(headers: Message, stream: BufferedIOBase) -> dict[str, Any]:
+    """The JSON object of a POST; a form of another site cannot send that type.
+
+    Raises:
+        RequestError: another type, too long, or no JSON object.
+    """
+    if headers.get_content_type() != "application/json":
+        raise RequestError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
+    length = headers.get("Content-Length", "")
+    if not _is_number(length) or int(length) > LONGEST_BODY:
+        raise RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
+    try:
+        body = json.loads(stream.read(int(length)))
+    except (ValueError, RecursionError) as error:
+        raise RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
+    if not isinstance(body, dict):
+        raise RequestError(HTTPStatus.BAD_REQUEST, "send a JSON object")
+    return body
+
+
+def picture_number(query: dict[str, str]) -> int:
+    """`after=N`; 0 without.
+
+    Raises:
+        RequestError: no number, or one that no picture has.
+    """
+    text = query.get("after", "0")
+    if not _is_number(text):
+        raise RequestError(HTTPStatus.BAD_REQUEST, f"after={text[:50]} is not a picture's number")
+    return int(text)
+
+
+def _is_number(text: str) -> bool:
+    return text.isdecimal() and len(text) <= LONGEST_NUMBER
