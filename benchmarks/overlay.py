@@ -35,7 +35,7 @@ from burg_drake.cameras.overlay import Overlay, instance_labels
 from burg_drake.cameras.overlay_style import OverlayStyle
 from burg_drake.cameras.painting import Bytes
 from burg_drake.cameras.scene_shape import SceneShape, scene_shape
-from burg_drake.cameras.view import View
+from burg_drake.cameras.view import FieldOfView
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.schema import Pose
 from burg_drake.pipeline.source import ObjectSource
@@ -79,7 +79,7 @@ def report(scene: Scene, intrinsics: Intrinsics) -> None:
     shape, projected, drawn = scene_shape(scene), [], []
     for X_SC in views():
         points, normals, alone = borders(scene, shape, intrinsics, X_SC)
-        lines = visible_lines(shape, View(intrinsics), X_SC)
+        lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
         projected.append(distances(points, lines.ends[lines.kind == OUTLINE]))
         drawn.append(np.abs(line_middles(overlay, X_SC, points[alone], normals[alone])))
     lens = "lens" if intrinsics.distortion else "pinhole"
@@ -152,7 +152,7 @@ def borders(
         values, vectors = np.linalg.eigh(near.T @ near)
         normals[i] = vectors[:, 0]
         alone[i] = values[0] < 0.01 * len(near)  # all on one line
-    inner = visible_lines(shape, View(intrinsics), X_SC)
+    inner = visible_lines(shape, FieldOfView(intrinsics), X_SC)
     others = inner.ends[inner.kind != OUTLINE].mean(axis=1)
     if len(others):
         alone &= np.linalg.norm(found[:, None] - others[None], axis=2).min(axis=1) > NEAREST

@@ -13,6 +13,8 @@ ENGINE_NAMES = ("reference", "standard", "screening")
 DEFAULT_ENGINE = "standard"
 # Likewise in step with evaluation.candidate_sampling.
 DEFAULT_APPROACH_ANGLE = 75.0
+# Likewise those that the package installs.
+SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
 
 
 class Parser(argparse.ArgumentParser):
@@ -74,8 +76,27 @@ def _sentence(summary: str) -> str:
 def add_scene(parser: Parser) -> None:
     """The argument SCENE."""
     parser.add_argument(
-        "scene", metavar="SCENE", help="scene file, or name of a built-in one: tabletop_six"
+        "scene",
+        metavar="SCENE",
+        help=f"scene file, or name of a built-in one: {', '.join(SCENE_NAMES)}",
     )
+
+
+def add_measured_board(parser: Any) -> None:
+    """The option --measured-mm of verbs that look at a board that was printed already."""
+    parser.add_argument(
+        "--measured-mm",
+        metavar="X[,Y]",
+        type=measured_mm,
+        default=(100.0, 100.0),
+        help="what the printed board's rulers of 100 mm measure, along x and along y",
+    )
+
+
+def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
+    """Size of the print against the document along x and y, by --measured-mm."""
+    x, y = arguments.measured_mm
+    return x / 100.0, y / 100.0
 
 
 def add_station(parser: Parser) -> None:

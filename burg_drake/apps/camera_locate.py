@@ -6,7 +6,13 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.arguments import add_scene, add_station, add_verb
+from burg_drake.apps.arguments import (
+    add_measured_board,
+    add_scene,
+    add_station,
+    add_verb,
+    print_scale,
+)
 
 
 def add_to(group: Any) -> None:
@@ -17,18 +23,20 @@ def add_to(group: Any) -> None:
         run_locate,
         "print where a fixed camera stands, from photos of the board, as lines for the station",
         "burg-drake camera locate tabletop_six photo.png --intrinsics K.yaml --station my.yaml",
-        "burg-drake camera locate tabletop_six photos/*.png --intrinsics K.yaml --name top",
+        "burg-drake camera locate tabletop_six photos/ --intrinsics K.yaml --name top",
     )
     add_scene(parser)
     parser.add_argument(
         "photos",
         metavar="PHOTO",
         nargs="+",
-        help="image of the board; the mean of several of the same place is better than one",
+        help="image of the board, or a folder or pattern of such; the mean of several of the same"
+        " place is better than one",
     )
     parser.add_argument(
         "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"
     )
+    add_measured_board(parser)
     add_station(parser)
     parser.add_argument(
         "--name", metavar="NAME", default="board", help="name of the camera (default: %(default)s)"
@@ -43,17 +51,19 @@ def run_locate(arguments: argparse.Namespace) -> int:
     from burg_drake.cameras.image_file import read_image
     from burg_drake.cameras.intrinsics_file import load_intrinsics
     from burg_drake.cameras.locate import locate_camera
+    from burg_drake.cameras.sources import image_paths
     from burg_drake.core.schema import dump_document
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station
 
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     intrinsics = load_intrinsics(arguments.intrinsics)
-    pose = BoardPose(scene.board, intrinsics)
+    scene.require_markers()
+    pose = BoardPose(scene.board, intrinsics, print_scale(arguments))
     estimates = []
-    for photo in arguments.photos:
+    for photo in image_paths(arguments.photos):
         image = read_image(photo)
-        intrinsics.require_size(image.shape[1], image.shape[0], photo)
+        intrinsics.require_size(image.shape[1], image.shape[0], str(photo))
         estimate = pose.estimate(image)
         estimates.append(estimate)
         figures = f"{len(estimate.ids)} markers, {estimate.reprojection_error:.2f} pixels"

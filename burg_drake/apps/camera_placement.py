@@ -7,13 +7,20 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_scene, add_verb, positive
+from burg_drake.apps.arguments import (
+    add_measured_board,
+    add_scene,
+    add_verb,
+    positive,
+    print_scale,
+)
 
 if TYPE_CHECKING:
+    from burg_drake.cameras.board_estimate import BoardEstimate
     from burg_drake.cameras.placement_document import Placement, PlacementCheck
 
-NO_BOARD = 2
-"""Exit code where nothing could be measured."""
+FEW_MARKERS = 4
+"""With fewer in sight, the camera's place is doubtful."""
 
 
 def add_to(group: Any) -> None:
@@ -28,13 +35,14 @@ def add_to(group: Any) -> None:
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml --depth depth.png",
         "",
         "Exit code 1 if an object is not seen, or its measurement is doubtful; 2 if there is no",
-        "board in the photo.",
+        "board in the photo, and then nothing is written.",
     )
     add_scene(parser)
     parser.add_argument("photo", metavar="PHOTO", help="image of the scene on its board")
     parser.add_argument(
         "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"
     )
+    add_measured_board(parser)
     parser.add_argument(
         "--depth",
         metavar="FILE",
@@ -55,16 +63,20 @@ def add_to(group: Any) -> None:
 
 def run_placement(arguments: argparse.Namespace) -> int:
     """Measures, prints a line an object, and writes what is asked for."""
-    from burg_drake.cameras.image_file import read_image
+    from burg_drake.cameras.board_pose import BoardPose
+    from burg_drake.cameras.image_file import read_image, require_image_format
     from burg_drake.cameras.intrinsics_file import load_intrinsics
     from burg_drake.cameras.placement import check_placement
     from burg_drake.cameras.placement_depth_file import read_depth
     from burg_drake.cameras.placement_document import image_of_file, save_placement
+    from burg_drake.core.errors import InvalidInputError
     from burg_drake.core.files import require_writable
     from burg_drake.scene.scene import load_scene
 
     for path in filter(None, (arguments.output, arguments.overlay)):
         require_writable(path)
+    if arguments.overlay:
+        require_image_format(arguments.overlay)
     scene, intrinsics = load_scene(arguments.scene), load_intrinsics(arguments.intrinsics)
     photo = read_image(arguments.photo)
     intrinsics.require_size(photo.shape[1], photo.shape[0], arguments.photo)
@@ -72,26 +84,40 @@ def run_placement(arguments: argparse.Namespace) -> int:
     if arguments.depth:
         depth = read_depth(arguments.depth, arguments.depth_unit)
         intrinsics.require_size(depth.shape[1], depth.shape[0], arguments.depth)
+    scene.require_markers()
+    scale = print_scale(arguments)
+    estimate = BoardPose(scene.board, intrinsics, scale).estimate(photo, depth=depth)
     check = check_placement(
         scene,
         photo,
         intrinsics,
         depth=depth,
+        estimate=estimate,
+        scale=scale,
         image_source=image_of_file(arguments.photo),
         depth_source=image_of_file(arguments.depth) if arguments.depth else None,
     )
+    if check.reason:
+        raise InvalidInputError(f"{arguments.photo}: {check.reason}")
+    for warning in _doubts(estimate, len(scene.board.layout.ids)):
+        print(f"burg-drake: warning: {arguments.photo}: {warning}", file=sys.stderr)
     for line in table(check):
         print(line)
     if arguments.output:
         save_placement(check, arguments.output)
         print(f"wrote {arguments.output}")
-    if check.camera is None:
-        print(f"burg-drake: {arguments.photo}: {check.reason}", file=sys.stderr)
-        return NO_BOARD
     if arguments.overlay:
         _write_overlay(arguments.overlay, check, scene, photo)
         print(f"wrote {arguments.overlay}")
     return 0 if all(p.status == "measured" for p in check.instances.values()) else 1
+
+
+def _doubts(estimate: BoardEstimate, markers: int) -> list[str]:
+    """What to doubt about the camera's place, a line each."""
+    doubts = [estimate.reason] if estimate.reason else []
+    if len(estimate.ids) < FEW_MARKERS:
+        doubts.append(f"only {len(estimate.ids)} of {markers} markers are seen; show more of them")
+    return doubts
 
 
 def table(check: PlacementCheck) -> list[str]:

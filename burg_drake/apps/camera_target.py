@@ -77,9 +77,11 @@ def given_target(arguments: argparse.Namespace) -> CharucoTarget:
 
 def run_target(arguments: argparse.Namespace) -> int:
     """Writes the PDF."""
+    from burg_drake.apps.printout import require_pdf
     from burg_drake.cameras.charuco_sheet import write_target
     from burg_drake.printout.board_printout import PrintSettings
 
+    require_pdf(arguments.output)
     x, y = arguments.measured_mm
     settings = PrintSettings(page=arguments.page, measured=(1e-3 * x, 1e-3 * y))
     target = given_target(arguments)

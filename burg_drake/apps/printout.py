@@ -55,15 +55,22 @@ def add_to(verbs: Any) -> None:
     )
 
 
+def require_pdf(path: str) -> None:
+    """Refuses names of other files."""
+    from burg_drake.core.errors import InvalidInputError
+
+    if not path.lower().endswith(".pdf"):
+        raise InvalidInputError(f"{path}: only PDF is written; end the name with .pdf")
+
+
 def run_printout(arguments: argparse.Namespace) -> int:
     """Writes the PDF; what is not on it as in the scene goes to stderr."""
-    from burg_drake.core.errors import InvalidInputError
     from burg_drake.core.files import require_writable
     from burg_drake.printout.board_printout import PrintSettings, print_board
+    from burg_drake.printout.paper import PAPERS
     from burg_drake.scene.scene import load_scene
 
-    if not arguments.output.lower().endswith(".pdf"):
-        raise InvalidInputError(f"{arguments.output}: only PDF is written; end the name with .pdf")
+    require_pdf(arguments.output)
     x, y = arguments.measured_mm
     settings = PrintSettings(
         page=arguments.page,
@@ -80,7 +87,9 @@ def run_printout(arguments: argparse.Namespace) -> int:
         print(f"burg-drake: warning: {scene.path}: {warning}", file=sys.stderr)
     tiling = printout.tiling
     columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
-    across = "landscape" if tiling.paper.width > tiling.paper.height else "portrait"
+    across = " landscape" if tiling.paper.width > tiling.paper.height else " portrait"
+    if tiling.paper.name not in PAPERS:
+        across = ""
     pages = f"{columns} x {rows} pages" if columns * rows > 1 else "1 page"
-    print(f"wrote {arguments.output}: {pages} {tiling.paper.name} {across}")
+    print(f"wrote {arguments.output}: {pages} {tiling.paper.name}{across}")
     return 0

@@ -100,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     intrinsics = load_intrinsics(arguments.intrinsics) if arguments.intrinsics else None
     scene = load_scene(arguments.scene)
+    scene.require_markers()
     x, y = arguments.measured_mm
     node = BoardNode(
         scene,

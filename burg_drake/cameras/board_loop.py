@@ -147,21 +147,15 @@ def build_board_loop(
         builder.AddNamedSystem("pose_filter", filter)
         builder.Connect(estimator.GetOutputPort("estimate"), filter.GetInputPort("estimate"))
         X_SC, valid = filter.GetOutputPort("X_SC"), filter.GetOutputPort("valid")
-    overlay = builder.AddNamedSystem(
-        "scene_overlay", SceneOverlay(scene, intrinsics, style or OverlayStyle())
-    )
+    overlay = SceneOverlay(scene, intrinsics, style or OverlayStyle())
+    builder.AddNamedSystem("scene_overlay", overlay)
     builder.Connect(color_image, overlay.GetInputPort("color_image"))
     builder.Connect(X_SC, overlay.GetInputPort("X_SC"))
     builder.Connect(valid, overlay.GetInputPort("valid"))
     builder.Connect(estimator.GetOutputPort("estimate"), overlay.GetInputPort("estimate"))
 
     _export_station(builder, built.diagram)
-    for name in ("X_SC", "valid", "reprojection_error", "covariance", "estimate"):
-        builder.ExportOutput(estimator.GetOutputPort(name), f"board.{name}")
-    if filter is not None:
-        builder.ExportOutput(X_SC, "board.X_SC_filtered")
-    builder.ExportInput(overlay.GetInputPort("placement"), "placement")
-    builder.ExportOutput(overlay.GetOutputPort("overlay_image"), "overlay_image")
+    _export_board(builder, estimator, filter, overlay)
     sensor = built.diagram.GetSubsystemByName(f"camera.{camera}")
     return BoardLoop(builder.Build(), built, sensor, intrinsics)
 
@@ -176,6 +170,20 @@ def _images(
     hold = builder.AddNamedSystem(f"{port}.hold", ZeroOrderHold(period, images.Allocate()))
     builder.Connect(images, hold.get_input_port())
     return hold.get_output_port()
+
+
+def _export_board(
+    builder: DiagramBuilder,
+    estimator: BoardPoseEstimator,
+    pose_filter: PoseFilter | None,
+    overlay: SceneOverlay,
+) -> None:
+    for name in ("X_SC", "valid", "reprojection_error", "covariance", "estimate"):
+        builder.ExportOutput(estimator.GetOutputPort(name), f"board.{name}")
+    if pose_filter is not None:
+        builder.ExportOutput(pose_filter.GetOutputPort("X_SC"), "board.X_SC_filtered")
+    builder.ExportInput(overlay.GetInputPort("placement"), "placement")
+    builder.ExportOutput(overlay.GetOutputPort("overlay_image"), "overlay_image")
 
 
 def _export_station(builder: DiagramBuilder, station: Diagram) -> None:

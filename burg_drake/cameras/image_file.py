@@ -60,13 +60,26 @@ def decode_image(data: bytes) -> Image | None:
 
 
 def _is_cut_off(data: bytes) -> bool:
-    """A JPEG without its end, which decoders fill up with grey."""
+    """A JPEG without its end, which decoders fill up with grey; or a PNG without, about which
+    libpng writes a line of its own."""
+    if data.startswith(b"\x89PNG"):
+        return b"IEND" not in data
     if not data.startswith(b"\xff\xd8"):
         return False
     at = 2  # behind it segments, which may hold a small image, then the image itself
     while data[at : at + 1] == b"\xff" and data[at + 1 : at + 2] != b"\xda":
         at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
     return data.find(b"\xff\xd9", at) < 0
+
+
+def require_image_format(path: str | Path) -> None:
+    """Refuses names of image files to write whose endings tell no format, before any work.
+
+    Raises:
+        InvalidInputError: no such format.
+    """
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InvalidInputError(f"cannot write {path}: .png and .jpg are formats of images")
 
 
 def write_image(path: str | Path, image: Image) -> None:

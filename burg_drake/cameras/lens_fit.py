@@ -95,10 +95,7 @@ def fit_lens(
     for p, q, rotation, translation in zip(points, pixels, rotations, translations, strict=True):
         expected, J = cv2.projectPoints(p.astype(float), rotation, translation, K, k)
         residuals.append(q.astype(float) - np.asarray(expected).reshape(-1, 2))
-        # What a change of the view's pose explains is no information about the camera.
-        of_pose = np.linalg.qr(J[:, :6])[0]
-        of_camera = J[:, 6 : 10 + count]
-        reduced.append(of_camera - of_pose @ (of_pose.T @ of_camera))
+        reduced.append(_of_camera(J, count))
     X_CT = [
         make_pose(cv2.Rodrigues(r)[0], np.ravel(t))
         for r, t in zip(rotations, translations, strict=True)
@@ -116,6 +113,19 @@ def fit_lens(
         tuple(residuals),
         _covariance(np.concatenate(reduced), residuals),
     )
+
+
+def _of_camera(J: Array, count: int) -> Array:
+    """Derivatives of a view's pixels by the camera's parameters, without what a change of the
+    view's pose explains, which is no information about the camera.
+
+    Args:
+        J: by the pose, focal lengths, center and coefficients, as OpenCV gives them.
+        count: of the model's coefficients.
+    """
+    of_pose = np.linalg.qr(J[:, :6])[0]
+    of_camera = J[:, 6 : 10 + count]
+    return np.asarray(of_camera - of_pose @ (of_pose.T @ of_camera))
 
 
 def _covariance(J: Array, residuals: Sequence[Array]) -> Array:

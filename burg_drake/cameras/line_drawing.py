@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.scene_shape import SceneShape
 from burg_drake.cameras.silhouette import Indices
-from burg_drake.cameras.view import NEAR, View
+from burg_drake.cameras.view import NEAR, FieldOfView
 from burg_drake.core.frames import Array, inverse, transform_points
 
 OUTLINE, INNER, CREASE = 0, 1, 2
@@ -49,7 +49,7 @@ class Lines:
     kind: Indices
 
 
-def visible_lines(shape: SceneShape, view: View, X_SC: Array) -> Lines:
+def visible_lines(shape: SceneShape, view: FieldOfView, X_SC: Array) -> Lines:
     """The lines of a scene that a camera sees.
 
     Args:
@@ -73,7 +73,7 @@ def visible_lines(shape: SceneShape, view: View, X_SC: Array) -> Lines:
     return Lines(view.intrinsics.project(p_CQ), p_CQ, owner, kind)
 
 
-def bits(p_CQ: Array, view: View) -> tuple[Array, Indices]:
+def bits(p_CQ: Array, view: FieldOfView) -> tuple[Array, Indices]:
     """Lines cut to what is in view, and into short bits, which follow a lens where it bends them.
 
     Args:
@@ -107,7 +107,7 @@ def bits(p_CQ: Array, view: View) -> tuple[Array, Indices]:
 
 def _seen(
     shape: SceneShape,
-    view: View,
+    view: FieldOfView,
     X_SC: Array,
     p_CQ: Array,
     inside: Array,

@@ -132,7 +132,7 @@ class OtherBoard:
         across: bool,
         line: int,
     ) -> bool:
-        """A row's or column's places in the image, some at least, are as light as paper all over."""
+        """All places of a row or column that are in the image are as light as paper all over."""
         every = np.arange(len(self._inside)).reshape(self._rows, self._columns)
         which = every[line] if across else every[:, line]
         at, seen = self._places(X_SC, self._inside[which], self._looks)

@@ -19,7 +19,7 @@ from burg_drake.cameras.silhouette import Indices
 from burg_drake.cameras.surface_image import NOTHING, SurfaceCamera, SurfaceImage
 from burg_drake.cameras.tag_layout import lay_out
 from burg_drake.cameras.text_tags import WHITE, notice, paste, tag
-from burg_drake.cameras.view import View
+from burg_drake.cameras.view import FieldOfView
 from burg_drake.core.colors import CATEGORIES, distinct_colors
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, transform_points
@@ -79,7 +79,7 @@ class Overlay:
         """
         self.scene, self.intrinsics = scene, intrinsics
         self.style = style or OverlayStyle()
-        self._view = View(intrinsics)
+        self._view = FieldOfView(intrinsics)
         self._whole = scene_shape(scene)
         self._shown: dict[tuple[str, ...] | None, tuple[SurfaceCamera, Array, Indices]] = {}
         self._colors = {name: _color(i) for i, name in enumerate(self._whole.names)}
@@ -207,7 +207,7 @@ def instance_labels(scene: Scene, intrinsics: Intrinsics, X_SC: Array) -> NDArra
         (H, W) numbers of the instances, in the order of `scene.instances` and then
         `scene.background`; -1 where there is none.
     """
-    shape, view = scene_shape(scene), View(intrinsics)
+    shape, view = scene_shape(scene), FieldOfView(intrinsics)
     lines = visible_lines(shape, view, X_SC)
     return SurfaceCamera(shape, view).look(X_SC, lines, _shades(shape)).owner
 

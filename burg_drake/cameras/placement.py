@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.board_pose import estimate_board
+from burg_drake.cameras.board_pose import BoardPose
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement_alignment import Aligner
 from burg_drake.cameras.placement_board import board_picture
@@ -47,6 +47,7 @@ def check_placement(
     *,
     depth: NDArray[np.float32] | None = None,
     estimate: BoardEstimate | None = None,
+    scale: tuple[float, float] = (1.0, 1.0),
     image_source: CheckedImage | None = None,
     depth_source: CheckedImage | None = None,
 ) -> PlacementCheck:
@@ -60,18 +61,21 @@ def check_placement(
             is none. Objects are then aligned with these, and the photo only serves to find the
             board.
         estimate: where the camera is; from the photo's markers if None.
+        scale: size of the printed board against the document along x and y, if it was measured; as
+            in `BoardPose`, whose estimate has to be of the same.
         image_source, depth_source: what the document calls the images; their pixels' hash if None.
 
     Raises:
         InvalidInputError: an image of another size than the intrinsics', or not an image; depth
             that is not in metres; markers that do not fit on the board.
     """
+    scene.require_markers()
     color = _checked_image(image, intrinsics)
     if depth is not None:
         depth = check_depth(depth, intrinsics)
     if estimate is None:
-        estimate = estimate_board(color, intrinsics, scene.board)
-    instances, reason = _measured(scene, color, depth, intrinsics, estimate)
+        estimate = BoardPose(scene.board, intrinsics, scale).estimate(color)
+    instances, reason = _measured(scene, color, depth, intrinsics, estimate, scale)
     return PlacementCheck(
         scene=CheckedScene(
             name=scene.name, path=str(Path(scene.path).absolute()), content=scene.content
@@ -99,9 +103,10 @@ def _measured(
     depth: NDArray[np.float32] | None,
     intrinsics: Intrinsics,
     estimate: BoardEstimate,
+    scale: tuple[float, float],
 ) -> tuple[dict[str, Placement], str]:
     """Placements by name; and why nothing was measured, if so."""
-    aligner = _aligner(scene, color, depth, intrinsics, estimate)
+    aligner = _aligner(scene, color, depth, intrinsics, estimate, scale)
     if isinstance(aligner, str):
         names = (*scene.instances, *scene.background)
         return {name: unseen(scene, name, aligner) for name in names}, aligner
@@ -120,6 +125,7 @@ def _aligner(
     depth: NDArray[np.float32] | None,
     intrinsics: Intrinsics,
     estimate: BoardEstimate,
+    scale: tuple[float, float],
 ) -> Aligner | str:
     """What objects are aligned by; or why nothing can be measured."""
     if not estimate.valid:
@@ -129,7 +135,7 @@ def _aligner(
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
     image = straight.color(color).astype(float)
-    picture = board_picture(scene.board, image, intrinsics.K, estimate.X_SC)
+    picture = board_picture(scene.board, image, intrinsics.K, estimate.X_SC, scale)
     return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
 
 

@@ -52,7 +52,9 @@ class BoardPicture:
     noise: float
 
 
-def board_picture(board: Board, image: Array, K: Array, X_SC: Array) -> BoardPicture | None:
+def board_picture(
+    board: Board, image: Array, K: Array, X_SC: Array, scale: tuple[float, float] = (1.0, 1.0)
+) -> BoardPicture | None:
     """Predicts the empty board.
 
     Args:
@@ -60,12 +62,13 @@ def board_picture(board: Board, image: Array, K: Array, X_SC: Array) -> BoardPic
         image: (H, W, 3) photo without lens distortion [8-bit levels].
         K: (3, 3) camera matrix.
         X_SC: (4, 4) camera in the scene frame.
+        scale: size of the print against the document along x and y.
 
     Returns:
         None if there is no contrast of paper and ink in the photo.
     """
     size = image.shape[1], image.shape[0]
-    H_pixel_S = K @ inverse(X_SC)[:3][:, [0, 1, 3]]
+    H_pixel_S = K @ inverse(X_SC)[:3][:, [0, 1, 3]] @ np.diag([*scale, 1.0])  # of the document
     ink, sheet = _projected(board, H_pixel_S, size)
     p_S = _on_the_sheet(H_pixel_S, size, board.size)
     sheet = cv2.erode(sheet.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)

@@ -114,9 +114,8 @@ class Recording:
         try:
             self._table = csv.writer(self._stream, lineterminator="\n")
             self._table.writerow(COLUMNS)
-            size = (intrinsics.width, intrinsics.height)
             for video in files.videos:
-                self._writers.append(_writer(video, frames_per_second, size))
+                self._writers.append(_writer(video, frames_per_second, intrinsics))
         except BaseException:
             self._abandon()
             raise
@@ -227,7 +226,8 @@ def _new_table(path: Path) -> TextIO:
         ) from error
 
 
-def _writer(path: Path, rate: float, size: tuple[int, int]) -> cv2.VideoWriter:
+def _writer(path: Path, rate: float, intrinsics: Intrinsics) -> cv2.VideoWriter:
+    size = (intrinsics.width, intrinsics.height)
     codec = cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()])
     with quiet():
         writer = cv2.VideoWriter(str(partial(path)), codec, rate, size)

@@ -92,6 +92,7 @@ class Session:
         print_scale: tuple[float, float] = (1.0, 1.0),
         style: OverlayStyle = OverlayStyle(),  # noqa: B008 (frozen)
     ) -> None:
+        scene.require_markers()
         self.scene, self.intrinsics, self.style = scene, intrinsics, style
         self._board_pose = BoardPose(scene.board, intrinsics, print_scale)
         self._overlay = Overlay(scene, intrinsics, style)
@@ -159,6 +160,7 @@ class Session:
             self.intrinsics,
             depth=None if depth is None else depth.astype(np.float32),
             estimate=sight.estimate,
+            scale=self._board_pose.scale,
         )
 
 

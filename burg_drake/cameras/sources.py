@@ -75,7 +75,18 @@ def _simulated(reference: str, scene: Scene | None, fps: float | None) -> FrameS
 
 
 def _images(references: Sequence[str]) -> FrameSource:
-    from burg_drake.cameras.sources_images import ImageSource, images_in, in_order, is_image
+    from burg_drake.cameras.sources_images import ImageSource
+
+    return ImageSource(image_paths(references), references[0] if len(references) == 1 else "")
+
+
+def image_paths(references: Sequence[str]) -> list[Path]:
+    """Image files by their names, folders or patterns such as `photos/*.jpg`.
+
+    Raises:
+        InvalidInputError: there are none.
+    """
+    from burg_drake.cameras.sources_images import images_in, in_order, is_image
 
     paths: list[Path] = []
     for reference in references:
@@ -96,5 +107,4 @@ def _images(references: Sequence[str]) -> FrameSource:
                 " images, the number of a camera, an rtsp or http address, or"
                 f" {SIMULATED}STATION/CAMERA"
             )
-    name = references[0] if len(references) == 1 else ""
-    return ImageSource(paths, name)
+    return paths

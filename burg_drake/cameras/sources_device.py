@@ -24,6 +24,13 @@ PATIENCE = 2.0
 FIRST_WAIT, LONGEST_WAIT = 0.5, 5.0
 """Between attempts to open a lost camera again; doubled after each [s]."""
 
+PLUGGED = (
+    "is it plugged in, free (no other program uses it), and may you read it?"
+    " `burg-drake camera list` shows which cameras open"
+)
+ON_AIR = "is the address right, does the network reach it, and does it send a video?"
+"""What to look at where a camera, or a stream, does not open."""
+
 BACKENDS = {"linux": cv2.CAP_V4L2, "darwin": cv2.CAP_AVFOUNDATION}
 """For cameras of this machine."""
 NETWORK = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 5000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5000]
@@ -36,12 +43,18 @@ class DeviceSource(FrameSource):
     Args:
         name: what messages call it.
         open_capture: opens it; called again when it was lost. None where it does not open.
+        question: what to look at where it does not open.
 
     Raises:
         InvalidInputError: it does not open, or gives no images.
     """
 
-    def __init__(self, name: str, open_capture: Callable[[], cv2.VideoCapture | None]) -> None:
+    def __init__(
+        self,
+        name: str,
+        open_capture: Callable[[], cv2.VideoCapture | None],
+        question: str = PLUGGED,
+    ) -> None:
         self.name, self.live = name, True
         self._open = open_capture
         self._start = time.monotonic()
@@ -49,10 +62,7 @@ class DeviceSource(FrameSource):
         first = None if capture is None else _image(capture)
         if capture is None or first is None:
             what = "does not open" if capture is None else "opens, but gives no images"
-            raise InvalidInputError(
-                f"{name} {what}; is it plugged in, free (no other program uses it), and may you"
-                " read it? `burg-drake camera list` shows which cameras open"
-            )
+            raise InvalidInputError(f"{name} {what}; {question}")
         self.size = (first.shape[1], first.shape[0])
         self.fps = capture.get(cv2.CAP_PROP_FPS) or None
         self._changed = threading.Condition()
@@ -131,9 +141,10 @@ def open_device(
     Raises:
         InvalidInputError: it does not open, or not with that size.
     """
-    is_local = isinstance(device, int)
     source = DeviceSource(
-        f"camera {device}" if is_local else str(device), lambda: _capture(device, size, fps)
+        f"camera {device}" if isinstance(device, int) else device,
+        lambda: _capture(device, size, fps),
+        ON_AIR if "://" in str(device) else PLUGGED,
     )
     if size is not None and source.size != tuple(size):
         source.close()

@@ -26,11 +26,12 @@ def simulated_camera(reference: str) -> tuple[Station, str]:
     except UnknownNameError as error:
         before, slash, named = text.rpartition("/")
         if not slash:
-            raise
+            raise UnknownNameError(f"station of {reference}: {error}") from None
         try:
             station = load_station(before)
-        except UnknownNameError:
-            raise error from None
+        except UnknownNameError as without_camera:
+            reason = error if text.endswith((".yaml", ".yml")) else without_camera
+            raise UnknownNameError(f"station of {reference}: {reason}") from None
     known = station.document.cameras
     if not known:
         raise InvalidInputError(f"station {station.name!r} ({station.path}) has no cameras")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.line_drawing import OUTLINE, Lines
 from burg_drake.cameras.scene_shape import SceneShape
-from burg_drake.cameras.view import NEAR, View
+from burg_drake.cameras.view import NEAR, FieldOfView
 from burg_drake.core.frames import Array, inverse, transform_points
 
 BLOCK = 4
@@ -41,7 +41,7 @@ class SurfaceCamera:
         shape: of the scene.
     """
 
-    def __init__(self, shape: SceneShape, view: View) -> None:
+    def __init__(self, shape: SceneShape, view: FieldOfView) -> None:
         self.shape = shape
         directions = view.directions
         self._directions = directions / np.linalg.norm(directions, axis=-1, keepdims=True)

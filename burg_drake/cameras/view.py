@@ -17,7 +17,7 @@ MARGIN = 0.05
 outside, a lens model leads back into the image."""
 
 
-class View:
+class FieldOfView:
     """A camera's field of view.
 
     Attributes:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import io
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
@@ -12,13 +15,14 @@ from reportlab.pdfgen.canvas import Canvas
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array
+from burg_drake.printout.board_edge import draw_edge, draw_origin
 from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
 from burg_drake.printout.page_frame import Caption, draw_page_frame
-from burg_drake.printout.paper import Paper, orientations
-from burg_drake.printout.pen import FAINT, POINT, Pen, rectangle
+from burg_drake.printout.paper import PAPERS, Paper, orientations
+from burg_drake.printout.pen import POINT, WHITE, Pen, rectangle
 from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
 from burg_drake.printout.tiling import Tile, Tiling, tile_board
-from burg_drake.scene.markers import MarkerLayout
+from burg_drake.scene.markers import EDGE, MarkerLayout
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import validate_scene
 
@@ -27,6 +31,10 @@ MEASURED = (0.080, 0.125)
 LOST = 0.5e-3
 """An object that loses less than this to the page's margin is worth no word [m]."""
 FORM = "board"
+COVER = 2e-3
+"""Width of the white around what a page shows [m]."""
+MARGINS = (4e-3, 3e-3, 2e-3, 1e-3, 0.0)
+"""Smaller ones that are tried for a board that is spread over pages because of the margin [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,11 +117,12 @@ def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout
         UnknownNameError: there is no such page; a mesh file is missing.
         InvalidInputError: no markers fit on the board, or none on a page; too many pages.
     """
+    scene.require_markers()
     settings = settings or PrintSettings()
-    papers = orientations(settings.page, settings.margin, settings.measured)
     size, layout = scene.board.size, scene.board.layout
+    orientations(settings.page, settings.margin, settings.measured)  # before the drawings
     drawings = draw_objects(scene) if settings.height_map else []
-    tiling = tile_board(size, layout, _needed(size, layout, drawings, papers[0]), papers)
+    tiling = _tiling(size, layout, drawings, settings)
     sheet = Sheet(
         size=size,
         layout=layout,
@@ -126,10 +135,51 @@ def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout
         sheet, homeless = place_names(sheet, tiling)
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
     warnings += _lost(sheet, tiling)
+    warnings += _spread(size, layout, drawings, settings, tiling)
     warnings += _without_white(size, layout)
     warnings += [f"there is no room for the words {words!r}" for words in homeless]
     pdf = _document(scene, sheet, tiling, settings)
     return Printout(pdf, tiling, settings, tuple(warnings))
+
+
+def _tiling(
+    size: tuple[float, float],
+    layout: MarkerLayout,
+    drawings: list[Drawing],
+    settings: PrintSettings,
+) -> Tiling:
+    papers = orientations(settings.page, settings.margin, settings.measured)
+    return tile_board(size, layout, _needed(size, layout, drawings, papers[0]), papers)
+
+
+def _spread(
+    size: tuple[float, float],
+    layout: MarkerLayout,
+    drawings: list[Drawing],
+    settings: PrintSettings,
+    tiling: Tiling,
+) -> list[str]:
+    """What would print on one page a board that is no larger than the page."""
+    paper, pages = tiling.paper, len(tiling.tiles)
+    sides = np.sort(size), np.sort([paper.width, paper.height])
+    if pages == 1 or (sides[0] > sides[1] + 1e-6).any():
+        return []
+
+    def on_one(**changes: Any) -> bool:
+        with contextlib.suppress(InvalidInputError):
+            changed = dataclasses.replace(settings, **changes)
+            return len(_tiling(size, layout, drawings, changed).tiles) == 1
+        return False
+
+    margin = next((m for m in MARGINS if m < settings.margin and on_one(margin=m)), None)
+    page = next((name for name in PAPERS if on_one(page=name)), None)
+    ways = [f"--margin-mm {1e3 * margin:g}"] if margin is not None else []
+    ways += [f"--page {page}"] if page else []
+    remedy = f"; {' or '.join(ways)} would do with one" if ways else ""
+    return [
+        f"the board is no larger than the page, but takes {pages} because of the margins, rulers"
+        f" and words{remedy}"
+    ]
 
 
 def _needed(
@@ -168,15 +218,15 @@ def _lost(sheet: Sheet, tiling: Tiling) -> list[str]:
 
 
 def _without_white(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
-    """Markers at the sheet's edge: detectors need white around them, a cell wide at least."""
+    """Markers at the sheet's edge: detectors need white around them, about a cell wide."""
     corners = layout.p_SQ[..., :2].reshape(-1, 2)
     white = min(corners.min(), (np.array(size) - corners).min())
-    cell = layout.side / layout.cells
-    if white > cell - ROUNDING:
+    least = min(layout.side / layout.cells, EDGE)
+    if white > least - 1e-9:
         return []
     return [
         f"markers are {1e3 * white:.1f} mm from the board's edge; cut out, on a dark table, they"
-        f" lack the white around them that detectors need: leave {1e3 * cell:.1f} mm, by a larger"
+        f" lack the white around them that detectors need: leave {1e3 * least:.1f} mm, by a larger"
         " board or smaller markers"
     ]
 
@@ -204,7 +254,13 @@ def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSetting
         canvas.scale(*stretch.tolist())
         _draw_board(pen, sheet, tile)
         draw_page_frame(
-            pen, tile, tiling, sheet.size, _caption(scene, settings), tints=bool(sheet.drawings)
+            pen,
+            tile,
+            tiling,
+            sheet.size,
+            _caption(scene, settings, len(tiling.tiles), tiling.flap),
+            marks=sheet.marks,
+            tints=bool(sheet.drawings),
         )
         canvas.showPage()
     canvas.save()
@@ -216,13 +272,20 @@ def _draw_board(pen: Pen, sheet: Sheet, tile: Tile) -> None:
     canvas = pen.canvas
     canvas.saveState()
     canvas.translate(tile.p_PS[0] / POINT, tile.p_PS[1] / POINT)
-    pen.clip([rectangle(tile.lower, tile.upper)])
+    # Covered, not clipped, where the page's part ends: along a clip, viewers blend what is below
+    # the white frames of markers into hairs.
+    lower, upper = np.array(tile.lower), np.array(tile.upper)
+    canvas.saveState()
+    pen.clip([rectangle(lower - COVER / 2, upper + COVER / 2)])
     canvas.doForm(FORM)
-    pen.outline([rectangle((0.0, 0.0), sheet.size)], 0.2e-3, FAINT)
+    draw_edge(pen, tile, sheet.size)
+    draw_origin(pen, tile, float(sheet.layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0).max()))
+    canvas.restoreState()
+    pen.area([rectangle(lower - COVER, upper + COVER), rectangle(lower, upper)], WHITE)
     canvas.restoreState()
 
 
-def _caption(scene: Scene, settings: PrintSettings) -> Caption:
+def _caption(scene: Scene, settings: PrintSettings, pages: int, flap: float) -> Caption:
     layout, size = scene.board.layout, scene.board.size
     edge = layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0)
     how = "Print at 100 %, not fitted to the page: both rulers must measure 100 mm."
@@ -233,13 +296,20 @@ def _caption(scene: Scene, settings: PrintSettings) -> Caption:
             " both rulers must measure 100 mm."
         )
     side, gap = 1e3 * layout.side, 1e3 * scene.board.markers.spacing
+    markers = (
+        f"{layout.dictionary}, ids {layout.ids[0]} to {layout.ids[-1]}, {side:g} mm with gaps of"
+        f" {gap:g} mm."
+    )
+    origin = (
+        f"The board's origin lies {1e3 * edge[0]:g} mm left of the markers, {1e3 * edge[1]:g} mm"
+        " below."
+    )
+    join = "Glue each page onto the strips of those before it, cross on cross."
+    if not flap:
+        join = "Join each page to those before it edge to edge, cross on cross."
+    steps = f"1 Check the rulers. 2 Cut along the lines that say CUT. 3 {join} "
     return Caption(
         title=scene.name,
-        lines=(
-            f"{layout.dictionary}, ids {layout.ids[0]} to {layout.ids[-1]}, {side:g} mm with gaps"
-            f" of {gap:g} mm; content {scene.content[:8]}",
-            f"Board {1e3 * size[0]:g} x {1e3 * size[1]:g} mm; its origin lies {1e3 * edge[0]:g} mm"
-            f" left of the markers, {1e3 * edge[1]:g} mm below.",
-            how,
-        ),
+        board=f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm, content {scene.content[:8]}",
+        lines=(f"{how} {markers}", (steps if pages > 1 else "") + origin),
     )

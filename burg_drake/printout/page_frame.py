@@ -28,6 +28,11 @@ HAIR = 0.12e-3
 MAP_SIZE = (0.026, 0.011)
 """Room for the map of the pages [m]."""
 LEGEND_WIDTH = 0.030
+CUT_SIZE = 7.5
+"""Of words at cuts [points]."""
+MARK_CLEAR = 4.5e-3
+"""Least distance of these words from the middle of an alignment mark, and from the board's edge
+[m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,10 +41,12 @@ class Caption:
 
     Attributes:
         title: the scene's name.
-        lines: what the board is, and how to print it.
+        board: its size and content.
+        lines: how to print and join the pages, and what the board is; two.
     """
 
     title: str
+    board: str
     lines: tuple[str, ...]
 
 
@@ -50,6 +57,7 @@ def draw_page_frame(
     size: tuple[float, float],
     caption: Caption,
     *,
+    marks: Array,
     tints: bool,
 ) -> None:
     """Draws what stands around the board on a page, with the page's origin lower left.
@@ -60,6 +68,7 @@ def draw_page_frame(
         tiling: all pages.
         size: extents of the board [m].
         caption: words at the foot.
+        marks: (N, 2) middles of alignment marks in the scene frame [m], which words keep clear of.
         tints: explain the tints of the height map.
     """
     paper = tiling.paper
@@ -71,12 +80,15 @@ def draw_page_frame(
         _draw_map(pen, tile, tiling, size, (right, base))
         right -= 4e-3
     left = paper.lower[0] + RULER + 8e-3
-    if tints and right - left > 0.105:
+    above = paper.lower[1] + RULER + 8e-3
+    if tints and above + LEGEND_WIDTH < paper.upper[1]:
+        _draw_legend(pen, (paper.lower[0] - 2.1e-3, above), turned=True)
+    elif tints and right - left > 0.105:
         right -= LEGEND_WIDTH
-        _draw_legend(pen, right, base + 3.4e-3)
+        _draw_legend(pen, (right, base + 5.8e-3), turned=False)
         right -= 6e-3
     _draw_caption(pen, caption, tile, len(tiling.tiles), (left, right), base)
-    _draw_cuts(pen, tile, tiling)
+    _draw_cuts(pen, tile, tiling, size, marks)
 
 
 def draw_rulers(pen: Pen, paper: Paper) -> None:
@@ -117,9 +129,10 @@ def _draw_caption(
     pen.text(
         left, base + 9.0e-3, caption.title, _fitting(caption.title, room, 9.5, BOLD), font=BOLD
     )
+    pen.text(left, base + 5.9e-3, caption.board, _fitting(caption.board, right - left, 6.5))
+    start = left - RULER - 8e-3  # below the ruler, too
     for k, line in enumerate(caption.lines):
-        size = _fitting(line, right - left, 6.5)
-        pen.text(left, base + 5.9e-3 - 2.75e-3 * k, line, size)
+        pen.text(start, base + 3.1e-3 - 2.6e-3 * k, line, _fitting(line, right - start, 6.5))
 
 
 def _fitting(text: str, room: float, size: float, font: str = "Helvetica") -> float:
@@ -147,22 +160,32 @@ def _draw_map(
         pen.text(*middle, str(other.number), text, align=0.5, color=WHITE if here else INK)
 
 
-def _draw_legend(pen: Pen, left: float, base: float) -> None:
-    """What the tints tell, in grey."""
+def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
+    """What the tints tell, in grey: from `start` [m] to the right, or turned upwards."""
+    along = np.array([0.0, 1.0] if turned else [1.0, 0.0])
+    up = np.array([-1.0, 0.0] if turned else [0.0, 1.0])
+
+    def at(length: float, off: float) -> tuple[float, float]:
+        x, y = (start + length * along + off * up).tolist()
+        return x, y
+
     steps = 60
-    edges = left + LEGEND_WIDTH * np.arange(steps + 1) / steps
+    edges = LEGEND_WIDTH * np.arange(steps + 1) / steps
     for k in range(steps):
         luma = luma_at(FULL_HEIGHT * (k + 0.5) / steps)
         r, g, b = tint(FIXED_HUE, luma).tolist()
         end = min(edges[k + 1] + 0.1e-3, edges[-1])  # over the next one, against hairs of white
-        pen.area([rectangle((edges[k], base), (end, base + 2.4e-3))], (r, g, b))
-    pen.text(left, base + 3.4e-3, "height above the sheet", 6)
+        corners = at(edges[k], 0.0), at(end, 0.0), at(end, 2.0e-3), at(edges[k], 2.0e-3)
+        pen.area([np.array(corners)], (r, g, b))
+    pen.text(*at(0.0, 2.8e-3), "height above the sheet", 6, turned=turned)
     for k, millimetre in enumerate((0, 50, 100)):
         words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
-        pen.text(left + k * LEGEND_WIDTH / 2, base - 2.4e-3, words, 6, align=k / 2)
+        pen.text(*at(k * LEGEND_WIDTH / 2, -2.0e-3), words, 6, align=k / 2, turned=turned)
 
 
-def _draw_cuts(pen: Pen, tile: Tile, tiling: Tiling) -> None:
+def _draw_cuts(
+    pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], marks: Array
+) -> None:
     """Dashed lines: to cut along on the left and above, to glue the next page up to on the right
     and below."""
     (x0, y0), (x1, y1) = tiling.paper.lower, tiling.paper.upper
@@ -171,26 +194,54 @@ def _draw_cuts(pen: Pen, tile: Tile, tiling: Tiling) -> None:
         if cut is not None:
             x = tile.p_PS[0] + cut
             pen.line((x, y0), (x, y1), width=HAIR, color=FAINT, dash=1.2e-3)
-            _label_cut(pen, (x, y1), trimmed, tile.number + 1, tiling.flap, turned=True)
+            crossed = tile.p_PS[1] + np.array([0.0, size[1], *_on_cut(marks, 0, cut)])
+            words = _cut_words(trimmed, tile.number + 1, tiling.flap)
+            _label_cut(pen, (x, y1), words, trimmed, crossed, turned=True)
     for cut, trimmed in ((tile.cut_top, True), (tile.cut_bottom, False)):
         if cut is not None:
             y = tile.p_PS[1] + cut
-            end = x1 if tile.cut_right is None else tile.p_PS[0] + tile.cut_right - 5e-3
             pen.line((x0, y), (x1, y), width=HAIR, color=FAINT, dash=1.2e-3)
-            _label_cut(pen, (end, y), trimmed, tile.number + columns, tiling.flap, turned=False)
+            crossed = tile.p_PS[0] + np.array([0.0, size[0], *_on_cut(marks, 1, cut)])
+            words = _cut_words(trimmed, tile.number + columns, tiling.flap)
+            _label_cut(pen, (x1, y), words, trimmed, crossed, turned=False)
+
+
+def _on_cut(marks: Array, axis: int, cut: float) -> list[float]:
+    """Where on a cut across `axis` alignment marks lie."""
+    here = np.abs(marks[:, axis] - cut) < 1e-5
+    return [float(p) for p in marks[here, 1 - axis]]
+
+
+def _cut_words(trimmed: bool, neighbour: int, flap: float) -> str:
+    if trimmed:
+        return "CUT"
+    return f"page {neighbour} " + ("is glued here" if flap else "joins here")
 
 
 def _label_cut(
-    pen: Pen, end: tuple[float, float], trimmed: bool, neighbour: int, flap: float, *, turned: bool
+    pen: Pen,
+    end: tuple[float, float],
+    words: str,
+    trimmed: bool,
+    crossed: Array,
+    *,
+    turned: bool,
 ) -> None:
-    """Says at the end of a cut line what to do there; the line runs towards `end`."""
-    x, y = end
-    aside = BLEED + 1.0e-3
-    words = (
-        "cut" if trimmed else f"page {neighbour}" + (" is glued here" if flap else " joins here")
-    )
-    if turned:
-        at = (x - aside, y - 1e-3) if trimmed else (x + aside + 1.6e-3, y - 1e-3)
-    else:
-        at = (x - 1e-3, y + aside) if trimmed else (x - 1e-3, y - aside - 1.6e-3)
-    pen.text(*at, words, 5.5, align=1.0, turned=turned, color=FAINT)
+    """Says at the end of a cut line what to do there.
+
+    Args:
+        pen: draws in metres of the page.
+        end: the line runs towards it [m].
+        words: to write.
+        trimmed: words stand on the side that is cut off, or else on the strip that stays.
+        crossed: (N,) where along the line something is that words keep clear of [m].
+        turned: the line runs upwards.
+    """
+    length = text_width(words, CUT_SIZE, BOLD)
+    along = end[1 if turned else 0] - 1e-3
+    for there in np.sort(crossed)[::-1]:
+        if along - length - MARK_CLEAR < there < along + MARK_CLEAR:
+            along = there - MARK_CLEAR
+    off = BLEED + 1.0e-3 if trimmed else -(BLEED + 1.0e-3 + 0.72 * CUT_SIZE * POINT)
+    at = (end[0] - off, along) if turned else (along, end[1] + off)
+    pen.text(*at, words, CUT_SIZE, font=BOLD, align=1.0, turned=turned)

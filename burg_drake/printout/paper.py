@@ -33,7 +33,7 @@ class Paper:
     """A page, x to the right and y up from its lower left corner.
 
     Attributes:
-        name: for people.
+        name: for people; of a size of one's own width and height, as it lies.
         width, height: [m], as long as they are printed; a printer that scales makes them longer.
         margin: that the printer leaves white on all sides [m].
     """
@@ -107,7 +107,10 @@ def orientations(
     """
     label, short, long = paper_size(name)
     sx, sy = (0.1 / m for m in measured)
-    pages = [Paper(label, w / sx, h / sy, margin) for w, h in ((short, long), (long, short))]
+    pages = [
+        Paper(label if label in PAPERS else f"{1e3 * w:g} x {1e3 * h:g} mm", w / sx, h / sy, margin)
+        for w, h in ((short, long), (long, short))
+    ]
     white = 2 * margin - 0.01  # the least sizes are those with margins of 5 mm
     fits = [p for p in pages if p.width - white >= LEAST_WIDTH and p.height - white >= LEAST_HEIGHT]
     if not fits:

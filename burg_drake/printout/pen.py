@@ -131,7 +131,7 @@ class Pen:
         return path
 
 
-def rectangle(lower: Sequence[float], upper: Sequence[float]) -> Array:
+def rectangle(lower: Sequence[float] | Array, upper: Sequence[float] | Array) -> Array:
     """(4, 2) corners, counter-clockwise from the lower left."""
     (x0, y0), (x1, y1) = lower, upper
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.printout.board_edge import ORIGIN
 from burg_drake.printout.drawings import Arrow, Drawing
 from burg_drake.printout.labels import FreeSpace
 from burg_drake.printout.outlines import cell_outlines
@@ -110,7 +111,10 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     """
     space, masks = FreeSpace(sheet.size), {}
     first, last = tiling.tiles[0], tiling.tiles[-1]
-    space.take_beyond((first.lower[0], last.lower[1]), (last.upper[0], first.upper[1]))
+    on_paper = (first.lower[0], last.lower[1]), (last.upper[0], first.upper[1])
+    inner = np.array([[0.0, 0.0], sheet.size]) + 2 * NAME_CLEAR * np.array([[1.0], [-1.0]])
+    space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
+    space.take((0.0, 0.0), (ORIGIN, ORIGIN))
     clear = max(NAME_CLEAR, _frame(sheet.layout))
     for corners in sheet.layout.p_SQ[:, :, :2]:
         space.take(corners.min(axis=0), corners.max(axis=0), clear)

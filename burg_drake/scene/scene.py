@@ -123,6 +123,17 @@ class Scene:
         """Fixed instances by name."""
         return {i.name or i.object: i for i in self.document.background}
 
+    def require_markers(self) -> None:
+        """Refuses a board whose markers cannot be, before anything is done with them.
+
+        Raises:
+            InvalidInputError: see `scene.markers.marker_layout`; it names the file and the key.
+        """
+        try:
+            _ = self.board.layout
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{self.path}: board.markers: {error}") from error
+
     def instance(self, name: str) -> Instance:
         """A free or fixed instance.
 

@@ -164,7 +164,9 @@ def build_station_diagram(
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
-    add_board(plant, scene.board, station, markers=cameras or meshcat is not None)
+    if markers := cameras or meshcat is not None:
+        scene.require_markers()
+    add_board(plant, scene.board, station, markers=markers)
     free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
     fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
     for name, body in fixed.items():

@@ -185,7 +185,7 @@ def test_a_recording_replaces_nothing(
     capsys.readouterr()
     assert main(command) == 2
     told = capsys.readouterr().err
-    assert told == f"burg-drake: {take} exists; give a recording a new name\n"
+    assert told == f"burg-drake: error: {take} exists; give a recording a new name\n"
     assert take.read_bytes() == video
 
 

@@ -139,6 +139,13 @@ def test_wrong_arguments(
     assert not (tmp_path / "K.yaml").exists()
 
 
+def test_target_is_nothing_but_a_pdf(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "target.png"
+    assert main(["camera", "target", "-o", str(path)]) == 2
+    assert f"{path}: only PDF is written; end the name with .pdf" in capsys.readouterr().err
+    assert not path.exists()
+
+
 def test_target_is_a_pdf(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "target.pdf"
     assert main(["camera", "target", "-o", str(path), "--measured-mm", "99,100.5"]) == 0

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 from burg_drake.apps.arguments import Parser, add_group
 from burg_drake.apps.camera_locate import add_to
 from burg_drake.cameras.intrinsics import of_camera
 from burg_drake.cameras.intrinsics_file import save_intrinsics
+from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import rotation_angle
 from burg_drake.core.resources import resolve
@@ -67,6 +69,25 @@ def test_lines_make_a_station_document(pictures: Path, tmp_path: Path, capsys: C
     assert np.linalg.norm(X_CD[:3, 3]) < 1e-3
     assert rotation_angle(X_CD[:3, :3]) < np.deg2rad(0.05)
     assert replace(seen, X_WC=truth.X_WC) == replace(truth, center=truth.principal_point)
+
+
+def test_a_folder_of_a_measured_print(pictures: Path, tmp_path: Path, capsys: Capture) -> None:
+    scene = load_scene("tabletop_six")
+    station = load_station("panda_tabletop")
+    camera = station.camera("board")
+    X_SC = np.linalg.inv(station.document.X_WS.matrix()) @ camera.X_WC.matrix()
+    drawn = board_image(scene.board, of_camera(camera), X_SC, scale=(0.97, 0.97))
+    for name in ("1.png", "2.png"):
+        Image.fromarray(drawn).save(tmp_path / name)
+    found = []
+    for words in ([], ["--measured-mm", "97"]):
+        assert locate(pictures, str(tmp_path), *words) == 0
+        out, err = capsys.readouterr()
+        assert f"{tmp_path / '1.png'}: " in err and f"{tmp_path / '2.png'}: " in err
+        data = yaml.safe_load(out)["cameras"]["board"]["X_WC"]["translation"]
+        found.append(np.linalg.norm(np.array(data) - camera.X_WC.matrix()[:3, 3]))
+    assert found[0] > 0.015
+    assert found[1] < 1e-3
 
 
 def test_a_picture_without_a_board(pictures: Path, capsys: Capture) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,11 @@ from burg_drake.apps.cli import main
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.intrinsics_file import save_intrinsics
 from burg_drake.cameras.placement_document import load_placement
+from burg_drake.cameras.synthetic import board_image
+from burg_drake.core.frames import make_pose
+from burg_drake.scene.scene import load_scene
 from burg_drake.system_libraries import missing_render_libraries
+from tests.cameras.placement_views import looking
 
 Capture = pytest.CaptureFixture[str]
 INTRINSICS = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
@@ -45,8 +50,6 @@ def folder(tmp_path: Path) -> Path:
 )
 def test_a_photo_becomes_a_table_a_document_and_a_picture(folder: Path, capsys: Capture) -> None:
     from burg_drake.cameras.placement_photo import ScenePhotographer
-    from burg_drake.core.frames import make_pose
-    from burg_drake.scene.scene import load_scene
 
     scene = load_scene(folder / "two.yaml")
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.29, 0.21, 0.7))  # straight down
@@ -74,9 +77,54 @@ def test_a_photo_without_a_board_says_so(folder: Path, capsys: Capture) -> None:
     words = (folder / "two.yaml", folder / "grey.png", "--intrinsics", folder / "K.yaml")
     assert run(*words, "-o", folder / "placement.yaml") == 2
     printed = capsys.readouterr()
-    assert "grey.png: the board was not found" in printed.err
-    assert "mug  not seen: the board was not found" in printed.out
-    assert load_placement(folder / "placement.yaml").camera is None
+    (line,) = printed.err.splitlines()
+    assert "grey.png: the board was not found" in line
+    assert printed.out == ""
+    assert not (folder / "placement.yaml").exists()
+
+
+def test_a_scaled_print_is_told_or_doubted(folder: Path, capsys: Capture) -> None:
+    scene = load_scene(folder / "two.yaml")
+    X_SC = looking(np.array([0.3, 0.1, 0.7]), np.array([0.29, 0.2, 0.0]))
+    drawn = board_image(scene.board, INTRINSICS, X_SC, scale=(0.97, 0.98))
+    cv2.imwrite(str(folder / "scaled.png"), drawn[..., ::-1])
+    words = (folder / "two.yaml", folder / "scaled.png", "--intrinsics", folder / "K.yaml")
+    files = (folder / "plain.yaml", folder / "told.yaml")
+    assert run(*words, "-o", files[0]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"burg-drake: warning: {folder / 'scaled.png'}: ")
+    assert "times as long along y" in line
+    assert run(*words, "--measured-mm", "97,98", "-o", files[1]) == 1
+    assert capsys.readouterr().err == ""
+    p_SC = [load_placement(file).camera.X_SC.translation for file in files]  # type: ignore[union-attr]
+    assert np.linalg.norm(p_SC[0] - X_SC[:3, 3]) > 0.01
+    assert np.linalg.norm(p_SC[1] - X_SC[:3, 3]) < 5e-4
+
+
+def test_few_markers_are_doubted(folder: Path, capsys: Capture) -> None:
+    scene = load_scene(folder / "two.yaml")
+    X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.117, 0.12, 0.08))
+    drawn = board_image(scene.board, INTRINSICS, X_SC)
+    cv2.imwrite(str(folder / "near.png"), drawn[..., ::-1])
+    words = (folder / "two.yaml", folder / "near.png", "--intrinsics", folder / "K.yaml")
+    assert run(*words) == 1
+    assert re.search(r"near\.png: only [1-3] of 54 markers are seen", capsys.readouterr().err)
+
+
+def test_an_overlay_of_no_format_is_refused_at_once(folder: Path, capsys: Capture) -> None:
+    words = (folder / "two.yaml", folder / "none.png", "--intrinsics", folder / "K.yaml")
+    assert run(*words, "--overlay", folder / "check.txt") == 2
+    assert "check.txt: .png and .jpg are formats of images" in capsys.readouterr().err
+
+
+def test_markers_that_do_not_fit_name_their_file(folder: Path, capsys: Capture) -> None:
+    (folder / "large.yaml").write_text(SCENE + "board: {markers: {side: 0.5}}\n")
+    cv2.imwrite(str(folder / "grey.png"), np.full((480, 640, 3), 128, np.uint8))
+    for verb in ("placement", "locate"):
+        words = [folder / "large.yaml", folder / "grey.png", "--intrinsics", folder / "K.yaml"]
+        assert main(["camera", verb, *map(str, words)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{folder / 'large.yaml'}: board.markers: markers of 500 mm" in line
 
 
 def test_files_that_cannot_be_used_are_named(folder: Path, capsys: Capture) -> None:

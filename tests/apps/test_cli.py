@@ -16,6 +16,7 @@ from burg_drake.apps.arguments import (
     DEFAULT_ENGINE,
     DEFAULT_STATION,
     ENGINE_NAMES,
+    SCENE_NAMES,
 )
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import builtin_names
@@ -215,5 +216,6 @@ def test_defaults_are_those_of_the_library() -> None:
     assert set(ENGINE_NAMES) == set(ENGINES)
     assert evaluate.MODES == MODES
     assert DEFAULT_ENGINE in ENGINES
+    assert list(SCENE_NAMES) == builtin_names("scenes")
     assert DEFAULT_STATION in builtin_names("stations")
     assert DEFAULT_APPROACH_ANGLE == DEFAULT_APPROACH_ANGLE_DEG

@@ -21,6 +21,15 @@ def test_it_writes_the_board(tmp_path: Path, capsys: Capture) -> None:
     assert output.read_bytes().startswith(b"%PDF-")
 
 
+def test_pages_of_ones_own_size_are_told_as_they_lie(tmp_path: Path, capsys: Capture) -> None:
+    output = tmp_path / "board.pdf"
+    for page, told in (("300x300", "300 x 300 mm"), ("210x297", "297 x 210 mm")):
+        options = ["--no-height-map", "--page", page, "-o", str(output)]
+        assert main(["printout", "tabletop_six", *options]) == 0
+        line = capsys.readouterr().out.strip()
+        assert line.endswith(f" pages {told}")
+
+
 def test_out_of_bounds_is_a_warning(tmp_path: Path, capsys: Capture) -> None:
     scene = tmp_path / "scene.yaml"
     scene.write_text(
@@ -73,4 +82,5 @@ def test_markers_that_do_not_fit(tmp_path: Path, capsys: Capture) -> None:
         )
         assert main(["printout", str(scene), "-o", str(tmp_path / "board.pdf")]) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert line.startswith(f"burg-drake: error: {message}")
+        where = f"{scene}: board.markers: " if message.startswith("markers") else ""
+        assert line.startswith(f"burg-drake: error: {where}{message}")

@@ -17,7 +17,7 @@ from burg_drake.cameras.line_drawing import OUTLINE, visible_lines
 from burg_drake.cameras.overlay_style import OverlayStyle
 from burg_drake.cameras.pose_filter import PoseFilter
 from burg_drake.cameras.scene_shape import scene_shape
-from burg_drake.cameras.view import View
+from burg_drake.cameras.view import FieldOfView
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle, rotation_from_rpy
 from burg_drake.core.schema import Pose
@@ -154,7 +154,7 @@ def test_outlines_are_on_the_edges_that_drake_renders(
     away = distance_transform_edt(~grid) / (2 * fine)  # in pixels of the camera
 
     X_SC = output(loop, context, "board.X_SC")
-    lines = visible_lines(scene_shape(scene), View(loop.intrinsics), X_SC)
+    lines = visible_lines(scene_shape(scene), FieldOfView(loop.intrinsics), X_SC)
     middle = lines.ends[lines.kind == OUTLINE].mean(axis=1)
     column, row = np.round(2 * (fine * (middle + 0.5) - 0.5)).astype(int).T
     inside = (column >= 0) & (row >= 0) & (column < grid.shape[1]) & (row < grid.shape[0])

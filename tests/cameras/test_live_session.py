@@ -1,4 +1,4 @@
-"""A running session over real videos and images, and what viewers can have made of it."""
+"""A running session over real videos and images."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -16,30 +15,19 @@ from burg_drake.cameras import sources_device
 from burg_drake.cameras.event_log import EventLog
 from burg_drake.cameras.frame_reader import FrameReader
 from burg_drake.cameras.frame_source import Frame, FrameSource
-from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.live_session import LiveSession
 from burg_drake.cameras.opencv_log import quiet
 from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.recording import Recording
 from burg_drake.cameras.session import (
     Session,
     ViewSettings,
 )
-from burg_drake.cameras.snapshot import load_snapshot
 from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.synthetic import board_image
 from burg_drake.cameras.view_actions import ViewActions
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
 from burg_drake.scene.scene import Scene, load_scene
-
-CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
-TIMEOUT = 30.0
-
-
-def camera_at(x: float) -> np.ndarray:
-    """Straight above the board."""
-    return make_pose(np.diag([1.0, -1.0, -1.0]), (x, 0.21, 0.6))
+from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines, until
 
 
 @pytest.fixture(scope="module")
@@ -85,35 +73,6 @@ def live(session: Session) -> Iterator[Callable[..., LiveSession]]:
     yield make
     for each in made:
         each.close()
-
-
-def until(condition: Callable[[], object]) -> None:
-    """Waits for other threads; a test that waits in vain fails."""
-    end = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
-
-
-def lines(log: EventLog) -> list[str]:
-    return [event.text for event in log.after(0)]
-
-
-class Pictures(FrameSource):
-    """Any frames, as fast as they are taken."""
-
-    def __init__(self, *images: np.ndarray, live: bool = False) -> None:
-        self.name, self.live, self.size, self.images = "pictures", live, (320, 240), list(images)
-        self.given = 0
-
-    def read(self) -> Frame | None:
-        if self.given == len(self.images):
-            return None
-        self.given += 1
-        return Frame(self.images[self.given - 1], None, 1.0 * self.given, f"picture {self.given}")
-
-    def close(self) -> None:
-        self.given = len(self.images)
 
 
 def test_every_frame_of_a_video_is_looked_at(
@@ -250,100 +209,3 @@ def test_what_ends_a_thread_is_raised(live: Callable[..., LiveSession], image: n
     running.start()
     with pytest.raises(ZeroDivisionError, match="in the driver"):
         running.wait(seconds=TIMEOUT)
-
-
-# --- Actions
-
-
-def test_snapshot_of_the_picture(
-    live: Callable[..., LiveSession], image: np.ndarray, tmp_path: Path
-) -> None:
-    running = live(Pictures(image))
-    actions = ViewActions(running, tmp_path)
-    with pytest.raises(InvalidInputError, match="there is no picture yet"):
-        actions.snapshot()
-    with pytest.raises(InvalidInputError, match="needs a picture that shows where the board is"):
-        actions.start_check()
-    running.start()
-    picture = running.next_picture(0, TIMEOUT)
-    assert picture is not None
-    places = [actions.snapshot(), actions.snapshot()]
-    assert [p.name for p in places] == ["tabletop_six_snapshot_001", "tabletop_six_snapshot_002"]
-    taken = load_snapshot(places[0])
-    assert np.array_equal(taken.image, image)
-    assert np.array_equal(taken.overlay, picture.overlay)
-    assert taken.document.source == "picture 1"
-
-
-def test_check_of_an_empty_board(
-    live: Callable[..., LiveSession], image: np.ndarray, tmp_path: Path
-) -> None:
-    """No object stands where it should; the check says so, and the view shows it."""
-    running = live(Pictures(image))
-    actions = ViewActions(running, tmp_path)
-    running.start()
-    picture = running.next_picture(0, TIMEOUT)
-    assert picture is not None and picture.placement is None
-    actions.start_check()
-    actions.wait_for_check(TIMEOUT)
-    assert not actions.checking
-    shown = running.next_picture(picture.number, TIMEOUT)
-    assert shown is not None and shown.placement is running.placement is not None
-    assert set(shown.placement.instances) == set(running.session.scene.instances)
-    assert {placed.status for placed in shown.placement.instances.values()} <= {
-        "not_seen",
-        "uncertain",
-    }
-
-
-@pytest.mark.parametrize(("told", "written"), [(90000.0, 240.0), (0.01, 1.0), (None, 30.0)])
-def test_rates_of_recordings(
-    live: Callable[..., LiveSession],
-    image: np.ndarray,
-    tmp_path: Path,
-    told: float | None,
-    written: float,
-) -> None:
-    source = Pictures(image)
-    source.fps = told
-    actions = ViewActions(live(source), tmp_path)
-    actions.start_recording()
-    assert actions.recording is not None and actions.recording.frames_per_second == written
-    assert actions.stop_recording() is None and list(tmp_path.iterdir()) == []
-
-
-def test_recordings_get_names_that_are_free(
-    live: Callable[..., LiveSession], image: np.ndarray, tmp_path: Path
-) -> None:
-    (tmp_path / "tabletop_six_recording_001.csv").write_text("mine")
-    actions = ViewActions(live(Pictures(image)), tmp_path)
-    assert actions.start_recording().name == "tabletop_six_recording_002.mp4"
-    actions.stop_recording()
-
-
-def test_a_recording_that_fails_is_finished_and_the_view_goes_on(
-    live: Callable[..., LiveSession],
-    image: np.ndarray,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log = EventLog()
-    running = live(Pictures(*[image] * 5), events=log, paced=False)
-    actions = ViewActions(running, tmp_path)
-    add = Recording.add
-
-    def fail_in_the_end(recording: Recording, *picture: Any) -> None:
-        if recording.pictures == 2:
-            raise OSError(28, "No space left on device")
-        add(recording, *picture)
-
-    monkeypatch.setattr(Recording, "add", fail_in_the_end)
-    take = actions.start_recording(tmp_path / "take.avi")
-    running.start()
-    running.wait(seconds=TIMEOUT)
-    assert running.counts.frames == 5 and actions.recording is None
-    ended, saved = lines(log)[-2:]
-    assert ended == "recording ended: [Errno 28] No space left on device"
-    assert saved.startswith(f"recorded {take}, ")
-    assert len(read_poses(tmp_path / "take.csv").times) == 2
-    assert not list(tmp_path.glob(".*"))

@@ -25,7 +25,7 @@ from burg_drake.cameras.strokes import strokes
 from burg_drake.cameras.surface_image import SurfaceCamera
 from burg_drake.cameras.tag_layout import lay_out
 from burg_drake.cameras.text_tags import notice
-from burg_drake.cameras.view import View
+from burg_drake.cameras.view import FieldOfView
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.schema import Pose
@@ -107,7 +107,7 @@ def distances(points: Array, ends: Array) -> Array:
 def test_outlines_are_where_rays_find_borders(
     shape: SceneShape, intrinsics: Intrinsics, X_SC: Array
 ) -> None:
-    lines = visible_lines(shape, View(intrinsics), X_SC)
+    lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
     truth = borders(shape, intrinsics, X_SC)
     error = distances(truth, lines.ends[lines.kind == OUTLINE])
     # The ends of bits that run behind another object are seen or hidden as a whole.
@@ -116,7 +116,7 @@ def test_outlines_are_where_rays_find_borders(
 
 @pytest.mark.parametrize("X_SC", VIEWS)
 def test_every_outline_is_a_border(shape: SceneShape, X_SC: Array) -> None:
-    lines = visible_lines(shape, View(PINHOLE), X_SC)
+    lines = visible_lines(shape, FieldOfView(PINHOLE), X_SC)
     ends = lines.ends[lines.kind == OUTLINE]
     along = ends[:, 1] - ends[:, 0]
     long = np.linalg.norm(along, axis=1) > 0.2
@@ -140,7 +140,7 @@ def test_outline_of_a_ball_is_the_ellipse_of_its_cone() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     center = np.array([0.06, -0.04, 0.5])
     shape = SceneShape({"ball": (ball.vertices + center, np.array(ball.faces))})
-    lines = visible_lines(shape, View(PINHOLE), np.eye(4))
+    lines = visible_lines(shape, FieldOfView(PINHOLE), np.eye(4))
     flat = (lines.ends.reshape(-1, 2) - PINHOLE.center) / PINHOLE.focal
     rays = np.column_stack([flat, np.ones(len(flat))])
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -158,7 +158,7 @@ def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
         {n: (np.array(m.vertices), np.array(m.faces)) for n, m in (("ring", ring), ("bar", bar))}
     )
     X_SC = looking((0.0, -0.5, 0.25), (0.0, 0.0, 0.0))
-    view = View(PINHOLE)
+    view = FieldOfView(PINHOLE)
     lines = visible_lines(shape, view, X_SC)
     shades = np.full(len(shape.owner), 200, np.uint8)
     owner = SurfaceCamera(shape, view).look(X_SC, lines, shades).owner
@@ -173,7 +173,7 @@ def test_a_handle_before_its_mug_is_an_inner_line(scene: Scene, shape: SceneShap
     yaw = np.deg2rad(140.0)  # where the handle points
     middle = mug.boxes[0].mean(axis=0)
     eye = middle + 0.35 * np.array([np.cos(yaw), np.sin(yaw), 0.5])
-    lines = visible_lines(mug, View(PINHOLE), looking(tuple(eye), tuple(middle)))
+    lines = visible_lines(mug, FieldOfView(PINHOLE), looking(tuple(eye), tuple(middle)))
     assert (lines.kind == INNER).sum() > 20
 
 
@@ -208,7 +208,7 @@ def test_draws_over_the_objects_alone(scene: Scene, shape: SceneShape) -> None:
     assert (image == 128).all() and drawn.dtype == np.uint8
     changed = (drawn != 128).any(axis=2)
     labels = all_labels(shape, PINHOLE, VIEWS[0])
-    ends = visible_lines(shape, View(PINHOLE), VIEWS[0]).ends
+    ends = visible_lines(shape, FieldOfView(PINHOLE), VIEWS[0]).ends
     near = np.zeros_like(changed)
     for shift in np.stack(np.meshgrid(*[np.arange(-5, 6)] * 2), axis=-1).reshape(-1, 2):
         x, y = np.clip(np.round(ends.mean(axis=1) + shift), 0, (319, 239)).astype(int).T
@@ -282,7 +282,7 @@ def test_lines_bend_with_the_lens() -> None:
     side = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float) * (0.55, 0.42, 1.0)
     shape = SceneShape({"sheet": (side, np.array([[0, 1, 2], [0, 2, 3]]))})
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 1.0))
-    lines: Lines = visible_lines(shape, View(WIDE), X_SC)
+    lines: Lines = visible_lines(shape, FieldOfView(WIDE), X_SC)
     rim = np.linspace(side[0], side[1], 50)
     truth = WIDE.project((rim - X_SC[:3, 3]) @ X_SC[:3, :3])
     inside = ((truth > 0) & (truth < (319, 239))).all(axis=1)

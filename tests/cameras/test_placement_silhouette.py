@@ -65,6 +65,16 @@ def test_a_plate_is_found_and_measured(look: Look) -> None:
     assert (np.abs(found.q - Q) < 4.0 * np.sqrt(np.diag(found.covariance))).all()
 
 
+def test_a_scaled_print_is_an_empty_board_only_to_who_knows_its_scale() -> None:
+    scale = (0.97, 0.98)
+    image = board_image(BOARD, INTRINSICS, X_SC, scale=scale).astype(float)
+    known = board_picture(BOARD, image, INTRINSICS.K, X_SC, scale)
+    unknown = board_picture(BOARD, image, INTRINSICS.K, X_SC)
+    assert known is not None and unknown is not None
+    assert (known.evidence[known.sheet] > 0.0).mean() < 0.01
+    assert (unknown.evidence[unknown.sheet] > 0.0).mean() > 0.1
+
+
 def test_an_empty_board_in_uneven_light_is_empty() -> None:
     image = drawing([], Look(blur=0.8, noise=3.0, gain=0.8, gradient=0.4))
     picture = board_picture(BOARD, image.astype(float), INTRINSICS.K, X_SC)

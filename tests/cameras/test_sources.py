@@ -361,8 +361,12 @@ def test_a_vanished_device_is_lost_and_a_new_one_found(tmp_path: Path, impatient
 
 
 def test_a_camera_that_does_not_open(capfd: pytest.CaptureFixture[str]) -> None:
-    for reference in ("99", "/dev/video99", "http://127.0.0.1:9/none.mjpg"):
-        with pytest.raises(InvalidInputError, match="does not open; is it plugged in") as raised:
+    for reference, question in (
+        ("99", "is it plugged in"),
+        ("/dev/video99", "is it plugged in"),
+        ("http://127.0.0.1:9/none.mjpg", "is the address right"),
+    ):
+        with pytest.raises(InvalidInputError, match=f"does not open; {question}") as raised:
             open_source(reference)
         assert reference in str(raised.value)
     assert capfd.readouterr().err == ""
@@ -408,3 +412,8 @@ def test_a_simulated_camera_needs_its_scene_and_name() -> None:
         open_source("sim:panda_tabletop/boards", scene=scene)
     with pytest.raises(UnknownNameError, match=r"panda_tabletob.* does not exist"):
         open_source("sim:panda_tabletob", scene=scene)
+    for name in ("nowhere/board", "nowhere"):
+        with pytest.raises(UnknownNameError) as raised:
+            open_source(f"sim:{name}", scene=scene)
+        start = f"station of sim:{name}: nowhere does not exist; known: "
+        assert str(raised.value).startswith(start)

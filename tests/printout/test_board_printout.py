@@ -178,15 +178,74 @@ def test_words_on_every_page(tmp_path: Path) -> None:
         assert f"page {k} of {len(texts)}" in text and "tabletop_twelve" in text
         assert "Print at 100 %, not fitted to the page: both rulers must measure 100 mm" in text
         assert (
-            f"ARUCO_MIP_36h12, ids 0 to 53, 45 mm with gaps of 15 mm; content {scene.content[:8]}"
-            in text
+            "ARUCO_MIP_36h12, ids 0 to 53, 45 mm with gaps of 15 mm." in text
+            and f"594 x 420 mm, content {scene.content[:8]}" in text
         )
+        assert "2 Cut along the lines that say CUT. 3 Glue each page onto the strips" in text
+        assert "height above the sheet" in text
+        assert ("CUT" in text.replace("say CUT", "")) == (k > 1)
     said = " ".join(texts).replace(scene.name, "")
     for name in scene.instances:
         assert re.search(rf"(?<!\w){name}(?!\w)", said)
     assert printout.warnings == ()
     bare = words(print_board(loaded("tabletop_six"), PrintSettings(names=False)), tmp_path)
     assert not re.search(r"\bmug\b", " ".join(bare))
+
+
+def small(scene: Scene, size: tuple[float, float], **markers: object) -> Scene:
+    return changed(scene, board=Board(size=size, markers=Markers(**markers)))
+
+
+@poppler
+def test_the_edge_is_told_and_the_origin_marked_where_they_are_on_paper(tmp_path: Path) -> None:
+    scene = small(load_scene("tabletop_six"), (0.297, 0.21), side=0.04)
+    whole = print_board(scene, PrintSettings(page="A3", height_map=False))
+    (text,) = words(whole, tmp_path)
+    assert text.count("edge of the board") == 4 and "origin" in text.split("The board's")[0]
+    (image,) = pages(whole, tmp_path, 300, "-gray")
+
+    def dark(x: float, y: float) -> bool:
+        u, v = whole.p_PQ(1, np.array([x, y])) / 0.0254 * 300
+        return bool(image[image.shape[0] - round(v), round(u)].max() < 120)
+
+    assert dark(0.005, 0.0) and dark(0.0, 0.005)  # the axes start at (0, 0) of the scene
+    assert not dark(0.005, 0.0012) and not dark(0.0012, 0.005) and not dark(-0.003, 0.0)
+    same = print_board(scene, PrintSettings(page="A4", height_map=False))
+    (text,) = words(same, tmp_path)
+    assert "edge of the board" not in text and "lies" in text
+    for page in ("A3", "A4"):
+        printout = print_board(scene, PrintSettings(page=page, height_map=False))
+        (image,) = pages(printout, tmp_path, 150, "-gray")
+        assert len(detect(image, scene.board.layout)) == len(scene.board.layout.ids)
+
+
+@poppler
+def test_nothing_strays_beyond_what_a_page_shows(tmp_path: Path) -> None:
+    """Around the part of the board, but for cut lines and words, a page is white."""
+    printout = printed("tabletop_six", "A4")
+    dpi = 130
+    image = pages(printout, tmp_path, dpi, "-gray", "-f", "5", "-l", "5")[0]
+    tile = printout.tiling.tiles[4]
+    low, high = (printout.p_PQ(5, np.array(p)) / 0.0254 * dpi for p in (tile.lower, tile.upper))
+    rows = slice(image.shape[0] - int(high[1]) + 100, image.shape[0] - int(low[1]) - 100)
+    edge = image[rows, round(high[0]) - 2 : round(high[0]) + 12, 0]
+    assert edge.min() > 250
+
+
+def test_a_board_that_only_margins_spread_over_pages() -> None:
+    """It fits on the page, less than the strips of rulers and words."""
+    scene = small(load_scene("tabletop_six"), (0.297, 0.21), side=0.06, spacing=0.005)
+    bare = PrintSettings(height_map=False)
+    printout = print_board(scene, bare)
+    assert len(printout.tiling.tiles) > 1
+    (said,) = printout.warnings
+    assert said.startswith("the board is no larger than the page, but takes 2 because of the mar")
+    margin, page = re.findall(r"--margin-mm (\S+) or --page (\S+) would do", said)[0]
+    for changes in ({"margin": float(margin) * 1e-3}, {"page": page}):
+        again = print_board(scene, dataclasses.replace(bare, **changes))
+        assert len(again.tiling.tiles) == 1 and again.warnings == ()
+    larger = print_board(changed(scene, board=Board()), bare)
+    assert len(larger.tiling.tiles) > 1 and larger.warnings == ()
 
 
 def test_the_same_bytes_and_no_scaling_by_the_viewer() -> None:
@@ -233,3 +292,17 @@ def test_what_is_beyond_the_board(tmp_path: Path) -> None:
 def test_settings_that_cannot_be(settings: dict[str, object], message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
         PrintSettings(**settings)
+
+
+def test_markers_at_the_edge_lack_white_around_them() -> None:
+    tiny = changed(
+        loaded("tabletop_six"),
+        instances=(),
+        board=Board(size=(0.1, 0.1), markers=Markers(side=0.1, count=(1, 1))),
+    )
+    assert print_board(tiny).warnings == (
+        "markers are 0.0 mm from the board's edge; cut out, on a dark table, they lack the white"
+        " around them that detectors need: leave 10.0 mm, by a larger board or smaller markers",
+    )
+    larger = changed(tiny, board=Board(size=(0.12, 0.12), markers=tiny.board.markers))
+    assert not print_board(larger).warnings

@@ -4,7 +4,9 @@
     /usr/bin/python3 robot.py show PLAN.json    publishes images, writes down what comes back
 
 The plan has `topics`, `steps` and `answers`, a folder. In each step one image goes out again and
-again, with one stamp, until everything that the step waits for has come back.
+again, each time a nanosecond later, until everything that the step waits for has come back. What is
+kept of a node's answers belongs to one image, told by its stamp: a node that has no camera_info yet
+also answers, without a pose.
 """
 
 import json
@@ -86,12 +88,10 @@ class Robot:
             self.keep("tf/" + transform.child_frame_id, entry)
 
     def take_status(self, message, key):
-        self.keep(key, {"stamp": None, "text": message.data})
+        self.keep(key, {"text": message.data})
 
     def play(self, number, step):
         """Publishes until all is there; returns the answers of this step."""
-        rospy = self.rospy
-        stamp = rospy.Time(*step["stamp"])
         bgr = self.cv2.imread(step["image"])
         if step["encoding"] == "mono8":
             bgr = self.cv2.cvtColor(bgr, self.cv2.COLOR_BGR2GRAY)
@@ -104,33 +104,45 @@ class Robot:
             image = self.bridge.cv2_to_imgmsg(converted, step["encoding"])
         compressed = self.bridge.cv2_to_compressed_imgmsg(bgr, "png")
         info = self.CameraInfo(**step["camera_info"])
-        for message in (image, compressed, info):
-            message.header.stamp = stamp
-            message.header.frame_id = step["frame"]
         with self.lock:
             self.answers = {}
+        seconds, nanoseconds = step["stamp"]
+        sent = []
         deadline = time.time() + PATIENCE
         while time.time() < deadline:
+            sent.append([seconds, nanoseconds + len(sent)])
+            for message in (image, compressed, info):
+                message.header.stamp = self.rospy.Time(*sent[-1])
+                message.header.frame_id = step["frame"]
             self.infos.publish(info)
             self.images.publish(image)
             self.compressed.publish(compressed)
             time.sleep(PERIOD)
-            found = self.found(step)
+            found = self.found(step, sent)
             if found is not None:
-                return self.written(number, found)
+                return dict(self.written(number, found), sent=sent)
         with self.lock:
             return {"missing": [k for k in step["wait"] if k not in self.answers]}
 
-    def found(self, step):
-        """The last answer to this step's stamp under each key, or None if one is missing."""
-        found = {}
+    def found(self, step, sent):
+        """Answers under all keys of this step, or None if some are missing: a status with the text
+        that is waited for, the rest by node from the last image to which it gave all of them."""
+        found, nodes = {}, {}
         with self.lock:
             for key in step["wait"]:
-                for answer in self.answers.get(key, []):
-                    if answer["stamp"] == step["stamp"] or step["text"] in answer.get("text", ""):
-                        found[key] = answer
-                if key not in found:
+                if key.endswith("/status"):
+                    texts = [a for a in self.answers.get(key, []) if step["text"] in a["text"]]
+                    if not texts:
+                        return None
+                    found[key] = texts[-1]
+                else:
+                    nodes.setdefault(key.split("/")[0], []).append(key)
+            for keys in nodes.values():
+                given = {k: {tuple(a["stamp"]): a for a in self.answers.get(k, [])} for k in keys}
+                whole = [s for s in map(tuple, sent) if all(s in given[k] for k in keys)]
+                if not whole:
                     return None
+                found.update((k, given[k][whole[-1]]) for k in keys)
         return found
 
     def written(self, number, found):
