@@ -22,6 +22,11 @@ NO_COLOUR = (204, 204, 204, 255)
 REFERRING = (".obj", ".gltf")
 """Mesh formats that refer to other files, such as materials and textures."""
 
+TEXT_ONLY = (".obj", ".off")
+"""Mesh formats that have no binary form here."""
+
+NEITHER = "its contents are neither text nor a known binary form"
+
 STL_HEADER, STL_TRIANGLE = 84, 50
 """Bytes of a binary STL file's header with the number of triangles, and of a triangle."""
 
@@ -123,14 +128,25 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     except Exception as error:  # the readers raise whatever their parsing stumbles over
         reason = str(error).strip().splitlines() or [type(error).__name__]
         if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
-            reason = ["its contents are neither text nor a known binary form"]
-        raise MeshError(
-            f"{path}: not a readable {path.suffix} mesh (cut off or damaged?):"
-            f" {_missing_bytes(path) or reason[0]}"
-        ) from error
+            reason = [NEITHER]
+        raise _unreadable(path, _missing_bytes(path) or reason[0]) from error
     if mesh is None:
+        # Where a package that guesses encodings is installed, trimesh takes any bytes for a text.
+        damage = _missing_bytes(path) or _not_text(path)
+        if damage:
+            raise _unreadable(path, damage)
         raise MeshError(f"{path}: the mesh file has no triangles")
     return mesh
+
+
+def _unreadable(path: Path, reason: str) -> MeshError:
+    return MeshError(f"{path}: not a readable {path.suffix} mesh (cut off or damaged?): {reason}")
+
+
+def _not_text(path: Path) -> str:
+    """What is wrong with a file of a text format that holds something else, or nothing."""
+    binary = path.suffix.lower() in TEXT_ONLY and b"\0" in path.read_bytes()
+    return NEITHER if binary else ""
 
 
 def _missing_bytes(path: Path) -> str:

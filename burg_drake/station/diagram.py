@@ -164,9 +164,7 @@ def build_station_diagram(
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
-    if markers := cameras or meshcat is not None:
-        scene.require_markers()
-    add_board(plant, scene.board, station, markers=markers)
+    add_board(plant, scene.board, station, markers=cameras or meshcat is not None)
     free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
     fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
     for name, body in fixed.items():
