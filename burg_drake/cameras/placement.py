@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,9 +76,7 @@ def check_placement(
         estimate = BoardPose(scene.board, intrinsics, scale).estimate(color)
     instances, reason = _measured(scene, color, depth, intrinsics, estimate, scale)
     return PlacementCheck(
-        scene=CheckedScene(
-            name=scene.name, path=str(Path(scene.path).absolute()), content=scene.content
-        ),
+        scene=_scene(scene),
         taken=datetime.now().astimezone().isoformat(timespec="seconds"),
         method="silhouette" if depth is None else "depth",
         image=image_source or CheckedImage(content=content_hash(color)),
@@ -111,10 +108,9 @@ def _measured(
         names = (*scene.instances, *scene.background)
         return {name: unseen(scene, name, aligner) for name in names}, aligner
     shapes = scene_shapes(scene)
-    unit: Literal["pixels", "metres"] = "pixels" if depth is None else "metres"
     located = locate(aligner, shapes)
     return {
-        name: placement_of(scene, name, shapes[name], found, estimate.covariance, unit)
+        name: placement_of(scene, name, shapes[name], found, estimate.covariance, aligner.rough)
         for name, found in located.items()
     }, ""
 

@@ -72,6 +72,8 @@ class Aligner(Protocol):
     """By how much a place must be rated higher than any other to be sure."""
     strict: bool
     """What stands beside the object speaks against a place."""
+    rough: float
+    """Root mean square that the alignment of the right object does not leave."""
 
     def align(
         self, shape: Shape, q: Array, others: Array, *, far: bool = True, turn: bool = True

@@ -65,6 +65,10 @@ def check_depth(depth: NDArray, intrinsics: Intrinsics) -> NDArray[np.float32]:
     return clean
 
 
+ROUGH = 0.005
+"""What the fit of the right object does not leave [m]."""
+
+
 class DepthAligner:
     """Aligns objects with one depth image.
 
@@ -87,7 +91,7 @@ class DepthAligner:
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
         spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * LEAST_NOISE
         self._noise = max(spread, LEAST_NOISE)
-        self.fine = self._noise
+        self.fine, self.rough = self._noise, ROUGH
         self._stands = self._valid & (height > HEIGHT * self._noise)
         evidence = np.clip(height / (HEIGHT * self._noise), 0.0, 1.0) * 2.0 - 1.0
         self.evidence = np.where(self._valid, evidence, 0.0)

@@ -43,6 +43,11 @@ SHIFTED, TWISTED = 0.4, 0.2
 ends against each other, as shares of the residual, which is `FINE` at least."""
 
 
+ROUGH = 0.35
+"""What the fit of the right object does not leave in a sharp photo [pixels]; in a blurred one it is
+as many times as much as the blur's standard deviation has pixels."""
+
+
 class SilhouetteAligner:
     """Aligns objects with one photo.
 
@@ -56,6 +61,7 @@ class SilhouetteAligner:
         self.view = view
         self.convincing, self.better, self.clearly, self.strict = 2.8, 0.15, 0.08, False
         self.evidence = picture.evidence
+        self.rough = ROUGH * max(1.0, picture.blur)
         self.fine = FINE
         self._image: NDArray[np.float32] = np.ascontiguousarray(image, dtype=np.float32)
         self._picture = picture

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
@@ -26,8 +26,6 @@ SUPPORT = 0.45
 """Mean evidence in the silhouette from which on it is filled."""
 SPILL = 0.35
 """Share around the silhouette that may be something else: a shadow, a hand, a cable."""
-ROUGH = {"pixels": 0.35, "metres": 0.005}
-"""Root mean square that the fit of the right object does not leave."""
 VAGUE = np.deg2rad(3.0)
 """Standard deviation of the angle above which an angle is not worth much [rad]."""
 LOOSE = 0.003
@@ -40,7 +38,7 @@ def placement_of(
     shape: Shape,
     found: Located,
     camera: Array,
-    unit: Literal["pixels", "metres"],
+    rough: float,
 ) -> Placement:
     """The entry of an object.
 
@@ -50,7 +48,7 @@ def placement_of(
         shape: of the object.
         found: what was found.
         camera: (6, 6) covariance of the camera's pose, NaN if unknown.
-        unit: of the alignment's residual.
+        rough: residual of the alignment from which on it is another object's.
     """
     missing = _missing(found)
     if missing or found.alignment is None:
@@ -58,7 +56,7 @@ def placement_of(
     alignment = found.alignment
     q, spread = alignment.q, alignment.spread(camera)
     deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    reason = _doubt(shape, found, deviation, unit)
+    reason = _doubt(shape, found, deviation, rough)
     status: Status = "uncertain" if reason else "measured"
     residual = alignment.residual
     angle = float((q[2] + np.pi) % (2.0 * np.pi) - np.pi)
@@ -97,11 +95,11 @@ def _missing(found: Located) -> str:
     if found.seen < ENOUGH:
         return "other objects hide it"
     if found.alignment is None or found.support < SUPPORTED:
-        return f"nothing like it stands within {1e3 * RANGE:.0f} mm of its target"
+        return f"nothing like it was found within {1e3 * RANGE:.0f} mm of its target"
     return ""
 
 
-def _doubt(shape: Shape, found: Located, deviation: Array, unit: str) -> str:
+def _doubt(shape: Shape, found: Located, deviation: Array, rough: float) -> str:
     """What is doubtful about a measurement; empty if nothing is."""
     alignment = found.alignment
     assert alignment is not None
@@ -114,7 +112,7 @@ def _doubt(shape: Shape, found: Located, deviation: Array, unit: str) -> str:
         return (
             "the board is seen where it should hide it: is it another object, or in another pose?"
         )
-    if alignment.residual > ROUGH[unit]:
+    if alignment.residual > rough:
         return "its outline does not quite fit: is it another object, or in another pose?"
     if found.spill > SPILL:
         return "something stands out beside it: is it another object, or in another pose?"

@@ -72,7 +72,7 @@ def test_rendered_objects_are_measured(scene: Scene, photo: Photo, method: str) 
             assert abs(np.rad2deg(found.angle) - turn) < 0.6, name
     banana = check.instances["banana"]
     assert (banana.status, banana.displacement) == ("not_seen", None)
-    assert banana.reason == "nothing like it stands within 50 mm of its target"
+    assert banana.reason == "nothing like it was found within 50 mm of its target"
 
 
 def test_without_a_board_nothing_is_measured_and_the_reason_is_said(scene: Scene) -> None:
