@@ -117,7 +117,7 @@ def _assigned(
     view, evidence = aligner.view, aligner.evidence.copy()
     for shape, q in placed.values():
         _cover(view, shape, q, evidence)
-    waiting = {name: find(view, shape, evidence) for name, shape in shapes.items()}
+    waiting = {name: _candidates(view, shape, evidence) for name, shape in shapes.items()}
     assigned: dict[str, list[Array]] = {}
     while waiting:
         rated = {n: _rating(view, shapes[n], found, evidence) for n, found in waiting.items()}
@@ -128,8 +128,16 @@ def _assigned(
         window = _cover(view, shapes[name], assigned[name][0], evidence)
         for other, found in waiting.items():
             if _overlap(window, view.window(shapes[other], found[0].q, 20.0)):
-                waiting[other] = find(view, shapes[other], evidence)
+                waiting[other] = _candidates(view, shapes[other], evidence)
     return assigned
+
+
+def _candidates(view: View, shape: Shape, evidence: Array) -> list[Found]:
+    """Where an object may be; if it is not near its target's angle, the best of all first."""
+    found = find(view, shape, evidence)
+    if _rating(view, shape, found, evidence) >= WORTH_A_TRY:
+        return found
+    return sorted(found, key=lambda f: -_support(view, shape, f.q, evidence, None)[0])
 
 
 def _rating(view: View, shape: Shape, found: list[Found], evidence: Array) -> float:

@@ -20,7 +20,6 @@ RANGE = 0.05
 """How far from its target an object is looked for [m]."""
 NEAR_TURNS = np.deg2rad((0.0, -10.0, 10.0, -20.0, 20.0, -30.0, 30.0))
 FAR_TURNS = np.deg2rad(np.arange(50.0, 311.0, 20.0))
-SLENDER_TURNS = np.deg2rad(np.arange(40.0, 321.0, 8.0))
 """Angles that are tried, near the target's, and far from it [rad]."""
 STEP = np.deg2rad(5.0)
 """Second, finer steps of the angle."""
@@ -56,7 +55,7 @@ def find(view: View, shape: Shape, evidence: Array) -> list[Found]:
     search = Search(view, shape, evidence)
     if shape.symmetric:
         return [search.slide(0.0)]
-    return search.best(NEAR_TURNS) + search.best(SLENDER_TURNS if shape.slender else FAR_TURNS)
+    return search.best(NEAR_TURNS) + search.best(FAR_TURNS)
 
 
 class Search:

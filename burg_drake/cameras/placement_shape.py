@@ -28,8 +28,6 @@ ROUND = 0.01
 about a pixel of a camera 0.8 m away, which no estimate of an angle should hang on."""
 ROUND_SHARE = 0.98
 """Share of the surface that must be within `ROUND`."""
-SLENDER = 0.3
-"""Width over length below which an object is slender: few degrees move its ends by its width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +57,6 @@ class Shape:
     def p_SV(self) -> Array:
         """(V, 3) vertices at the target in S [m]."""
         return transform_points(self.X_SO, self.vertices)
-
-    @cached_property
-    def slender(self) -> bool:
-        """Whether it is long and narrow from above."""
-        away = self.surface[0][:, :2] - self.p_SR[:2]
-        _, axes = np.linalg.eigh(away.T @ away)
-        width, length = np.ptp(away @ axes, axis=0)
-        return bool(width < SLENDER * length)
 
     @cached_property
     def outline(self) -> MeshOutline:

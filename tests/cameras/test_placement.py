@@ -143,3 +143,20 @@ def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_han
         assert np.rad2deg(seen.angle) == pytest.approx(turn, abs=0.5)
     assert hidden.status == "uncertain"
     assert "turned by another" in hidden.reason or "another place" in hidden.reason
+
+
+@needs_renderer
+def test_a_slender_object_turned_far_is_found() -> None:
+    whole = load_scene("tabletop_six")
+    kept = tuple(i for i in whole.document.instances if i.object == "screwdriver")
+    scene = Scene(replace(whole.document, instances=kept), whole.library, whole.path)
+    (name,) = scene.instances
+    X_SO = scene_shapes(scene)[name].placed(np.array([0.005, 0.005, np.deg2rad(90.0)]))
+    taken = ScenePhotographer(scene).take(X_SC, INTRINSICS, {name: X_SO})
+    color = np.asarray(taken.color, dtype=np.uint8)
+    found = check_placement(scene, color, INTRINSICS).instances[name]
+    assert found.status == "measured", found.reason
+    assert found.displacement is not None
+    assert found.angle is not None
+    assert np.hypot(found.displacement[0] - 0.005, found.displacement[1] - 0.005) < 6e-4
+    assert abs(np.rad2deg(found.angle) - 90.0) < 0.6
