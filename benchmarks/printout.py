@@ -2,9 +2,9 @@
 
     python benchmarks/printout.py [--dpi 300]
 
-Prints scenes on pages, rasterises the PDF with `pdftoppm` (poppler-utils), detects the markers with
-OpenCV, and compares every corner and side with the scene's layout. Beside it: what a detector finds
-of the whole board in pictures of a camera: on our sheet, on one without objects, and on one that is
+Prints scenes on pages, rasterises the PDF with PDFium (pypdfium2), detects the markers with OpenCV,
+and compares every corner and side with the scene's layout. Beside it: what a detector finds of the
+whole board in pictures of a camera: on our sheet, on one without objects, and on one that is
 painted the way of BURG-Toolkit, with an opaque height map over the markers.
 """
 
@@ -12,13 +12,12 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import subprocess
-import tempfile
+import math
 import time
-from pathlib import Path
 
 import cv2
 import numpy as np
+import pypdfium2
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
@@ -93,13 +92,15 @@ def report_print(kind: str, scene: Scene, page: str, dpi: int) -> None:
 
 
 def pages_of(pdf: bytes, dpi: int) -> list[Image]:
-    """Pages of a PDF in grey."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "board.pdf"
-        file.write_bytes(pdf)
-        subprocess.run(["pdftoppm", "-r", str(dpi), "-gray", file, f"{folder}/page"], check=True)
-        images = sorted(Path(folder).glob("page*.pgm"))
-        return [np.asarray(cv2.imread(str(image), cv2.IMREAD_GRAYSCALE)) for image in images]
+    """Pages of a PDF in grey, lower left corners of page and pixels alike."""
+    per_point, images = dpi / 72, []
+    with pypdfium2.PdfDocument(pdf) as document:
+        for page in document:
+            # PDFium stretches a page to whole pixels; a page of as many is not stretched.
+            pixels = [math.ceil(side * per_point) for side in page.get_size()]
+            page.set_mediabox(0, 0, *((side - 1e-3) / per_point for side in pixels))
+            images.append(page.render(scale=per_point, grayscale=True).to_numpy().copy())
+    return images
 
 
 def detected(image: Image, layout: MarkerLayout) -> dict[int, Array]:

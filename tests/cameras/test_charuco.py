@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,11 +13,11 @@ from burg_drake.cameras.charuco import CharucoTarget, CharucoView, find_target
 from burg_drake.cameras.charuco_image import target_image
 from burg_drake.cameras.charuco_sheet import upper_left, write_target
 from burg_drake.cameras.frame_source import Image
-from burg_drake.cameras.image_file import read_image
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.core.errors import BurgError, InvalidInputError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.printout.board_printout import PrintSettings
+from tests.printout.paper import rasterised
 
 TARGET = CharucoTarget()
 CAMERA = Intrinsics(
@@ -142,13 +141,6 @@ def test_targets_that_cannot_be(target: dict[str, object], message: str) -> None
 # --- on paper --------------------------------------------------------------------------------
 
 
-def rasterised(pdf: Path, dpi: int = 300) -> np.ndarray:
-    stem = str(pdf.with_suffix(""))
-    subprocess.run(["pdftoppm", "-r", str(dpi), "-png", str(pdf), stem], check=True)
-    (page,) = pdf.parent.glob(f"{pdf.stem}-*.png")
-    return np.asarray(read_image(page))
-
-
 @pytest.mark.parametrize(
     ("target", "settings"),
     [
@@ -165,15 +157,14 @@ def test_the_printed_target_has_its_true_size(
 ) -> None:
     """Marker corners on the page, found by OpenCV, are those of the board in millimetres."""
     paper = write_target(target, tmp_path / "target.pdf", settings)
-    page = rasterised(tmp_path / "target.pdf")
+    (page,) = rasterised((tmp_path / "target.pdf").read_bytes(), 300)
     view = find_target(page, target)
     assert isinstance(view, CharucoView)
     assert len(view.ids) == len(target.p_TQ)  # every corner, so every marker too
     per_metre = 300 / 0.0254
     stretch = 0.1 / np.array(settings.measured)
-    height = paper.height * stretch[1]  # the page of pixels is a part of one higher
     place = upper_left(target, paper)[None] + target.p_TQ[view.ids, :2] * [1.0, -1.0]
-    found = (view.corners + 0.5) / per_metre * [1.0, -1.0] + [0.0, height]
+    found = (view.corners + 0.5) / per_metre * [1.0, -1.0] + [0.0, len(page) / per_metre]
     assert np.abs(found / stretch - place).max() < 0.06e-3
     sizes = np.ptp(found / stretch, axis=0) - np.ptp(target.p_TQ[:, :2], axis=0)
     assert np.abs(sizes).max() < 0.03e-3

@@ -1,13 +1,10 @@
-"""Printed boards: rasterised by poppler, detected by OpenCV, measured."""
+"""Printed boards: rasterised by PDFium, detected by OpenCV, measured."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import re
-import shutil
-import subprocess
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,10 +15,8 @@ from burg_drake.core.schema import Pose
 from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
 from burg_drake.scene.markers import MarkerLayout, Markers, marker_dictionary
 from burg_drake.scene.scene import Board, Instance, Scene, load_scene
+from tests.printout.paper import rasterised, words
 
-poppler = pytest.mark.skipif(
-    shutil.which("pdftoppm") is None, reason="needs pdftoppm of poppler-utils"
-)
 BURG = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019, count=(7, 5)))
 
 
@@ -44,22 +39,6 @@ def changed(scene: Scene, **changes: object) -> Scene:
     return Scene(document, scene.library, scene.path)
 
 
-def pages(printout: Printout, folder: Path, dpi: int, *options: str) -> list[np.ndarray]:
-    file = folder / "board.pdf"
-    printout.save(file)
-    subprocess.run(["pdftoppm", "-r", str(dpi), *options, file, folder / "page"], check=True)
-    return [cv2.imread(str(image)) for image in sorted(folder.glob("page*"))]
-
-
-def words(printout: Printout, folder: Path) -> list[str]:
-    """Text of each page, spaces made single."""
-    printout.save(folder / "board.pdf")
-    found = subprocess.run(
-        ["pdftotext", folder / "board.pdf", "-"], capture_output=True, text=True, check=True
-    )
-    return [" ".join(page.split()) for page in found.stdout.split("\f")[:-1]]
-
-
 def detect(image: np.ndarray, layout: MarkerLayout) -> dict[int, np.ndarray]:
     """Corners (4, 2) [px] by id; pixel centres at whole numbers."""
     parameters = cv2.aruco.DetectorParameters()
@@ -79,7 +58,6 @@ def measured_corners(image: np.ndarray, layout: MarkerLayout, dpi: int) -> dict[
     }
 
 
-@poppler
 @pytest.mark.parametrize(
     ("scene", "page", "dpi", "tolerance"),
     [
@@ -88,14 +66,12 @@ def measured_corners(image: np.ndarray, layout: MarkerLayout, dpi: int) -> dict[
         ("burg", "A3", 150, 2e-4),
     ],
 )
-def test_every_marker_of_every_page(
-    scene: str, page: str, dpi: int, tolerance: float, tmp_path: Path
-) -> None:
+def test_every_marker_of_every_page(scene: str, page: str, dpi: int, tolerance: float) -> None:
     """Each marker is on one page, is found, is where it belongs and as long as it should be; so
     pages that are laid over each other by their alignment marks make the board."""
     printout, layout = printed(scene, page), loaded(scene).board.layout
     seen: list[int] = []
-    images = pages(printout, tmp_path, dpi, "-gray")
+    images = rasterised(printout.pdf, dpi)
     assert len(images) == len(printout.tiling.tiles)
     for number, image in enumerate(images, start=1):
         for i, p_PQ in measured_corners(image, layout, dpi).items():
@@ -107,20 +83,19 @@ def test_every_marker_of_every_page(
     assert sorted(seen) == layout.ids.tolist()
 
 
-@poppler
-def test_a_printer_that_scales(tmp_path: Path) -> None:
+def test_a_printer_that_scales() -> None:
     """What is drawn larger by 100/98 along x and 100/99 along y has its true size when the printer
     makes it smaller by as much; rulers, too."""
     scene, dpi = load_scene("tabletop_six"), 300
     settings = PrintSettings(page="A3", measured=(0.098, 0.099))
     printout, shrink = print_board(scene, settings), np.array([0.98, 0.99])
-    image = pages(printout, tmp_path, dpi, "-gray", "-l", "1")[0]
+    (image,) = rasterised(printout.pdf, dpi, only=[1])
     found = measured_corners(image, scene.board.layout, dpi)
     assert len(found) >= 12
     for p_PQ in found.values():
         sides = np.linalg.norm((p_PQ - np.roll(p_PQ, 1, axis=0)) * shrink, axis=1)
         assert np.abs(sides - 0.045).max() < 5e-5
-    dark = image[..., 0] < 140
+    dark = image < 140
     lower = dark[int(0.93 * len(dark)) :]  # the ruler along x; the one along y stands above
     row = max(lower, key=longest_run)
     column = max(dark[:, : dpi // 2].T, key=longest_run)
@@ -133,13 +108,12 @@ def longest_run(line: np.ndarray) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-@poppler
-def test_height_map_on_paper(tmp_path: Path) -> None:
+def test_height_map_on_paper() -> None:
     """Under the mug's body the paper is darker than under its handle, and white beside both; white
     cells stay far brighter than black ones everywhere."""
     scene, dpi = load_scene("tabletop_six"), 100
     printout = print_board(scene, PrintSettings(page="A1", names=False))
-    image = cv2.cvtColor(pages(printout, tmp_path, dpi)[0], cv2.COLOR_BGR2GRAY)
+    (image,) = rasterised(printout.pdf, dpi)
     X_SO = scene.X_SO("mug")
 
     def grey(x: float, y: float, z: float = 0.0) -> int:
@@ -169,11 +143,10 @@ def test_height_map_on_paper(tmp_path: Path) -> None:
             assert value < 30 if is_black else value > 165
 
 
-@poppler
-def test_words_on_every_page(tmp_path: Path) -> None:
+def test_words_on_every_page() -> None:
     scene = load_scene("tabletop_twelve")
     printout = printed("tabletop_twelve", "A4")
-    texts = words(printout, tmp_path)
+    texts = words(printout.pdf)
     for k, text in enumerate(texts, start=1):
         assert f"page {k} of {len(texts)}" in text and "tabletop_twelve" in text
         assert "Print at 100 %, not fitted to the page: both rulers must measure 100 mm" in text
@@ -188,7 +161,7 @@ def test_words_on_every_page(tmp_path: Path) -> None:
     for name in scene.instances:
         assert re.search(rf"(?<!\w){name}(?!\w)", said)
     assert printout.warnings == ()
-    bare = words(print_board(loaded("tabletop_six"), PrintSettings(names=False)), tmp_path)
+    bare = words(print_board(loaded("tabletop_six"), PrintSettings(names=False)).pdf)
     assert not re.search(r"\bmug\b", " ".join(bare))
 
 
@@ -196,39 +169,37 @@ def small(scene: Scene, size: tuple[float, float], **markers: object) -> Scene:
     return changed(scene, board=Board(size=size, markers=Markers(**markers)))
 
 
-@poppler
-def test_the_edge_is_told_and_the_origin_marked_where_they_are_on_paper(tmp_path: Path) -> None:
+def test_the_edge_is_told_and_the_origin_marked_where_they_are_on_paper() -> None:
     scene = small(load_scene("tabletop_six"), (0.297, 0.21), side=0.04)
     whole = print_board(scene, PrintSettings(page="A3", height_map=False))
-    (text,) = words(whole, tmp_path)
+    (text,) = words(whole.pdf)
     assert text.count("edge of the board") == 4 and "origin" in text.split("The board's")[0]
-    (image,) = pages(whole, tmp_path, 300, "-gray")
+    (image,) = rasterised(whole.pdf, 300)
 
     def dark(x: float, y: float) -> bool:
         u, v = whole.p_PQ(1, np.array([x, y])) / 0.0254 * 300
-        return bool(image[image.shape[0] - round(v), round(u)].max() < 120)
+        return bool(image[image.shape[0] - round(v), round(u)] < 120)
 
     assert dark(0.005, 0.0) and dark(0.0, 0.005)  # the axes start at (0, 0) of the scene
     assert not dark(0.005, 0.0012) and not dark(0.0012, 0.005) and not dark(-0.003, 0.0)
     same = print_board(scene, PrintSettings(page="A4", height_map=False))
-    (text,) = words(same, tmp_path)
+    (text,) = words(same.pdf)
     assert "edge of the board" not in text and "lies" in text
     for page in ("A3", "A4"):
         printout = print_board(scene, PrintSettings(page=page, height_map=False))
-        (image,) = pages(printout, tmp_path, 150, "-gray")
+        (image,) = rasterised(printout.pdf, 150)
         assert len(detect(image, scene.board.layout)) == len(scene.board.layout.ids)
 
 
-@poppler
-def test_nothing_strays_beyond_what_a_page_shows(tmp_path: Path) -> None:
+def test_nothing_strays_beyond_what_a_page_shows() -> None:
     """Around the part of the board, but for cut lines and words, a page is white."""
     printout = printed("tabletop_six", "A4")
     dpi = 130
-    image = pages(printout, tmp_path, dpi, "-gray", "-f", "5", "-l", "5")[0]
+    (image,) = rasterised(printout.pdf, dpi, only=[5])
     tile = printout.tiling.tiles[4]
     low, high = (printout.p_PQ(5, np.array(p)) / 0.0254 * dpi for p in (tile.lower, tile.upper))
     rows = slice(image.shape[0] - int(high[1]) + 100, image.shape[0] - int(low[1]) - 100)
-    edge = image[rows, round(high[0]) - 2 : round(high[0]) + 12, 0]
+    edge = image[rows, round(high[0]) - 2 : round(high[0]) + 12]
     assert edge.min() > 250
 
 
@@ -258,8 +229,7 @@ def test_the_same_bytes_and_no_scaling_by_the_viewer() -> None:
     assert print_board(scene, PrintSettings(height_map=False)).pdf != first
 
 
-@poppler
-def test_what_is_beyond_the_board(tmp_path: Path) -> None:
+def test_what_is_beyond_the_board() -> None:
     scene = load_scene("tabletop_six")
     away = Instance(name="stray", object="can", X_SO=Pose((3.0, 0.1, 0.0)))
     over = Instance(name="over", object="bowl", X_SO=Pose((0.3, 0.41, 0.0)))
@@ -270,10 +240,10 @@ def test_what_is_beyond_the_board(tmp_path: Path) -> None:
     assert "'stray' is out of bounds: 2.44 m over the right edge" in stray
     assert "'over' is out of bounds: 70.0 mm over the upper edge" in bowl
     assert "of 'shelf' lie in the margin of the page; larger pages have room" in rest
-    (text,) = words(printout, tmp_path)
+    (text,) = words(printout.pdf)
     for said in ("stray: 2.44 m beyond the edge", "over: 70 mm beyond the edge", "shelf (fixed)"):
         assert said in text
-    (image,) = pages(printout, tmp_path, 150)
+    (image,) = rasterised(printout.pdf, 150, grey=False)
     assert len(detect(image, fixed.board.layout)) == 54
     # The arrow to the bowl, in the only red of the sheet, points up at the place it names.
     u, v = printout.p_PQ(1, np.array([0.3, 0.42 - 0.0235])) / 0.0254 * 150

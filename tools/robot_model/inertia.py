@@ -27,8 +27,13 @@ class Inertia:
     products: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+LENGTH_DIGITS, INERTIA_DIGITS = 12, 15
+"""Decimals of metres and kg m^2: sums differ in the last digits from processor to processor, the
+files that are written must not."""
+
+
 def box_inertia(boxes: Sequence[Box], mass: float) -> Inertia:
-    """Mass properties of boxes of one density; where boxes overlap both count.
+    """Mass properties of boxes of one density, rounded; where boxes overlap both count.
 
     Args:
         boxes: in the link frame; turned about x only.
@@ -46,7 +51,8 @@ def box_inertia(boxes: Sequence[Box], mass: float) -> Inertia:
         r = centre - p_BBcm
         I_Bcm += R_BG @ np.diag(m / 12.0 * (squares.sum() - squares)) @ R_BG.T
         I_Bcm += m * (r @ r * np.eye(3) - np.outer(r, r))
-    x, y, z = (float(v) for v in p_BBcm)
-    xx, yy, zz = (float(v) for v in np.diag(I_Bcm))
-    xy, xz, yz = (float(I_Bcm[i, j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+    x, y, z = (np.round(p_BBcm, LENGTH_DIGITS) + 0.0).tolist()
+    I_Bcm = np.round(I_Bcm, INERTIA_DIGITS) + 0.0
+    xx, yy, zz = np.diag(I_Bcm).tolist()
+    xy, xz, yz = I_Bcm[[0, 0, 1], [1, 2, 2]].tolist()
     return Inertia(mass, (x, y, z), (xx, yy, zz), (xy, xz, yz))

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the programs that some tests hold burg_drake against, where apt is at hand and needs no
-# password: pdftoppm for printouts, ROS 1 for the ROS node. Without them those tests skip and say so.
+# password: ROS 1 for the ROS node. Without them those tests skip and say so.
 set -euo pipefail
 # shellcheck source=tools/setup/apt.sh
 . "$(dirname "$0")/apt.sh"
@@ -19,6 +19,5 @@ want() {
     say "no $name: tests that need it skip (missing: ${missing[*]})"
 }
 
-want pdftoppm poppler-utils
 want "ROS 1" python3-rospy python3-rosmaster python3-cv-bridge python3-sensor-msgs \
   python3-geometry-msgs python3-tf2-msgs
