@@ -18,6 +18,7 @@ from burg_drake.apps.arguments import (
     seed,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
+from burg_drake.apps.retries import add_retry_failed, how_to_retry
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
@@ -93,6 +94,7 @@ def add_to(verbs: Any) -> None:
         " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
         " there is no arm)",
     )
+    add_retry_failed(parser, "grasps")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
@@ -128,6 +130,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         workers=arguments.workers,
         table=arguments.table,
         mode=arguments.mode,
+        retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
     )
     print_summary(run)
@@ -136,7 +139,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     if run.failures:
         print(
             f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
-            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path}",
+            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
+            f" {how_to_retry(len(run.interrupted), len(run.failures))}",
             file=sys.stderr,
         )
         return 1

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_verb, not_negative, positive_int, seed
+from burg_drake.apps.retries import add_retry_failed, how_to_retry
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.probes import RobustnessSettings
@@ -86,6 +87,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
     )
+    add_retry_failed(parser, "tests")
     parser.add_argument("--quiet", action="store_true", help="no progress")
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
@@ -107,6 +109,7 @@ def run_robustness(arguments: argparse.Namespace) -> int:
         settings=settings,
         out=arguments.output,
         workers=arguments.workers,
+        retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
     )
     Console().print(robustness_view(found.grasps, settings))
@@ -115,7 +118,7 @@ def run_robustness(arguments: argparse.Namespace) -> int:
         id, reason = next(iter(found.failures.items()))
         print(
             f"burg-drake: {len(found.failures)} tests could not be simulated, such as {id}:"
-            f" {reason}",
+            f" {reason}; {how_to_retry(found.interrupted, len(found.failures))}",
             file=sys.stderr,
         )
         return 1

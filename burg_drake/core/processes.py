@@ -12,6 +12,9 @@ import subprocess
 import sys
 from multiprocessing.connection import Connection, Pipe
 
+FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
+"""Signals that end a process from outside: the system when memory runs out, a batch system, a user.
+All others (SIGSEGV, SIGABRT) are of its own making, and would come again."""
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
 }
@@ -62,5 +65,12 @@ def cause_of_death(process: subprocess.Popen[bytes], last_words: str = "") -> st
     """Why a worker process ended, in half a sentence; waits for its end."""
     code = process.wait()
     if code < 0:
-        return f"the worker process was ended by {signal.Signals(-code).name}"
+        name = signal.Signals(-code).name
+        outside = " from outside" if was_ended_from_outside(process) else ""
+        return f"the worker process was ended{outside} by {name}"
     return f"the worker process ended: {last_words or f'exit code {code}'}"
+
+
+def was_ended_from_outside(process: subprocess.Popen[bytes]) -> bool:
+    """Whether a worker process was ended by one of `FROM_OUTSIDE`; waits for its end."""
+    return -process.wait() in FROM_OUTSIDE

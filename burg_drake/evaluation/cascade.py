@@ -24,7 +24,7 @@ from burg_drake.core.processes import default_workers
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
-from burg_drake.evaluation.candidates import Candidates, given_candidates
+from burg_drake.evaluation.candidates import Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
@@ -75,6 +75,7 @@ def evaluate(
     workers: int | None = None,
     table: TableFormat = "csv",
     mode: Mode | None = None,
+    retry_failed: bool = False,
     progress: bool | Listener = True,
 ) -> Run:
     """Judges grasps and writes a run.
@@ -82,7 +83,8 @@ def evaluate(
     Results do not depend on the number of workers or on the order in which they finish. A grasp
     that Drake cannot simulate ends as `simulation_failed`, and the others go on. An interrupted
     call loses nothing that was judged; the same call goes on from there, and returns at once when
-    nothing is left to do.
+    nothing is left to do. It tries those grasps again whose worker process was ended from outside,
+    for example because the memory ran out.
 
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
@@ -100,6 +102,7 @@ def evaluate(
         mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
             execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
             the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
+        retry_failed: try all grasps again that an earlier call could not simulate.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
@@ -144,7 +147,8 @@ def evaluate(
             reporter,
         )
         make_judge = StationJudgeFactory(scene, station, engine, mode)
-        run = _judge(run, make_judge, journal, workers, reporter)
+        left = _open_grasps(run, retry_failed)
+        run = _judge(run, left, make_judge, journal, workers, reporter)
         return _finish(run, table)
 
 
@@ -247,19 +251,27 @@ def _require_sound(scene: Scene, station: Station, mode: Mode) -> None:
         require_usable_arm(scene, station)
 
 
+def _open_grasps(run: Run, retry_failed: bool) -> list[Candidate]:
+    """Grasps without a verdict, and those that are to be tried again."""
+    verdicts = run.verdicts
+    known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
+    return [candidate for candidate in run.candidates if candidate.id not in known]
+
+
 def _judge(
     run: Run,
+    open_grasps: list[Candidate],
     make_judge: StationJudgeFactory,
     journal: Journal,
     workers: int,
     reporter: Reporter,
 ) -> Run:
     """Judges what is left and keeps each verdict at once; returns the run as it is then."""
-    open_grasps = [c for c in run.candidates if c.id not in run.verdicts]
     if not open_grasps:
         return run
     done, total = len(run.candidates) - len(open_grasps), len(run.candidates)
-    outcomes = Counter(v.outcome for v in run.verdicts.values())
+    again = {grasp.id for grasp in open_grasps}
+    outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     event = Progress("starting", done, total, before=done, outcomes=outcomes)
     reporter.show(event)
     stretches = run.document.stretches

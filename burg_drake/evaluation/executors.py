@@ -2,7 +2,8 @@
 
 A grasp that ends its worker (a crash inside Drake) is tried once more, alone, in a fresh process;
 when that dies too, the grasp's outcome is `simulation_failed` and the others go on. So do they when
-a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended.
+a grasp takes longer than `GRASP_TIME_LIMIT`: its worker is ended. A verdict tells whether the last
+worker was ended from outside; then a later call may ask again.
 
 Screens are asked about many grasps at once, which costs a fraction of asking about each, and only
 what they pass on is handed out grasp by grasp. When a worker ends while it screens, its grasps go
@@ -202,7 +203,9 @@ class _Pool:
         if not (worker.last_try or worker.overdue):
             self.hire(Task((suspect,), last_try=True))
             return
-        yield suspect[0], Verdict(Outcome.SIMULATION_FAILED, worker.stage, reason=reason)
+        interrupted = worker.was_interrupted
+        failed = Outcome.SIMULATION_FAILED
+        yield suspect[0], Verdict(failed, worker.stage, reason=reason, interrupted=interrupted)
         self.crashes_in_a_row += 1
         if self.crashes_in_a_row >= HOPELESS:
             raise SimulationError(

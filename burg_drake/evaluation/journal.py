@@ -80,7 +80,7 @@ class Journal:
 
 
 def read_journal(path: Path) -> dict[str, Verdict]:
-    """Verdicts by grasp id; lines that cannot be read count as not judged."""
+    """The last verdict about each grasp by id; lines that cannot be read count as not judged."""
     verdicts: dict[str, Verdict] = {}
     if path.exists():
         for line in path.read_bytes().splitlines():
@@ -94,7 +94,7 @@ def read_journal(path: Path) -> dict[str, Verdict]:
 
 def encode(id: str, verdict: Verdict) -> bytes:
     """One line for one grasp; numbers that are not finite become null."""
-    record = {
+    record: dict[str, Any] = {
         "id": id,
         "outcome": verdict.outcome.value,
         "stage": verdict.stage.value,
@@ -108,6 +108,8 @@ def encode(id: str, verdict: Verdict) -> bytes:
         "q_pregrasp": list(verdict.q_pregrasp),
         "cpu": {stage.value: round(seconds, 6) for stage, seconds in verdict.cpu.items()},
     }
+    if verdict.interrupted:
+        record["interrupted"] = True
     return json.dumps(record, separators=(",", ":"), allow_nan=False).encode() + b"\n"
 
 
@@ -130,6 +132,7 @@ def decode(line: bytes) -> tuple[str, Verdict]:
         q_grasp=tuple(record["q_grasp"]),
         q_pregrasp=tuple(record["q_pregrasp"]),
         cpu={Stage(stage): seconds for stage, seconds in record["cpu"].items()},
+        interrupted=record.get("interrupted", False) is True,
     )
 
 

@@ -80,6 +80,8 @@ class Verdict:
         blocker, reason, margins, displacements, pushed, touched, q_grasp, q_pregrasp: as in
             `Decision`.
         cpu: CPU time by stage [s].
+        interrupted: whether it failed because its worker process was ended from outside, so that
+            another try may give an answer.
     """
 
     outcome: Outcome
@@ -93,6 +95,15 @@ class Verdict:
     q_grasp: tuple[float, ...] = ()
     q_pregrasp: tuple[float, ...] = ()
     cpu: Mapping[Stage, float] = field(default_factory=dict)
+    interrupted: bool = False
+
+    def is_open(self, *, retry_failed: bool = False) -> bool:
+        """Whether a later call asks again.
+
+        Args:
+            retry_failed: not only where it was interrupted, but wherever the simulation failed.
+        """
+        return self.interrupted or (retry_failed and self.outcome is Outcome.SIMULATION_FAILED)
 
 
 class Screen(NamedTuple):

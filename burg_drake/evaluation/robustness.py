@@ -8,7 +8,7 @@ answers known about the grasps of the last call, those of earlier calls with equ
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,11 +46,13 @@ class Robustness:
         grasps: answers by grasp, in the order asked.
         table_path: the table.
         failures: ids of probes that could not be simulated, with the reason.
+        interrupted: how many of them failed because their worker process was ended from outside.
     """
 
     grasps: tuple[GraspRobustness, ...]
     table_path: Path
     failures: dict[str, str]
+    interrupted: int = 0
 
 
 def assess_robustness(
@@ -61,6 +63,7 @@ def assess_robustness(
     settings: RobustnessSettings | None = None,
     out: str | Path | None = None,
     workers: int | None = None,
+    retry_failed: bool = False,
     progress: bool | Listener = True,
 ) -> Robustness:
     """Tests how robust lifted grasps of a run are, and writes a table.
@@ -73,6 +76,8 @@ def assess_robustness(
         out: the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The journal
             is the file of the same name with the suffix .jsonl.
         workers: number of processes; as many as there are processors if None.
+        retry_failed: ask all again that an earlier call could not simulate, not only that whose
+            worker process was ended from outside.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Raises:
@@ -100,7 +105,12 @@ def assess_robustness(
     probes = [p for grasp in chosen for p in make_probes(grasp, factory.scene, settings, context)]
     writable_folder(table.parent)
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
-        _answer(probes, factory, journal, read_journal(journal_path), workers, reporter)
+        known = {
+            id
+            for id, verdict in read_journal(journal_path).items()
+            if not verdict.is_open(retry_failed=retry_failed)
+        }
+        _answer(probes, factory, journal, known, workers, reporter)
     answers = read_journal(journal_path)
     found = tuple(_gather(grasp, answers, factory, context) for grasp in chosen)
     write_table(table, robustness_columns(found, settings, run.document.engine))
@@ -109,7 +119,8 @@ def assess_robustness(
         for p in probes
         if answers[p.id].outcome is Outcome.SIMULATION_FAILED
     }
-    return Robustness(found, table, failures)
+    interrupted = sum(answers[id].interrupted for id in failures)
+    return Robustness(found, table, failures, interrupted)
 
 
 def _require_other_files(run: Run, *written: Path) -> None:
@@ -142,7 +153,7 @@ def _answer(
     probes: Sequence[Probe],
     factory: ProbeJudgeFactory,
     journal: Journal,
-    known: dict[str, Verdict],
+    known: Collection[str],
     workers: int | None,
     reporter: Reporter,
 ) -> None:

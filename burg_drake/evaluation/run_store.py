@@ -102,6 +102,11 @@ class Run:
         """Ids of the grasps that could not be simulated."""
         return self.results["id"][self.results["outcome"] == Outcome.SIMULATION_FAILED].tolist()
 
+    @property
+    def interrupted(self) -> list[str]:
+        """Ids of those whose worker process was ended from outside; `evaluate` tries them again."""
+        return [id for id in self.failures if self.verdicts[id].interrupted]
+
     def row(self, id: str) -> dict[str, Any]:
         """One row of the results.
 

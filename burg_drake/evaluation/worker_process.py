@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
 from burg_drake.core.outcome import Stage
-from burg_drake.core.processes import cause_of_death, start_worker
+from burg_drake.core.processes import cause_of_death, start_worker, was_ended_from_outside
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import Judge, Screened
 from burg_drake.evaluation.worker import Screening, Task
@@ -91,6 +91,11 @@ class WorkerProcess:
         """Why it has ended, for people; `limit` as above."""
         cause = cause_of_death(self.process, self.last_words)
         return f"took longer than {limit:g} s" if self.overdue else cause
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether it has been ended by others than us, and through no fault of its grasp."""
+        return not self.overdue and was_ended_from_outside(self.process)
 
 
 def start(make_judge: Callable[[], Judge], first: Task | None) -> WorkerProcess:

@@ -10,8 +10,11 @@ import pytest
 
 from burg_drake.apps import robustness
 from burg_drake.apps.cli import main
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation import probes
 from burg_drake.evaluation import robustness as tested
+from burg_drake.evaluation.journal import Journal, read_journal
+from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.probes import RobustnessSettings
 from burg_drake.evaluation.robustness import assess_robustness
 from burg_drake.evaluation.run_store import Run, load_run
@@ -69,6 +72,22 @@ def test_an_interrupted_test_goes_on_with_the_same_result(copied: Run, tmp_path:
     assert again.read_bytes() == table.read_bytes()
     assert (tmp_path / "again.jsonl").read_bytes().startswith(b"".join(lines[:2]))
     assert len((tmp_path / "again.jsonl").read_bytes().splitlines()) == 5
+
+
+@pytest.mark.parametrize(("interrupted", "options"), [(True, []), (False, ["--retry-failed"])])
+def test_tests_that_could_not_be_simulated_are_tried_again(
+    copied: Run, tmp_path: Path, interrupted: bool, options: list[str]
+) -> None:
+    table, journal = copied.path / "robustness.csv", tmp_path / "again.jsonl"
+    shutil.copy(copied.path / "robustness.jsonl", journal)
+    lost = Verdict(Outcome.SIMULATION_FAILED, Stage.EXECUTED, interrupted=interrupted)
+    noise = [id for id in read_journal(journal) if ":noise:1:" in id]
+    with Journal(journal) as opened:
+        opened.append(noise[0], lost)
+    command = ["robustness", str(copied.path), *OPTIONS, "-o", str(tmp_path / "again.csv")]
+    assert main([*command, *options]) == 0
+    assert (tmp_path / "again.csv").read_bytes() == table.read_bytes()
+    assert len(journal.read_bytes().splitlines()) == 7
 
 
 def test_two_workers_and_no_journal_give_the_same_bits(copied: Run, tmp_path: Path) -> None:

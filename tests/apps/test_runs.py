@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
+from burg_drake.apps.retries import how_to_retry
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps import GraspSet
@@ -92,6 +93,42 @@ def test_failures_to_report_end_with_1(
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: 2 of 3 grasps could not be simulated, such as {failed[0]}")
+
+
+def test_what_was_ended_from_outside_is_tried_again_by_the_same_command(
+    run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    """A journal in which memory ran out at one grasp, and another one could not be stepped."""
+    killed, failed = run.results["id"][[0, 2]].tolist()
+    shutil.copytree(run.path, tmp_path / "run")
+    with Journal(tmp_path / "run" / "journal.jsonl") as journal:
+        for id in (killed, failed):
+            lost = Verdict(Outcome.SIMULATION_FAILED, Stage.EXECUTED, interrupted=id == killed)
+            journal.append(id, lost)
+    run.candidates.grasps.save(tmp_path / "grasps.npz")
+    command = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
+    command += ["--grasps", str(tmp_path / "grasps.npz"), "--workers", "1", "--quiet"]
+    assert main(command) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        f"burg-drake: 1 of 3 grasps could not be simulated, such as {failed}; reasons are in"
+        f" {tmp_path / 'run' / 'results.csv'}; --retry-failed tries them again"
+    )
+    assert main([*command, "--retry-failed"]) == 0
+    again = load_run(tmp_path / "run")
+    assert again.results["outcome"].tolist() == run.results["outcome"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("interrupted", "failed", "said"),
+    [
+        (0, 2, r"^--retry-failed tries them again$"),
+        (2, 2, r"^2 of them because .* ended from outside, .* the same command tries these again"),
+        (1, 2, r"^1 of them .*, --retry-failed all$"),
+    ],
+)
+def test_how_to_try_again_is_said(interrupted: int, failed: int, said: str) -> None:
+    assert re.search(said, how_to_retry(interrupted, failed))
 
 
 def test_interrupted_evaluation_says_how_to_go_on(

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from pathlib import Path
 
 import pytest
 
-from burg_drake.core.processes import cause_of_death, default_workers, start_worker
+from burg_drake.core.processes import (
+    cause_of_death,
+    default_workers,
+    start_worker,
+    was_ended_from_outside,
+)
 
 ECHO = """\
 import os
@@ -41,10 +47,16 @@ def test_a_worker_hears_and_answers(echo: str) -> None:
     assert cause_of_death(process, "so be it") == "the worker process ended: so be it"
 
 
-def test_a_worker_that_is_killed(echo: str) -> None:
+@pytest.mark.parametrize(
+    ("number", "outside"),
+    [("SIGKILL", True), ("SIGTERM", True), ("SIGSEGV", False), ("SIGABRT", False)],
+)
+def test_what_ends_a_worker_from_outside(echo: str, number: str, outside: bool) -> None:
     process, _ = start_worker(echo)
-    process.kill()
-    assert cause_of_death(process) == "the worker process was ended by SIGKILL"
+    process.send_signal(signal.Signals[number])
+    assert was_ended_from_outside(process) is outside
+    where = " from outside" if outside else ""
+    assert cause_of_death(process) == f"the worker process was ended{where} by {number}"
 
 
 def test_there_is_a_processor() -> None:

@@ -138,6 +138,24 @@ class CrashingJudge(KnownJudge):
 
 
 @dataclass(frozen=True)
+class ShortOfMemory(KnownJudge):
+    """Some grasps end its process in the stage `executed`, as the system does or by themselves.
+
+    Attributes:
+        killed: ids of grasps at which it is ended by SIGKILL.
+        crashing: ids of those at which it ends by SIGSEGV.
+    """
+
+    killed: tuple[str, ...] = ()
+    crashing: tuple[str, ...] = ()
+
+    def execute(self, grasp: Candidate) -> Decision:
+        if grasp.id in (*self.killed, *self.crashing):
+            os.kill(os.getpid(), signal.SIGKILL if grasp.id in self.killed else signal.SIGSEGV)
+        return super().execute(grasp)
+
+
+@dataclass(frozen=True)
 class Make:
     """A factory as `judge_all` takes it."""
 

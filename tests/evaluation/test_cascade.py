@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from known_judge import KnownJudge, Make, expected, install
+from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
@@ -136,6 +137,42 @@ def test_a_killed_run_goes_on_where_it_was(
     )
     assert same_results(run, fresh)
     assert read_table(run.table_path)["id"].tolist() == run.candidates.id
+
+
+def test_grasps_whose_workers_were_ended_are_tried_again(
+    scene: Scene, station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those ended from outside by the same call, those that crashed on request; no others."""
+
+    def judge(known: KnownJudge, out: str, **options: bool) -> Run:
+        make = Make(known)
+        monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: make)
+        options |= {"grasps_per_object": 10, "progress": False}
+        return evaluate(scene, station, tmp_path / out, workers=1, **options)
+
+    def asked(name: str) -> list[str]:
+        return (tmp_path / name).read_text().split()
+
+    install(monkeypatch.setattr)
+    whole = judge(KnownJudge(), "whole")
+    killed, crashing = [id for id in whole.candidates.id if expected(id).stage == "executed"][:2]
+    short = ShortOfMemory(killed=(killed,), crashing=(crashing,))
+    run = judge(short, "run")
+    assert run.complete and run.failures == [killed, crashing] and run.interrupted == [killed]
+    assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
+
+    run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
+    assert asked("short again") == [killed] and run.interrupted == [killed]
+    run = judge(KnownJudge(tmp_path / "enough"), "run")
+    assert asked("enough") == [killed] and run.failures == [crashing]
+    assert run.row(killed)["outcome"] == expected(killed)
+    run = judge(KnownJudge(tmp_path / "none"), "run")
+    assert not (tmp_path / "none").exists()
+    run = judge(KnownJudge(tmp_path / "failed"), "run", retry_failed=True)
+    assert asked("failed") == [crashing] and run.failures == []
+    assert same_results(run, whole)
+    assert read_table(run.table_path)["outcome"].tolist() == whole.results["outcome"].tolist()
+    assert [stretch.judged for stretch in run.document.stretches] == [30, 1, 1, 1]
 
 
 def test_an_interrupt_keeps_what_is_done(scene: Scene, tmp_path: Path) -> None:

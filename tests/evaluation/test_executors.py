@@ -10,7 +10,16 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from known_judge import CrashingJudge, DieOnStart, KnownJudge, Make, die, expected, refuse
+from known_judge import (
+    CrashingJudge,
+    DieOnStart,
+    KnownJudge,
+    Make,
+    ShortOfMemory,
+    die,
+    expected,
+    refuse,
+)
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
@@ -49,6 +58,19 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
         "cube-0017": "RuntimeError: the solver did not converge",
     }
     assert {v.stage for v in failed.values()} == {Stage.EXECUTED}
+    assert not any(v.interrupted for v in failed.values())
+
+
+def test_a_grasp_whose_workers_are_ended_from_outside_says_so() -> None:
+    """Each is tried twice and no more, whoever ends the process."""
+    executed = [c.id for c in grasps(20) if expected(c.id).stage is Stage.EXECUTED][:2]
+    make = Make(ShortOfMemory(killed=(executed[0],), crashing=(executed[1],)))
+    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
+    assert [judged[id].reason for id in executed] == [
+        "the worker process was ended from outside by SIGKILL",
+        "the worker process was ended by SIGSEGV",
+    ]
+    assert [id for id, v in judged.items() if v.interrupted] == executed[:1]
 
 
 def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
@@ -137,6 +159,7 @@ def test_a_grasp_that_takes_too_long_is_settled(
             assert verdict.outcome is Outcome.SIMULATION_FAILED
             assert verdict.stage is Stage.EXECUTED
             assert verdict.reason == "took longer than 0.5 s"
+            assert not verdict.interrupted
         else:
             assert verdict.outcome is expected(id)
 

@@ -28,7 +28,12 @@ BLOCKED = Verdict(
 )
 
 
-@pytest.mark.parametrize("verdict", [LIFTED, BLOCKED])
+KILLED = Verdict(
+    Outcome.SIMULATION_FAILED, Stage.EXECUTED, reason="ended by SIGKILL", interrupted=True
+)
+
+
+@pytest.mark.parametrize("verdict", [LIFTED, BLOCKED, KILLED])
 def test_a_line_gives_back_what_went_in(verdict: Verdict) -> None:
     line = encode("mug-1", verdict)
     assert line.count(b"\n") == 1 and line.endswith(b"\n")
@@ -45,6 +50,7 @@ def test_a_line_of_an_older_release_is_read() -> None:
     )
     id, verdict = decode(line)
     assert (id, verdict.outcome, verdict.margins["slip"]) == ("mug-1", Outcome.LIFTED, 0.002)
+    assert not verdict.interrupted
     assert verdict.displacements == {} and "patch_area" not in verdict.margins
 
 

@@ -55,7 +55,7 @@ def test_a_worker_that_dies_costs_one_object(
     sources = [*boxes(3), ObjectSource(name="fatal", mesh=fatal, mass=0.1)]
     report = build_library(sources, tmp_path / "lib", confirm=False, workers=2)
     assert report.built == ("box_0", "box_1", "box_2")
-    assert report.failed == {"fatal": "the worker process was ended by SIGKILL"}
+    assert report.failed == {"fatal": "the worker process was ended from outside by SIGKILL"}
     assert not (tmp_path / "lib" / "fatal").exists()
 
 
