@@ -157,7 +157,8 @@ def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tup
     from burg_drake.scene.scene import Board
 
     width, height = (1e3 * extent for extent in (scene.board if scene else Board()).size)
-    lines = [("board", f"{width:g} x {height:g} mm")]
+    content = f"{len(scene.instances)} objects of {scene.name}" if scene else "empty"
+    lines = [("board", f"{width:g} x {height:g} mm, {content}")]
     if reach is None:
         return lines
     for k, z in enumerate(reach.heights):

@@ -15,13 +15,14 @@ from burg_drake.simulation.result import TrialResult
 from burg_drake.simulation.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.station import Station
+from burg_drake.visualization.camera_aim import aim_at
 from burg_drake.visualization.replay import FRAMES_PER_SECOND, VIEW, play_in_a_loop
-from burg_drake.visualization.scene_view import draw_board
+from burg_drake.visualization.scene_view import draw_board, robot_points, scene_points
 
-DISTANCE, CAMERA_HEIGHT = 1.5, 0.55
-"""Of the camera from and above the middle between arm and grasp [m]."""
-MIDDLE_HEIGHT = 0.30
-"""Of that above the lower of the two [m]."""
+SLOPE = 0.37
+"""By how much the eye looks down, compared with ahead."""
+POSTURES = 25
+"""Of the planned motion that have to be in view."""
 
 
 def record_arm_trial(
@@ -63,7 +64,9 @@ def record_arm_trial(
     draw_board(scene, station, meshcat, labels=False)
     arm = station.document.arm
     assert arm is not None  # ArmTrial has seen to it
-    _aim(meshcat, arm.X_WA.matrix()[:3, 3], trial.X_WG(instance, X_OG)[:3, 3])
+    forward = _across(arm.X_WA.matrix()[:3, 3], trial.X_WG(instance, X_OG)[:3, 3])
+    points = [scene_points(scene, station), _motion_points(trial, plan)]
+    aim_at(meshcat, np.vstack(points), forward)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
     result = trial.run(instance, X_OG, plan, friction=friction, mass=mass)
     meshcat.StopRecording()
@@ -71,14 +74,28 @@ def record_arm_trial(
     return result
 
 
-def _aim(meshcat: Meshcat, p_WA: Array, p_WG: Array) -> None:
-    """Looks at arm base and grasp from the side, so that neither hides the other."""
+def _across(p_WA: Array, p_WG: Array) -> Array:
+    """Direction (3,) in which arm base and grasp are seen from the side, neither hiding the
+    other."""
     ahead = (p_WG - p_WA)[:2]
     ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-9)
     across = np.array([-ahead[1], ahead[0]])
     if across @ VIEW < 0.0:
         across = -across
-    middle = (p_WA + p_WG) / 2.0
-    middle[2] = min(p_WA[2], p_WG[2]) + MIDDLE_HEIGHT
-    way = np.array([*(0.9 * across + 0.45 * ahead) * DISTANCE, CAMERA_HEIGHT])
-    meshcat.SetCameraPose(middle + way, middle)
+    return -np.array([*(0.9 * across + 0.45 * ahead), SLOPE])
+
+
+def _motion_points(trial: ArmTrial, plan: Plan) -> Array:
+    """(N, 3) points around the robot on its planned way [m]."""
+    built = trial.diagram
+    context = built.diagram.CreateDefaultContext()
+    plant_context = built.plant.GetMyMutableContextFromRoot(context)
+    q_robot = built.plant.GetPositions(plant_context)
+    places = [joint.position_start() for joint in built.arm_joints]
+    q = plan.whole.q
+    points = []
+    for row in np.unique(np.linspace(0, len(q) - 1, POSTURES).astype(int)):
+        q_robot[places] = q[row]
+        built.plant.SetPositions(plant_context, q_robot)
+        points.append(robot_points(built, context))
+    return np.vstack(points)

@@ -19,12 +19,12 @@ from burg_drake.core.frames import Array, make_pose, rot_z, transform_points
 from burg_drake.formats.grasp_convention import convention_of, grouped
 from burg_drake.formats.grasp_format import GraspFormat, Gripper
 from burg_drake.station.hand import Hand
-from burg_drake.visualization.gallery import FIELD_OF_VIEW_DEG, FILL
-from burg_drake.visualization.gallery_layout import ASPECT
+from burg_drake.visualization.camera_aim import VIEW_ASPECT, aim_at
+from burg_drake.visualization.gallery import FIELD_OF_VIEW_DEG
 from burg_drake.visualization.gltf import label_mesh
 from burg_drake.visualization.hand_visuals import HandVisual, hand_visuals
 from burg_drake.visualization.legend import LegendEntry
-from burg_drake.visualization.portrait import camera_rotation, fit_camera
+from burg_drake.visualization.portrait import camera_rotation
 from burg_drake.visualization.triad import TriadStyle, draw_triad
 
 ROOT = "/drake/frames"
@@ -54,7 +54,7 @@ CELL_GAP = 0.035
 
 @dataclass(frozen=True)
 class Sheet:
-    """A grid of cells in the picture; the first one is left free for the page's legend.
+    """A grid of cells in the picture.
 
     Attributes:
         columns, rows: numbers of cells.
@@ -71,7 +71,7 @@ class Sheet:
 
     def place(self, index: int) -> tuple[float, float]:
         """Where in the picture G of a hand is, to the right and up [m]."""
-        row, column = divmod(index + 1, self.columns)
+        row, column = divmod(index, self.columns)
         return self.width * column, -self.height * row
 
     def bounds(self) -> Array:
@@ -152,9 +152,8 @@ def _sheet(count: int, lower: Array, upper: Array, caption: float) -> Sheet:
     foot = float(lower[1]) - LINES * CAPTION_HEIGHT
     width = max(float(upper[0] - lower[0]), caption) + CELL_GAP
     height = float(upper[1]) - foot + CELL_GAP
-    cells = count + 1
-    grids = [(columns, -(-cells // columns)) for columns in range(1, cells + 1)]
-    columns, rows = min(grids, key=lambda g: max(g[0] * width / ASPECT, g[1] * height))
+    grids = [(columns, -(-count // columns)) for columns in range(1, count + 1)]
+    columns, rows = min(grids, key=lambda g: max(g[0] * width / VIEW_ASPECT, g[1] * height))
     return Sheet(columns, rows, width, height, foot, float(upper[1]))
 
 
@@ -206,7 +205,4 @@ def _write(meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WL: Array) 
 def _aim(meshcat: Meshcat, bounds: Array) -> None:
     """Fits corners (2, 2) of the picture into the view."""
     corners = np.array([in_picture(u, v)[:3, 3] for u in bounds[:, 0] for v in bounds[:, 1]])
-    vertical = np.tan(np.deg2rad(FIELD_OF_VIEW_DEG) / 2.0)
-    p_WC = fit_camera(corners, R_WC, FILL * vertical * np.array([ASPECT, 1.0]))
-    meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW_DEG)
-    meshcat.SetCameraPose(p_WC, p_WC + R_WC[:, 2] * float(np.linalg.norm(p_WC)))
+    aim_at(meshcat, corners, R_WC[:, 2], field_of_view_deg=FIELD_OF_VIEW_DEG)

@@ -9,6 +9,7 @@ from pydrake.geometry import Meshcat, Rgba
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.objects.library import ObjectLibrary
+from burg_drake.visualization.camera_aim import aim_at
 from burg_drake.visualization.exhibit import (
     LINE,
     ROOT,
@@ -19,15 +20,11 @@ from burg_drake.visualization.exhibit import (
     draw_slab,
     prepare_exhibit,
 )
-from burg_drake.visualization.gallery_layout import ASPECT, ELEVATION, Layout, lay_out
+from burg_drake.visualization.gallery_layout import ELEVATION, Layout, lay_out
 from burg_drake.visualization.hydroelastic_view import HIGH_PRESSURE, hydroelastic_meshes
 from burg_drake.visualization.legend import LegendEntry
-from burg_drake.visualization.portrait import camera_rotation, fit_camera
+from burg_drake.visualization.portrait import camera_rotation
 
-LEGEND_ROOM = 0.15
-"""Kept free on the left of the back row for the legend, as a share of the gallery's width."""
-FILL = 0.94
-"""Share of the window that the gallery fills."""
 FLOOR = Rgba(0.90, 0.91, 0.92, 1.0)
 FIELD_OF_VIEW_DEG = 22.0
 """Vertical angle of view: little perspective, so that rows in the back are not small."""
@@ -86,15 +83,8 @@ def show_library(
 
 def aim(meshcat: Meshcat, layout: Layout) -> None:
     """Aims camera and lamp at a gallery, whose middle is the origin."""
-    R_WC = camera_rotation(ELEVATION)
-    vertical = np.tan(np.deg2rad(FIELD_OF_VIEW_DEG) / 2.0)
-    lower, upper = layout.corners().min(axis=0), layout.corners().max(axis=0)
-    beside = [lower[0] - LEGEND_ROOM * (upper[0] - lower[0]), upper[1], 0.0]
-    p_WC = fit_camera(
-        np.vstack([layout.corners(), beside]), R_WC, FILL * vertical * np.array([ASPECT, 1.0])
-    )
-    meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW_DEG)
-    meshcat.SetCameraPose(p_WC, p_WC - R_WC[:, 2] * p_WC[2] / R_WC[2, 2])
+    forward = camera_rotation(ELEVATION)[:, 2]
+    aim_at(meshcat, layout.corners(), forward, field_of_view_deg=FIELD_OF_VIEW_DEG)
     radius = max(MIN_RADIUS, float(np.linalg.norm(layout.corners()[:, :2], axis=1).max()))
     p_WL = radius * LAMP
     for light, intensity in LIGHTS.items():

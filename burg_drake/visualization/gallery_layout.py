@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.visualization.camera_aim import VIEW_ASPECT
 
 ELEVATION = np.deg2rad(42.0)
 """By which the camera looks down on the gallery [rad]."""
-ASPECT = 1.55
-"""Width over height of the window that the gallery is laid out for."""
 GAP = 0.16
 """Between things, as a share of the gallery's unit."""
 MAX_BANKS = 8
@@ -100,7 +99,7 @@ class Layout:
     def distance(self) -> float:
         """How far away, up to a factor, a camera has to be that sees all of it [m]."""
         lower, upper = self.corners().min(axis=0), self.corners().max(axis=0)
-        return float(max((upper - lower)[0] / ASPECT, (upper - lower)[1] * np.sin(ELEVATION)))
+        return float(max((upper - lower)[0] / VIEW_ASPECT, (upper - lower)[1] * np.sin(ELEVATION)))
 
 
 def lay_out(rows: Sequence[Row], unit: float, line: float, max_banks: int = MAX_BANKS) -> Layout:

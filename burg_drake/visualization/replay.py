@@ -17,14 +17,16 @@ from burg_drake.simulation.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.station import Station
-from burg_drake.visualization.scene_view import draw_board
+from burg_drake.visualization.camera_aim import aim_at
+from burg_drake.visualization.scene_view import draw_board, robot_points, scene_points
 
 FRAMES_PER_SECOND = 32.0
 LOOPS = 10_000
 VIEW = (0.73, -0.68)
 """Heading from the grasp to the camera that is preferred, in the world: across from an arm."""
 DISTANCE, CAMERA_HEIGHT = 0.80, 0.42
-"""Of the camera from and above its target [m]."""
+"""The eye looks down in this proportion [m]; objects farther from the grasp than that do not hide
+it."""
 SHOWN = 5e-5
 """Displacements from here on are told [m]."""
 CLEAR_VIEW = 0.10
@@ -69,10 +71,12 @@ def record_trial(
     engine = replace(engine, whole_trial=True)
     trial = HandTrial(scene, station, engine=engine, settings=settings, meshcat=meshcat)
     X_WG = trial.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
-    _show_start(trial, X_WG)
+    hand = _show_start(trial, X_WG)
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
-    aim_at_grasp(meshcat, X_WG, np.reshape(others, (-1, 3)), settings.lift_height)
+    offset = camera_offset(X_WG, np.reshape(others, (-1, 3)))
+    lifted = hand + np.array([0.0, 0.0, settings.lift_height])
+    aim_at(meshcat, np.vstack([scene_points(scene, station), hand, lifted]), -offset)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
     result = trial.run(instance, X_OG, friction=friction, mass=mass)
     meshcat.StopRecording()
@@ -90,21 +94,8 @@ def play_in_a_loop(meshcat: Meshcat) -> None:
     meshcat.PublishRecording()
 
 
-def aim_at_grasp(meshcat: Meshcat, X_WG: Array, p_WB: Array, lift_height: float) -> None:
-    """Looks at a grasp (4, 4) so that both fingers are seen, with room for the lift [m] above.
-
-    Args:
-        meshcat: whose camera to set.
-        X_WG: (4, 4) grasp.
-        p_WB: (M, 3) other objects, which should not be in the way [m].
-        lift_height: how far the hand will rise [m].
-    """
-    target = X_WG[:3, 3] + np.array([0.0, 0.0, 0.45 * lift_height])
-    meshcat.SetCameraPose(target + camera_offset(X_WG, p_WB), target)
-
-
 def camera_offset(X_WG: Array, p_WB: Array) -> Array:
-    """Camera (3,) from its target in the axes of the world [m].
+    """From the grasp towards the eye (3,) in the axes of the world [m].
 
     Looks across the closing direction, not from behind the hand, past other objects (M, 3), and
     otherwise from about `VIEW`.
@@ -159,9 +150,11 @@ def describe(result: TrialResult) -> list[str]:
     return lines + ([f"moved {', '.join(pushed)}"] if pushed else [])
 
 
-def _show_start(trial: HandTrial, X_WG: Array) -> None:
+def _show_start(trial: HandTrial, X_WG: Array) -> Array:
+    """Shows the hand at the grasp; returns points (N, 3) around it [m]."""
     station_diagram = trial.diagram
     context = station_diagram.diagram.CreateDefaultContext()
     plant_context = station_diagram.plant.GetMyMutableContextFromRoot(context)
     FloatingHand(station_diagram).place(plant_context, X_WG)
     station_diagram.diagram.ForcedPublish(context)
+    return robot_points(station_diagram, context)

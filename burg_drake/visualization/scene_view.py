@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.geometry import Meshcat, MeshcatParams, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, transform_points
@@ -12,6 +14,7 @@ from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import placed_vertices
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
 from burg_drake.station.station import Station
+from burg_drake.visualization.camera_aim import aim_at
 from burg_drake.visualization.text import text_triangles
 
 SKY_COLOR = (0.93, 0.95, 0.97)
@@ -33,7 +36,11 @@ LABEL_GAP = 0.012
 """Between an object's footprint and its name [m]."""
 LABEL_LIFT = 1e-3
 """Height of names and outline above the board, against flicker [m]."""
-FIELD_OF_VIEW_DEG = 45.0
+BODY_RADIUS = 0.09
+"""Of the robot's bodies around their origins, about, for what has to be in view [m]."""
+ACROSS = (1.05, 1.63, 0.72)
+ALONE = (0.3, -0.95, 0.74)
+"""Directions in S from the board to the eye: across from the arm, and at the board alone."""
 
 LABELS_PATH = "/drake/labels"
 
@@ -62,7 +69,6 @@ def open_meshcat(port: int | None = None) -> Meshcat:
     meshcat.SetProperty(lamp, "castShadow", True)
     for key, value in SHADOW.items():
         meshcat.SetProperty(lamp, f"shadow.{key}", value)
-    meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", FIELD_OF_VIEW_DEG)
     return meshcat
 
 
@@ -87,9 +93,11 @@ def show_scene(
         The diagram that was shown.
     """
     station_diagram = build_station_diagram(scene, station, robot=robot, meshcat=meshcat)
-    station_diagram.diagram.ForcedPublish(station_diagram.diagram.CreateDefaultContext())
+    context = station_diagram.diagram.CreateDefaultContext()
+    station_diagram.diagram.ForcedPublish(context)
     draw_board(scene, station, meshcat, labels=labels)
-    aim_camera(scene, station, meshcat, robot=robot)
+    shown = robot_points(station_diagram, context)
+    aim_camera(scene, station, meshcat, robot=robot, also=shown)
     return station_diagram
 
 
@@ -119,30 +127,57 @@ def draw_board(scene: Scene, station: Station, meshcat: Meshcat, *, labels: bool
         meshcat.SetTransform(path, RigidTransform(X_WS) @ X_SL)
 
 
-def aim_camera(scene: Scene, station: Station, meshcat: Meshcat, *, robot: Robot = "arm") -> None:
-    """Looks at the board: across it towards the arm if there is one, else from its lower edge."""
-    across = robot == "arm" and station.document.arm is not None
-    size = np.array(scene.board.size)
-    p_ST, p_SC = camera_placement(size, across)
-    if not across and station.document.arm is not None:  # the names read from the other side
-        p_SC = np.array([*(size - p_SC[:2]), p_SC[2]])
-        p_ST = np.array([*(size - p_ST[:2]), p_ST[2]])
-    p_WT, p_WC = transform_points(station.document.X_WS.matrix(), [p_ST, p_SC])
-    meshcat.SetCameraPose(p_WC, p_WT)
-
-
-def camera_placement(board_size: Array, across: bool) -> tuple[Array, Array]:
-    """Target and camera (3,) in the scene frame [m].
+def aim_camera(
+    scene: Scene,
+    station: Station,
+    meshcat: Meshcat,
+    *,
+    robot: Robot = "arm",
+    also: Array | None = None,
+) -> Array:
+    """Looks at the board: across it towards the arm if there is one, else from its lower edge.
 
     Args:
-        board_size: (2,) [m].
-        across: look over the board at an arm behind its lower edge; else at the board alone.
+        scene: what stands on the board; all of it will be in view.
+        station: where.
+        meshcat: whose camera to set.
+        robot: as for `build_station_diagram`.
+        also: (N, 3) points in the world that will be in view, too [m].
+
+    Returns:
+        (3, 3) `R_WC`.
     """
-    diagonal = float(np.hypot(*board_size))
-    center = np.array([*(board_size / 2), 0.0])
-    if across:
-        target = center + np.array([0.0, -0.2 * diagonal, 0.40 * diagonal])
-        return target, target + diagonal * np.array([1.05, 1.63, 0.72])
-    return center + np.array([0.0, 0.0, 0.11 * diagonal]), center + diagonal * np.array(
-        [0.3, -0.95, 0.85]
-    )
+    across = robot == "arm" and station.document.arm is not None
+    p_SC = np.array(ACROSS if across else ALONE)
+    if not across and station.document.arm is not None:  # the names read from the other side
+        p_SC[:2] *= -1.0
+    forward = -station.document.X_WS.matrix()[:3, :3] @ p_SC
+    points = [scene_points(scene, station)] + ([] if also is None else [also])
+    return aim_at(meshcat, np.vstack(points), forward)
+
+
+def scene_points(scene: Scene, station: Station) -> Array:
+    """(N, 3) corners of the board and of boxes around all free objects, in the world [m]."""
+    x, y = scene.board.size
+    points = [np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float)]
+    for name in scene.instances:
+        vertices = placed_vertices(scene, name)
+        points.append(box_corners(vertices.min(axis=0), vertices.max(axis=0)))
+    return transform_points(station.document.X_WS.matrix(), np.vstack(points))
+
+
+def box_corners(lower: ArrayLike, upper: ArrayLike) -> Array:
+    """(8, 3) corners of the box between two points (3,)."""
+    sides = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=1)
+    return np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
+
+
+def robot_points(built: StationDiagram, context: Context) -> Array:
+    """(N, 3) corners of boxes around the robot's bodies in a context of the diagram [m]."""
+    plant_context = built.plant.GetMyContextFromRoot(context)
+    origins = [
+        built.plant.EvalBodyPoseInWorld(plant_context, built.plant.get_body(body)).translation()
+        for body in built.robot_bodies
+    ]
+    boxes = [box_corners(p - BODY_RADIUS, p + BODY_RADIUS) for p in origins]
+    return np.vstack(boxes) if boxes else np.empty((0, 3))

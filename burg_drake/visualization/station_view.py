@@ -18,7 +18,7 @@ from burg_drake.station.station import Camera, Station
 from burg_drake.station.surroundings import OBSTACLE_COLOR
 from burg_drake.visualization.color_map import hex_color, map_colors
 from burg_drake.visualization.legend import ColorBar, LegendEntry
-from burg_drake.visualization.scene_view import camera_placement, show_scene
+from burg_drake.visualization.scene_view import aim_camera, robot_points, show_scene
 from burg_drake.visualization.text import text_triangles
 
 CAMERAS_PATH = "/drake/cameras"
@@ -32,8 +32,6 @@ CAMERA_DEPTH = 0.16
 NAME_HEIGHT = 0.022
 SPAN_COLOR = "#3b6ea5"
 SPAN_POINTS = 181
-AWAY = 1.9
-"""How much farther from the board the eye is than for a scene alone."""
 GLASS = 0.35
 """Opacity of obstacles, so that what is behind them is seen."""
 BINS = 10
@@ -73,17 +71,22 @@ def show_station(
     """
     through = None if camera is None else station.camera(camera)
     robot: Robot = "arm" if station.document.arm is not None else "none"
-    show_scene(scene, station, meshcat, robot=robot)
-    R_WT = aim_at_station(scene, station, meshcat)
+    built = show_scene(scene, station, meshcat, robot=robot)
+    seen = [robot_points(built, built.diagram.CreateDefaultContext())]
     legend: list[LegendEntry | ColorBar] = []
     if reachability is not None:
-        legend += draw_reachability(reachability, station, meshcat)
+        legend += draw_reachability(reachability, station, meshcat, on_board(scene))
     if span is not None:
         legend.append(draw_span(span, meshcat))
+        seen.append(circle(span))
     if station.document.cameras:
-        legend.append(draw_cameras(station, meshcat, R_WT))
+        R_WC = aim_camera(scene, station, meshcat, robot=robot)
+        entry, points = draw_cameras(station, meshcat, R_WC @ np.diag([1.0, -1.0, -1.0]))
+        legend.append(entry)
+        seen.append(points)
     if station.document.background:
         legend.append(draw_obstacles(station, meshcat))
+    aim_camera(scene, station, meshcat, robot=robot, also=np.vstack(seen))
     if through is not None:
         look_through(through, meshcat)
         meshcat.SetProperty(f"{CAMERAS_PATH}/{camera}", "visible", False)
@@ -100,31 +103,26 @@ def draw_obstacles(station: Station, meshcat: Meshcat) -> LegendEntry:
     return LegendEntry("obstacles", hex_color((r, g, b)), (OBSTACLES_PATH,))
 
 
-def aim_at_station(scene: Scene, station: Station, meshcat: Meshcat) -> Array:
-    """Looks at the board from across the arm, or from its lower edge without one, from so far that
-    cameras around it are in view and the legend hides nothing of it.
-
-    Returns:
-        (3, 3) axes in the world of a text that is read from there.
-    """
-    target, eye = camera_placement(np.array(scene.board.size), station.document.arm is not None)
-    ends = np.array([target, target + AWAY * (eye - target)])
-    p_WT, p_WC = transform_points(station.document.X_WS.matrix(), ends)
-    meshcat.SetCameraPose(p_WC, p_WT)
-    z = (p_WC - p_WT) / np.linalg.norm(p_WC - p_WT)
-    x = np.cross([0.0, 0.0, 1.0], z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=-1)
+def on_board(scene: Scene) -> str:
+    """What stood on the board while its reachability was measured, for people."""
+    count = len(scene.instances) + len(scene.background)
+    if count == 0:
+        return "board empty"
+    return f"with the {count} object{'' if count == 1 else 's'} of {scene.name} in the way"
 
 
-def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> LegendEntry:
+def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> tuple[LegendEntry, Array]:
     """Draws each camera as the pyramid over its image, upper edge bold, with its name.
 
     Args:
-        station: whose cameras.
+        station: whose cameras; at least one.
         meshcat: where to draw them.
         R_WT: (3, 3) how names stand: x along them, y up.
+
+    Returns:
+        A switch for them, and points (N, 3) that have to be in view for them to be [m].
     """
+    drawn = []
     for name, camera in station.document.cameras.items():
         path = f"{CAMERAS_PATH}/{name}"
         p_WC = np.array(camera.X_WC.translation)
@@ -140,25 +138,41 @@ def draw_cameras(station: Station, meshcat: Meshcat, R_WT: Array) -> LegendEntry
         X_WT = RigidTransform(RotationMatrix(R_WT), p_WC + 0.5 * NAME_HEIGHT * R_WT[:, 1])
         meshcat.SetTriangleMesh(f"{path}/name", vertices, faces, color)
         meshcat.SetTransform(f"{path}/name", X_WT)
-    return LegendEntry("cameras, upper edge bold", CAMERA_COLOR, (CAMERAS_PATH,))
+        drawn += [corners, p_WC[None], transform_points(X_WT.GetAsMatrix4(), vertices.T)]
+    entry = LegendEntry("cameras, upper edge bold", CAMERA_COLOR, (CAMERAS_PATH,))
+    return entry, np.vstack(drawn)
 
 
 def draw_span(span: ArmSpan, meshcat: Meshcat) -> LegendEntry:
     """Draws where the ball that the grasp frame never leaves cuts the table top."""
-    radius = np.sqrt(max(0.0, span.radius**2 - span.p_WJ[2] ** 2))
-    angle = np.linspace(0.0, 2.0 * np.pi, SPAN_POINTS)
-    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)]) * radius
-    circle += np.array([[span.p_WJ[0]], [span.p_WJ[1]], [TILE_LIFT]])
-    meshcat.SetLine(SPAN_PATH, np.asfortranarray(circle), 3.0, _rgba(SPAN_COLOR))
-    text = f"longest reach on the table, {radius:.2f} m"
+    meshcat.SetLine(SPAN_PATH, np.asfortranarray(circle(span).T), 3.0, _rgba(SPAN_COLOR))
+    text = f"longest reach on the table, {_radius(span):.2f} m"
     return LegendEntry(text, SPAN_COLOR, (SPAN_PATH,))
 
 
+def circle(span: ArmSpan) -> Array:
+    """(N, 3) points around where the ball of `draw_span` cuts the table top [m]."""
+    angle = np.linspace(0.0, 2.0 * np.pi, SPAN_POINTS)
+    p = _radius(span) * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
+    return p + np.array([span.p_WJ[0], span.p_WJ[1], TILE_LIFT])
+
+
+def _radius(span: ArmSpan) -> float:
+    return float(np.sqrt(max(0.0, span.radius**2 - span.p_WJ[2] ** 2)))
+
+
 def draw_reachability(
-    reachability: ReachabilityMap, station: Station, meshcat: Meshcat
+    reachability: ReachabilityMap, station: Station, meshcat: Meshcat, condition: str
 ) -> list[LegendEntry | ColorBar]:
     """Draws a map as tiles: the lowest points on the board, smaller tiles for others where they
-    are."""
+    are.
+
+    Args:
+        reachability: the map.
+        station: whose board.
+        meshcat: where to draw it.
+        condition: under which it was measured, for the legend.
+    """
     meshcat.Delete(MAP_PATH)
     X_WS = RigidTransform(station.document.X_WS.matrix())
     place = np.minimum((reachability.share * BINS).astype(int), BINS - 1)
@@ -176,7 +190,8 @@ def draw_reachability(
             meshcat.SetTriangleMesh(path, vertices, faces, Rgba(*colors[b], TILE_OPACITY))
             meshcat.SetTransform(path, X_WS)
     bar = ColorBar(
-        title=f"share of {len(reachability.tilt)} hand orientations that the arm reaches",
+        title=f"share of {len(reachability.tilt)} hand orientations that the arm reaches,"
+        f" {condition}",
         colors=tuple(hex_color(color) for color in colors),
         counts=tuple(np.bincount(place.ravel(), minlength=BINS).tolist()),
         ticks=tuple((share, f"{share:g}") for share in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)),

@@ -11,7 +11,7 @@ from pydrake.geometry import Box, Rgba
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.visualization.legend import LegendEntry
-from burg_drake.visualization.page import overlay, save_html
+from burg_drake.visualization.page import panel, save_html
 from burg_drake.visualization.scene_view import open_meshcat
 
 
@@ -64,13 +64,27 @@ def test_title_and_caption_are_text(page: str) -> None:
     assert page.count("</body>") == 1
 
 
-def test_the_box_is_in_the_page_before_its_end(page: str) -> None:
-    assert page.index('<div id="burg">') < page.rindex("</body>")
+def test_the_panel_is_in_the_page_before_its_end(page: str) -> None:
+    assert page.index('<details id="burg" open>') < page.rindex("</body>")
     assert 'data-paths="/drake/a /drake/b"' in page
 
 
+def test_view_and_panel_are_beside_each_other(page: str) -> None:
+    """Meshcat puts its controls into its pane's parent, which has to be the view's element."""
+    (inside,) = re.findall(r'<div id="view">(.*?)<script', page, flags=re.DOTALL)
+    pane = r'\s*<div id="meshcat-pane">\s*</div>\s*</div>\s*'
+    assert re.fullmatch(pane, inside)
+    assert page.index('id="view"') < page.index('<details id="burg"')
+    (rule,) = re.findall(r"#burg \{[^}]*\}", page)
+    assert "position" not in rule
+
+
+def test_narrow_views_show_as_much_as_the_narrowest_that_cameras_are_aimed_for(page: str) -> None:
+    assert "Math.min(1, pane.offsetWidth / pane.offsetHeight / 1.2)" in page
+
+
 def test_legend_is_escaped() -> None:
-    html = overlay("t", [], [LegendEntry('<b>"', 'red"', ('/a"',))])
+    html = panel("t", [], [LegendEntry('<b>"', 'red"', ('/a"',))])
     assert "<b>" not in html
     assert 'red"' not in html
 

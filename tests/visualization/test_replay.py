@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import base64
 import dataclasses
-import re
 
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
+from eye import VIEWS, in_view, messages
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
+from burg_drake.core.frames import (
+    grasp_from_axes,
+    make_pose,
+    rotation_from_rpy,
+    transform_points,
+)
 from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import Margins, TrialResult
+from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
 from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import Station, load_station
 from burg_drake.visualization.replay import CLEAR_VIEW, VIEW, camera_offset, describe, record_trial
@@ -35,12 +39,6 @@ def station() -> Station:
     return load_station("panda_tabletop")
 
 
-def messages(meshcat: Meshcat) -> bytes:
-    """All that a saved page would send to the viewer."""
-    found = re.findall(r"base64,([A-Za-z0-9+/=]+)", meshcat.StaticHtml())
-    return b"".join(base64.b64decode(part) for part in found)
-
-
 def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
     early = HandTrial(scene, station).run("box", X_OG)
@@ -53,14 +51,23 @@ def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station:
     recording = meshcat.get_mutable_recording()
     assert recording.autoplay()
     assert recording.loop_mode() == type(recording).LoopMode.kLoopRepeat
-    assert b"set_animation" in messages(meshcat)
+    page = meshcat.StaticHtml()
+    assert b"set_animation" in b"".join(messages(page))
+    (x, y), X_WS = scene.board.size, station.document.X_WS.matrix()
+    board = transform_points(X_WS, [[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]])
+    X_WO = X_WS @ scene.X_SO("box")
+    hand = X_WO @ X_OG @ make_pose(p_AB=(0.0, 0.0, -0.15))  # behind its palm
+    raised = hand[:3, 3] + (0.0, 0.0, DEFAULT_TRIAL.lift_height)
+    for view in VIEWS:
+        seen = in_view(page, np.vstack([board, hand[:3, 3], raised]), view)
+        assert np.abs(seen).max() < 1.0, view
 
 
 def test_a_collision_is_a_still_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
     result = record_trial(scene, station, "box", X_OG @ make_pose(p_AB=(0, 0, 0.1)), meshcat)
     assert result.outcome is Outcome.COLLISION_TARGET
-    assert b"set_animation" not in messages(meshcat)
+    assert b"set_animation" not in b"".join(messages(meshcat.StaticHtml()))
     assert meshcat.HasPath("/drake/visualizer/hand/panda_hand")
 
 

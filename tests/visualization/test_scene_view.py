@@ -6,20 +6,18 @@ import dataclasses
 
 import numpy as np
 import pytest
+from eye import VIEWS, in_view
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import transform_points
 from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.robot import Robot
 from burg_drake.station.station import Station, load_station
 from burg_drake.visualization.scene_view import (
-    FIELD_OF_VIEW_DEG,
-    camera_placement,
     draw_board,
     open_meshcat,
     show_scene,
 )
-
-BOARD = np.array([0.594, 0.420])
-ASPECT = 1.5
 
 
 @pytest.fixture(scope="module")
@@ -67,32 +65,33 @@ def test_a_taken_port_is_named() -> None:
         open_meshcat(meshcat.port())
 
 
-def image_points(p_SC: np.ndarray, p_ST: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(N, 2) image coordinates; inside the picture they are between -1 and 1."""
-    forward = (p_ST - p_SC) / np.linalg.norm(p_ST - p_SC)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(right, forward), forward])
-    x, y, z = axes @ (points - p_SC).T
-    assert (z > 0.0).all()
-    half = np.tan(np.deg2rad(FIELD_OF_VIEW_DEG) / 2)
-    return np.stack([x / z / half / ASPECT, y / z / half], axis=1)
+ARM = np.array([[-0.13, 0.0, 0.0], [0.0, 0.0, 0.649], [0.50, 0.0, 0.60]])
+"""Base, elbow (333 + 316 mm high) and hand of the Panda at home, from its base [m]."""
 
 
-@pytest.mark.parametrize("across", [False, True])
-@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
-def test_the_board_is_in_the_picture(across: bool, scale: float) -> None:
-    size = scale * BOARD
-    p_ST, p_SC = camera_placement(size, across)
-    corners = np.array([[x, y, 0.0] for x in (0, size[0]) for y in (0, size[1])])
-    seen = image_points(p_SC, p_ST, corners)
-    assert np.abs(seen).max() < 1.0
-    assert np.ptp(seen[:, 0]) > 0.6, "the board is too small in the picture"
+def board_corners(scene: Scene, station: Station) -> np.ndarray:
+    x, y = scene.board.size
+    return transform_points(
+        station.document.X_WS.matrix(), [[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]]
+    )
 
 
-def test_the_arm_at_home_is_in_the_picture(station: Station) -> None:
-    p_ST, p_SC = camera_placement(BOARD, True)
-    X_WS = station.document.X_WS.matrix()
-    arm = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.85], [0.55, 0.0, 0.75]])
-    p_S = (arm - X_WS[:3, 3]) @ X_WS[:3, :3]
-    assert np.abs(image_points(p_SC, p_ST, p_S)).max() < 1.0
+@pytest.mark.parametrize("robot", ["arm", "none"])
+@pytest.mark.parametrize("scale", [0.5, 1.0, 3.0])
+def test_the_whole_board_and_the_arm_are_in_view(
+    scene: Scene, station: Station, robot: Robot, scale: float
+) -> None:
+    board = dataclasses.replace(scene.board, size=tuple(scale * np.array(scene.board.size)))
+    document = dataclasses.replace(scene.document, board=board, instances=())
+    empty = Scene(document, scene.library, scene.path)
+    meshcat = open_meshcat()
+    show_scene(empty, station, meshcat, robot=robot)
+    page, corners = meshcat.StaticHtml(), board_corners(empty, station)
+    for view in VIEWS:
+        assert np.abs(in_view(page, corners, view)).max() < 1.0, view
+        if robot == "arm":
+            assert station.document.arm is not None
+            p_WA = station.document.arm.X_WA.matrix()[:3, 3]
+            assert np.abs(in_view(page, p_WA + ARM, view)).max() < 1.0, view
+    if robot == "none":
+        assert np.ptp(in_view(page, corners, VIEWS[0]), axis=0).max() > 1.6, "the board is small"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from eye import VIEWS, in_view
 from pydrake.geometry import Meshcat
 
+from burg_drake.core.frames import transform_points
 from burg_drake.motion.arm_span import ArmSpan
 from burg_drake.motion.reachability import ReachabilityMap
 from burg_drake.motion.station_check import empty_scene
+from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import load_station
 from burg_drake.visualization.legend import ColorBar, LegendEntry
 from burg_drake.visualization.scene_view import open_meshcat
@@ -65,6 +68,29 @@ def test_a_station_without_an_arm_and_obstacles(meshcat: Meshcat) -> None:
     assert [entry.label for entry in legend if isinstance(entry, LegendEntry)] == [
         "cameras, upper edge bold"
     ]
+
+
+@pytest.mark.parametrize("name", ["panda_bin", "panda_tabletop", "wsg_tabletop"])
+def test_cameras_and_board_are_in_view(name: str) -> None:
+    station, meshcat = load_station(name), open_meshcat()
+    show_station(empty_scene(), station, meshcat)
+    page = meshcat.StaticHtml()
+    (x, y), X_WS = empty_scene().board.size, station.document.X_WS.matrix()
+    points = [transform_points(X_WS, [[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]])]
+    for camera in station.document.cameras.values():
+        X_WC = camera.X_WC.matrix()
+        ahead = 0.16 * X_WC[:3, 2]  # its image is drawn there
+        points.append(X_WC[None, :3, 3] + np.outer([0.0, 1.0], ahead))
+    for view in VIEWS:
+        assert np.abs(in_view(page, np.vstack(points), view)).max() < 1.0, view
+
+
+def test_the_share_says_what_stood_on_the_board(meshcat: Meshcat) -> None:
+    station = load_station("panda_tabletop")
+    for scene, text in ((empty_scene(), "board empty"), (load_scene("tabletop_six"), "6 objects")):
+        legend = show_station(scene, station, meshcat, reachability=checkered())
+        (bar,) = (entry for entry in legend if isinstance(entry, ColorBar))
+        assert text in bar.title
 
 
 def test_tiles_cover_their_cells_and_face_up() -> None:
