@@ -10,6 +10,9 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
 
 DAMAGED = (
     ArithmeticError,
@@ -30,6 +33,9 @@ DAMAGED = (
 """What they raise besides OSError. Numpy takes the header of an array for Python and believes the
 shape in it; h5py passes on what HDF5 finds in any of its structures."""
 
+LONGEST = 200
+"""Characters of what another library says; numpy repeats whole headers."""
+
 
 @contextmanager
 def without_warnings() -> Iterator[None]:
@@ -39,6 +45,31 @@ def without_warnings() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def reading(path: str | Path, kind: str) -> Iterator[None]:
+    """Makes one line that names the file of every error that reading it ends with.
+
+    Args:
+        path: the file.
+        kind: what it should be, such as `a .npy file of numbers`.
+
+    Raises:
+        InvalidInputError: in place of what is raised within; one that names the file stays.
+    """
+    try:
+        with without_warnings():
+            yield
+    except InvalidInputError as error:
+        if str(path) in str(error):
+            raise
+        raise InvalidInputError(f"{path}: {error}") from error
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {path}: {error.strerror or reason(error)}") from error
+    except DAMAGED as error:
+        raise InvalidInputError(f"{path} is not {kind}: {reason(error)}") from error
+
+
 def reason(error: Exception) -> str:
-    """What an error says, in one line."""
-    return str(error).partition("\n")[0] or type(error).__name__
+    """What an error says, in one line that is not too long."""
+    text = str(error).partition("\n")[0] or type(error).__name__
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

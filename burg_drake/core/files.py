@@ -5,10 +5,29 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import stat
 import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 from burg_drake.core.errors import InvalidInputError
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """Opens a file for reading bytes; a folder, device or pipe is refused, as it may never end.
+
+    Raises:
+        InvalidInputError: it is not there, cannot be read, or is no file.
+    """
+    try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise InvalidInputError(f"cannot read {path}: it is not a regular file")
+        return open(path, "rb")
+    except (OSError, ValueError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InvalidInputError(f"cannot read {path}: {why}") from error
 
 
 def atomic_write(path: str | Path, content: str | bytes) -> None:

@@ -118,19 +118,29 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
     X = np.asarray(X_AB, dtype=float)
     if X.shape[-2:] != (4, 4):
         raise InvalidInputError(f"{name} has shape {X.shape}; expected (..., 4, 4)")
-    if not np.isfinite(X).all():
-        raise InvalidInputError(
-            f"{name} has NaN or infinite numbers; give finite metres and angles"
-        )
+
+    def refuse(bad: NDArray[np.bool_], what: str) -> None:
+        if bad.any():
+            index = ", ".join(str(i) for i in np.argwhere(bad)[0])
+            raise InvalidInputError(f"{name}{f'[{index}]' if index else ''} {what}")
+
+    refuse(
+        ~np.isfinite(X).all(axis=(-2, -1)),
+        "has NaN or infinite numbers; give finite metres and angles",
+    )
     R = X[..., :3, :3]
-    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(initial=0.0)
-    if error > POSE_TOLERANCE or (np.linalg.det(R) < 0).any():
-        raise InvalidInputError(
-            f"{name} is not a rigid transform: its rotation part is off by {error:.2g}"
-            " from orthonormal or is a mirror image"
-        )
-    if np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(initial=0.0) > POSE_TOLERANCE:
-        raise InvalidInputError(f"{name} has a last row other than 0 0 0 1")
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size
+        off = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-2, -1))
+        mirrored = np.linalg.det(R) < 0.0
+    off = np.where(np.isnan(off), np.inf, off)
+    worst = f"{off.max(initial=0.0):.2g}"
+    refuse(
+        (off > POSE_TOLERANCE) | mirrored,
+        f"is not a rigid transform: its rotation part is off by {worst} from orthonormal or is a"
+        " mirror image",
+    )
+    last = np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
+    refuse(last > POSE_TOLERANCE, "has a last row other than 0 0 0 1")
     return X
 
 

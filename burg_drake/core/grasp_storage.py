@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.damaged import DAMAGED, reason, without_warnings
+from burg_drake.core.damaged import reading
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet, require_sound
+from burg_drake.core.hdf5 import is_hdf5, open_hdf5
+from burg_drake.core.numpy_file import open_npz
+from burg_drake.core.stored_array import NUMBERS, StoredArray
 
 FORMAT = "burg_drake.grasps"
 VERSION = 2
@@ -30,8 +33,6 @@ FIXED = ("X_OG", "width", "id", "object", "score")
 TEXT = ("id", "object")
 PREFIX = "column:"
 """Of the names of further columns in `.npz`."""
-
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 Columns = dict[str, NDArray[Any]]
 
@@ -49,22 +50,14 @@ def save_grasps(grasps: GraspSet, path: str | Path) -> None:
 
 def load_grasps(path: str | Path) -> GraspSet:
     """See `GraspSet.load`."""
-    try:
-        with open(path, "rb") as stream:
-            is_hdf5 = stream.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE
-        read = _read_hdf5 if is_hdf5 else _read_npz
-        with without_warnings():
-            header, fixed, columns = read(Path(path))
-            _check_types(header, fixed)
-            return GraspSet(**fixed, provenance=header["provenance"], columns=columns)
-    except InvalidInputError:
-        raise
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except DAMAGED as error:
-        raise InvalidInputError(
-            f"{path} is not a grasp set written by burg_drake: {reason(error)}"
-        ) from error
+    path = Path(path)
+    with reading(path, "a grasp set written by burg_drake"):
+        header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
+        if not isinstance(header["provenance"], dict):
+            raise ValueError("its provenance is no mapping")
+        grasps = GraspSet(**fixed, provenance=header["provenance"], columns=columns)
+        require_sound(grasps)
+        return grasps
 
 
 def _check(path: Path, header: dict[str, Any]) -> None:
@@ -75,12 +68,25 @@ def _check(path: Path, header: dict[str, Any]) -> None:
         )
 
 
-def _check_types(header: dict[str, Any], fixed: Columns) -> None:
-    if not isinstance(header["provenance"], dict):
-        raise ValueError("its provenance is no mapping")
-    for name, values in fixed.items():
-        if values.dtype.kind != ("U" if name in TEXT else "f"):
-            raise ValueError(f"{name} has values of type {values.dtype}")
+def _read_arrays(
+    array: Callable[[str], StoredArray], further: dict[str, str]
+) -> tuple[Columns, Columns]:
+    """The columns that every set has, and further ones.
+
+    Args:
+        array: what a file says of an array by its name.
+        further: names of arrays by names of columns.
+    """
+    for name in {*FIXED_COLUMNS, ""} & set(further):
+        raise ValueError(f"{name!r} is among its further columns")
+    poses = array("X_OG")
+    n = poses.rows(4, 4)
+    fixed = {"X_OG": poses.read("f").astype(float)}
+    for name in FIXED[1:]:
+        values = array(name).read("U" if name in TEXT else "f", (n,))
+        fixed[name] = values if name in TEXT else values.astype(float)
+    columns = {name: array(key).read(NUMBERS + "U", (n,)) for name, key in further.items()}
+    return fixed, columns
 
 
 def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
@@ -92,14 +98,11 @@ def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
 
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
-    with zipfile.ZipFile(path):  # np.load takes other kinds of file as well
-        pass
-    with np.load(path, allow_pickle=False) as data:
-        header = json.loads(str(data["header"]))
+    with open_npz(path) as file:
+        header = json.loads(str(file.array("header").read("U", ())))
         _check(path, header)
-        names = [name for name in data.files if name.startswith(PREFIX)]
-        columns = {name.removeprefix(PREFIX): data[name] for name in names}
-        return header, {name: data[name] for name in FIXED}, columns
+        further = {n.removeprefix(PREFIX): n for n in file.names if n.startswith(PREFIX)}
+        return header, *_read_arrays(file.array, further)
 
 
 def _hdf5(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
@@ -113,39 +116,33 @@ def _hdf5(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
             _write_dataset(file, name, values)
         further = file.create_group("columns", track_order=True)
         for name, values in columns.items():
+            if "/" in name or name in (".", ""):
+                raise InvalidInputError(
+                    f"HDF5 has no columns that are called {name!r}; rename it, or write .npz"
+                )
             _write_dataset(further, name, values)
     return buffer.getvalue()
 
 
 def _write_dataset(group: Any, name: str, values: NDArray[Any]) -> None:
-    """Text becomes UTF-8 of variable length; everything is compressed without loss."""
+    """Text becomes UTF-8 of fixed length, whose size a reader knows before it reads it; everything
+    is compressed without loss."""
     import h5py
 
-    text = values.dtype.kind == "U"
-    data = values.astype(object) if text else values
     packed = {"compression": "gzip", "shuffle": True} if values.size else {}
-    group.create_dataset(
-        name, data=data, dtype=h5py.string_dtype() if text else values.dtype, **packed
-    )
+    if values.dtype.kind == "U":
+        encoded = np.char.encode(values, "utf-8")
+        type = h5py.string_dtype("utf-8", max(1, encoded.dtype.itemsize))
+        group.create_dataset(name, data=encoded.astype(type), dtype=type, **packed)
+    else:
+        group.create_dataset(name, data=values, **packed)
 
 
 def _read_hdf5(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        if "format" not in file.attrs:
-            raise ValueError("an HDF5 file without the attribute `format`")
-        version = int(file.attrs["version"])
-        header: dict[str, Any] = {"format": str(file.attrs["format"]), "version": version}
+    with open_hdf5(path) as file:
+        version = int(file.attribute("version"))
+        header: dict[str, Any] = {"format": str(file.attribute("format")), "version": version}
         _check(path, header)
-        header["provenance"] = json.loads(file.attrs["provenance"])
-        columns = {name: _read_dataset(data) for name, data in file["columns"].items()}
-        return header, {name: _read_dataset(file[name]) for name in FIXED}, columns
-
-
-def _read_dataset(data: Any) -> NDArray[Any]:
-    import h5py
-
-    if h5py.check_string_dtype(data.dtype) is None:
-        return np.asarray(data[()])
-    return np.array(data.asstr()[()], dtype=str)
+        header["provenance"] = json.loads(file.attribute("provenance"))
+        further = {name: f"columns/{name}" for name in file.names("columns")}
+        return header, *_read_arrays(file.array, further)

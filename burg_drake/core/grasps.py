@@ -85,6 +85,7 @@ class GraspSet:
         n = len(poses)
         names = _column("object", np.asarray(object, dtype=str), n)
         widths = _column("width", np.asarray(np.nan if width is None else width, float), n) + 0.0
+        _require_widths(widths)
         scores = _column("score", np.asarray(np.nan if score is None else score, float), n)
         ids = _identifiers(names, poses, widths)
         try:
@@ -227,6 +228,38 @@ class GraspSet:
         from burg_drake.core.grasp_storage import load_grasps
 
         return load_grasps(path)
+
+
+def require_sound(grasps: GraspSet) -> None:
+    """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
+
+    Grasps that are there several times, with the same identifier, object, pose and width, are fine.
+
+    Raises:
+        InvalidInputError: a pose is not a finite rigid transform, a width is infinite, or grasps
+            that differ have the same identifier; the message names the first ones.
+    """
+    check_pose(grasps.X_OG, "X_OG")
+    _require_widths(grasps.width)
+    _, first, same = np.unique(grasps.id, return_index=True, return_inverse=True)
+    twin = first[same]
+    differs = (grasps.object != grasps.object[twin]) | (grasps.X_OG[twin] != grasps.X_OG).any(
+        (1, 2)
+    )
+    differs |= ~((grasps.width == grasps.width[twin]) | np.isnan(grasps.width))
+    differs |= np.isnan(grasps.width) != np.isnan(grasps.width[twin])
+    if differs.any():
+        i = int(np.argmax(differs))
+        raise InvalidInputError(
+            f"id[{twin[i]}] and id[{i}] are both {str(grasps.id[i])!r}, but these are different"
+            " grasps; give each an identifier of its own"
+        )
+
+
+def _require_widths(width: Array) -> None:
+    if (bad := np.isinf(width)).any():
+        i = int(np.argmax(bad))
+        raise InvalidInputError(f"width[{i}] is {width[i]}; give metres, or NaN if unknown")
 
 
 def _column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:

@@ -87,7 +87,8 @@ def read_grasps(
                 f"{path} has grasps in the frames of their objects, to which neither a pose nor"
                 " object ids apply"
             )
-        return GivenGrasps(_of_names(grasps, names), imported.notes)
+        found = _of_names(grasps, names)
+        return GivenGrasps(found, (*imported.notes, *_repeated(found, names.path)))
     if frame == "camera" and X_SF is None:
         raise InvalidInputError(
             f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
@@ -96,7 +97,13 @@ def read_grasps(
     X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
     owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
     placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
-    return GivenGrasps(placed, (*imported.notes, *notes))
+    return GivenGrasps(placed, (*imported.notes, *notes, *_repeated(placed, names.path)))
+
+
+def _repeated(by_instance: Mapping[str, GraspSet], path: str) -> tuple[str, ...]:
+    """A note about grasps that are there several times, which `given_candidates` leaves out."""
+    count = sum(len(part) - len(np.unique(part.id)) for part in by_instance.values())
+    return (f"{count} grasps of {path} repeat others; each is judged once.",) if count else ()
 
 
 def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:

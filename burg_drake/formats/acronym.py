@@ -30,12 +30,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.damaged import DAMAGED, reason
+from burg_drake.core.damaged import DAMAGED, reading
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, inverse
-from burg_drake.core.grasp_storage import HDF5_SIGNATURE
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
+from burg_drake.core.hdf5 import Hdf5File, is_hdf5, open_hdf5
+from burg_drake.core.stored_array import NUMBERS, Shape
 from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
 from burg_drake.formats.one_object import (
@@ -59,8 +60,12 @@ MOTIONS = tuple(
     for kind in ("angular", "linear")
 )
 """Trials' results of FleX besides `object_in_gripper`."""
-PHYSICAL = ("mass", "friction", "density", "volume", "com", "inertia")
-"""What files say of their object besides mesh and scale."""
+PHYSICAL: dict[str, tuple[Shape, ...]] = {
+    **dict.fromkeys(("mass", "friction", "density", "volume"), ((), (1,))),
+    "com": ((3,),),
+    "inertia": ((3, 3), (9,)),
+}
+"""What files say of their object besides mesh and scale, with its shapes."""
 KIND = "an ACRONYM file"
 
 
@@ -72,12 +77,9 @@ def X_GF(gripper: Gripper) -> Array:
 def recognises(path: Path) -> bool:
     """An HDF5 file with `grasps/transforms`."""
     try:
-        with open(path, "rb") as stream:
-            if stream.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
-                return False
-        import h5py
-
-        with h5py.File(path, "r") as file:
+        if not is_hdf5(path):
+            return False
+        with open_hdf5(path) as file:
             return TRANSFORMS in file
     except (OSError, *DAMAGED):
         return False
@@ -89,37 +91,27 @@ def read(path: Path, gripper: Gripper) -> Imported:
     Raises:
         InvalidInputError: no such file, or a value that cannot be used; the message says where.
     """
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return _read(path, file, gripper)
-    except InvalidInputError:
-        raise
-    except OSError as error:
-        why = error.strerror or "it is no HDF5 file, or only part of one"
-        raise InvalidInputError(f"cannot read {path}: {why}") from error
-    except DAMAGED as error:
-        raise InvalidInputError(f"{path} is a damaged HDF5 file: {reason(error)}") from error
+    with reading(path, "an HDF5 file that can be read"), open_hdf5(path) as file:
+        return _read(path, file, gripper)
 
 
-def _read(path: Path, file: Any, gripper: Gripper) -> Imported:
+def _read(path: Path, file: Hdf5File, gripper: Gripper) -> Imported:
     notes: tuple[str, ...] = ()
-    X_OF, rounded = nearest_rigid(_values(path, file, TRANSFORMS), f"{path}: {TRANSFORMS}")
-    mesh = _text(path, file, "object/file")
-    scale = _number(path, file, "object/scale")
+    X_OF, rounded = nearest_rigid(_poses(file), f"{path}: {TRANSFORMS}")
+    mesh = _text(file, "object/file")
+    scale = _number(file, "object/scale")
     if scale <= 0.0:
         raise InvalidInputError(f"{path}: object/scale is {scale:g}; it must be above 0")
     name = object_name(mesh)
     described: dict[str, Any] = {"file": mesh, "scale": scale}
-    for key in PHYSICAL:
+    for key, shapes in PHYSICAL.items():
         if f"object/{key}" in file:
-            values = _values(path, file, f"object/{key}").astype(float)
+            values = file.array(f"object/{key}").read(NUMBERS, *shapes).astype(float)
             if np.isfinite(values).all():
                 described[key] = values.tolist()
     if "gripper/type" in file:
-        notes = check_hand(_text(path, file, "gripper/type"), gripper, f"{path}: gripper/type")
-    columns = _qualities(path, file, len(X_OF))
+        notes = check_hand(_text(file, "gripper/type"), gripper, f"{path}: gripper/type")
+    columns = _qualities(file, len(X_OF))
     success = columns.pop(SUCCESS_COLUMN, None)
     width = columns.pop("width", None)
     score = columns.pop("score", success)
@@ -140,62 +132,39 @@ def _read(path: Path, file: Any, gripper: Gripper) -> Imported:
     return Imported(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
 
 
-def _qualities(path: Path, file: Any, n: int) -> dict[str, NDArray[Any]]:
+def _poses(file: Hdf5File) -> NDArray[Any]:
+    if TRANSFORMS not in file:
+        raise InvalidInputError(f"{file.path}: {TRANSFORMS} is missing; is it a file of ACRONYM?")
+    stored = file.array(TRANSFORMS)
+    stored.rows(4, 4)
+    return stored.read("fiu")
+
+
+def _qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
     """(n,) values by column: of FleX and of us under their names, of others as `WHO.NAME`."""
     columns: dict[str, NDArray[Any]] = {}
     if QUALITIES not in file:
         return columns
-    for who in _group(path, file, QUALITIES):
-        for name in _group(path, file, f"{QUALITIES}/{who}"):
-            key = f"{QUALITIES}/{who}/{name}"
-            values = _values(path, file, key)
-            if values.shape != (n,):
-                raise InvalidInputError(
-                    f"{path}: {key} has shape {values.shape}; expected ({n},), one value a grasp"
-                )
+    for who in file.names(QUALITIES):
+        for name in file.names(f"{QUALITIES}/{who}"):
+            values = file.array(f"{QUALITIES}/{who}/{name}").read(NUMBERS, (n,))
             plain = who in (SIMULATOR, OURS) and name not in FIXED_COLUMNS
             plain = plain or (who == OURS and name in ("score", "width"))
             columns[name if plain else f"{who}.{name}"] = values.astype(float)
     return columns
 
 
-def _group(path: Path, file: Any, key: str) -> Any:
-    group = file[key]
-    if not hasattr(group, "items"):
-        raise InvalidInputError(f"{path}: {key} is a dataset; expected a group")
-    return group
+def _number(file: Hdf5File, key: str) -> float:
+    values = file.array(key).read("fiu", (), (1,))
+    if not np.isfinite(values).all():
+        raise InvalidInputError(f"{file.path}: {key} is {values.item()}; expected a finite number")
+    return float(values.item())
 
 
-def _dataset(path: Path, file: Any, key: str) -> Any:
-    if key not in file:
-        raise InvalidInputError(f"{path}: {key} is missing; is it a file of ACRONYM?")
-    if not hasattr(file[key], "dtype"):
-        raise InvalidInputError(f"{path}: {key} is a group; expected a dataset")
-    return file[key]
-
-
-def _values(path: Path, file: Any, key: str) -> NDArray[Any]:
-    values = np.asarray(_dataset(path, file, key)[()])
-    if values.dtype.kind not in "fiub":
-        raise InvalidInputError(f"{path}: {key} has type {values.dtype}; expected numbers")
-    return values
-
-
-def _number(path: Path, file: Any, key: str) -> float:
-    values = _values(path, file, key)
-    if values.size != 1 or not np.isfinite(values).all():
-        raise InvalidInputError(f"{path}: {key} is {values.tolist()}; expected one finite number")
-    return float(values.reshape(-1)[0])
-
-
-def _text(path: Path, file: Any, key: str) -> str:
-    value = _dataset(path, file, key)[()]
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.reshape(-1)[0]
-    if isinstance(value, bytes):
-        value = value.decode("utf-8", "replace")
-    if not isinstance(value, str) or not value:
-        raise InvalidInputError(f"{path}: {key} is not a text; expected a name")
+def _text(file: Hdf5File, key: str) -> str:
+    value = str(file.array(key).read("U", (), (1,)).item())
+    if not value:
+        raise InvalidInputError(f"{file.path}: {key} is empty; expected a name")
     return value
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 from burg_drake.core.damaged import DAMAGED
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasp_storage import FORMAT as MARK
-from burg_drake.core.grasp_storage import HDF5_SIGNATURE
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.hdf5 import is_hdf5, open_hdf5
+from burg_drake.core.numpy_file import open_npz
 from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
 
 
@@ -19,15 +19,11 @@ def _X_GF(gripper: Gripper) -> Array:
 
 def _recognises(path: Path) -> bool:
     try:
-        with open(path, "rb") as stream:
-            start = stream.read(len(HDF5_SIGNATURE))
-        if start == HDF5_SIGNATURE:
-            import h5py
-
-            with h5py.File(path, "r") as file:
-                return bool(file.attrs.get("format") == MARK)
-        with zipfile.ZipFile(path) as archive:
-            return {"header.npy", "X_OG.npy"} <= set(archive.namelist())
+        if is_hdf5(path):
+            with open_hdf5(path) as tree:
+                return bool(tree.attribute("format") == MARK)
+        with open_npz(path) as file:
+            return {"header", "X_OG"} <= set(file.names)
     except (OSError, *DAMAGED):
         return False
 

@@ -27,9 +27,10 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.numpy_file import npy_shape, open_npy, write_npy
+from burg_drake.core.stored_array import require_grasps
 from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
-from burg_drake.formats.npy_array import npy_shape, read_npy, write_npy
 from burg_drake.formats.rigid import nearest_rigid
 
 ROW = 14
@@ -50,11 +51,14 @@ def _recognises(path: Path) -> bool:
 
 
 def _read(path: Path, gripper: Gripper) -> Imported:
-    values = read_npy(path)
-    if not _is_grasps(values.shape):
-        raise InvalidInputError(
-            f"{path} has shape {values.shape}; grasps of BURG-Toolkit have (n, 4, 4) or (n, {ROW})"
-        )
+    with open_npy(path) as stored:
+        if not _is_grasps(stored.shape):
+            raise InvalidInputError(
+                f"{path} has shape {stored.shape}; grasps of BURG-Toolkit have (n, 4, 4) or"
+                f" (n, {ROW})"
+            )
+        require_grasps(str(path), stored.shape[0])
+        values = stored.read("fiu").astype(float)
     width = score = None
     where = str(path)
     if values.ndim == 2:

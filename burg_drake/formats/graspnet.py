@@ -29,9 +29,9 @@ from numpy.typing import ArrayLike
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.numpy_file import npy_shape, open_npy, write_npy
 from burg_drake.formats.grasp_format import PREGRASP_WIDTH, GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
-from burg_drake.formats.npy_array import npy_shape, read_npy, write_npy
 from burg_drake.formats.rigid import nearest_rigid
 
 NUMBERS = 17
@@ -67,11 +67,9 @@ def _recognises(path: Path) -> bool:
 
 
 def _read(path: Path, gripper: Gripper) -> Imported:
-    rows = read_npy(path)
-    if rows.ndim != 2 or rows.shape[1] != NUMBERS:
-        raise InvalidInputError(
-            f"{path} has shape {rows.shape}; GraspNet's grasps have (N, {NUMBERS})"
-        )
+    with open_npy(path) as stored:
+        stored.rows(NUMBERS)
+        rows = stored.read("fiu").astype(float)
     bad = ~np.isfinite(rows[:, DEPTH]) | (np.abs(rows[:, DEPTH]) > 1.0)
     if bad.any():
         i = int(np.argmax(bad))

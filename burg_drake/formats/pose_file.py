@@ -14,10 +14,10 @@ from typing import cast
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.numpy_file import open_npy
 from burg_drake.core.reader import Reader
 from burg_drake.core.schema import Pose
 from burg_drake.core.yaml_nodes import load_nodes
-from burg_drake.formats.npy_array import read_npy
 from burg_drake.formats.rigid import nearest_rigid
 
 
@@ -51,9 +51,12 @@ def _read_pose(reference: str) -> Array:
         if index is not None:
             raise InvalidInputError(f"{path} holds one pose; leave out ':{index}'")
         return cast(Pose, Reader(str(path)).read(load_nodes(path), Pose, "")).matrix()
-    poses = read_npy(path)
-    if poses.shape[-2:] != (4, 4) or poses.ndim > 3:
-        raise InvalidInputError(f"{path} has shape {poses.shape}; expected (4, 4) or (N, 4, 4)")
+    with open_npy(path) as stored:
+        if stored.shape[-2:] != (4, 4) or len(stored.shape) > 3:
+            raise InvalidInputError(
+                f"{path} has shape {stored.shape}; expected (4, 4) or (N, 4, 4)"
+            )
+        poses = stored.read("fiu").astype(float)
     if index is None:
         if poses.ndim == 3 and len(poses) != 1:
             raise InvalidInputError(

@@ -160,18 +160,18 @@ def test_check_pose_error_texts():
     bad = good.copy()
     bad[1, 0, 3] = np.nan
     assert message(bad) == (
-        "X_SO of 'mug' has NaN or infinite numbers; give finite metres and angles"
+        "X_SO of 'mug'[1] has NaN or infinite numbers; give finite metres and angles"
     )
     bad = good.copy()
     bad[2, :3, :3] *= 1.01
     assert message(bad) == (
-        "X_SO of 'mug' is not a rigid transform: its rotation part is off by 0.02"
+        "X_SO of 'mug'[2] is not a rigid transform: its rotation part is off by 0.02"
         " from orthonormal or is a mirror image"
     )
     assert "mirror image" in message(np.diag([1.0, 1.0, -1.0, 1.0]))
     bad = good.copy()
     bad[0, 3, 0] = 0.5
-    assert message(bad) == "X_SO of 'mug' has a last row other than 0 0 0 1"
+    assert message(bad) == "X_SO of 'mug'[0] has a last row other than 0 0 0 1"
 
 
 def test_check_pose_accepts_what_text_files_round():

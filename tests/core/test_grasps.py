@@ -263,8 +263,9 @@ def test_files_that_are_no_grasp_set(tmp_path: Path):
         )
     np.save(tmp_path / "burg.npy", poses(3))
     np.savez(tmp_path / "other.npz", grasps=poses(3))
-    for name in ("burg.npy", "other.npz", "other.h5", "torn.h5"):
+    for name in ("burg.npy", "other.npz", "other.h5"):
         assert "is not a grasp set" in message(tmp_path / name)
+    assert message(tmp_path / "torn.h5").endswith("torn.h5: columns is missing")
     with h5py.File(tmp_path / "kinds.h5", "w") as file:
         file.attrs.update(format="burg_drake.grasps", version=2, provenance="{}")
         file.update({"X_OG": poses(3), "width": np.ones(3), "score": np.ones(3)})
@@ -282,3 +283,84 @@ def test_a_newer_version_is_named(tmp_path: Path):
     np.savez(tmp_path / "new.npz", header=np.array(json.dumps(header)), poses=poses(2))
     with pytest.raises(InvalidInputError, match=r"version 3; this release .* version 1 and 2$"):
         GraspSet.load(tmp_path / "new.npz")
+
+
+def rewritten(path: Path, **changed: object) -> Path:
+    """A file of a set with arrays replaced, of either kind."""
+    grasps(12).save(path)
+    if path.suffix == ".h5":
+        with h5py.File(path, "a") as file:
+            for name, values in changed.items():
+                del file[name]
+                if isinstance(values, np.ndarray):
+                    file[name] = values.astype("S") if values.dtype.kind == "U" else values
+                else:  # a shape, of which nothing is stored
+                    file.create_dataset(name, values, "f8", chunks=(1000,))
+    else:
+        with np.load(path) as data:
+            arrays = dict(data)
+        for name, values in changed.items():
+            many = isinstance(values, tuple)
+            arrays[name] = np.broadcast_to(0.0, 1_000_000) if many else values
+        np.savez_compressed(path, **arrays)
+    return path
+
+
+def spoilt(index: int, value: float, row: int = 0, column: int = 0) -> np.ndarray:
+    X = grasps(12).X_OG
+    X[index, row, column] = value
+    return X
+
+
+ids = grasps(12).id
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".h5"])
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"X_OG": spoilt(7, np.nan)}, r"X_OG\[7\] has NaN or infinite numbers"),
+        ({"X_OG": spoilt(3, np.inf, 1, 3)}, r"X_OG\[3\] has NaN or infinite numbers"),
+        ({"X_OG": spoilt(5, 3.0)}, r"X_OG\[5\] is not a rigid transform"),
+        ({"X_OG": spoilt(2, 1e200)}, r"X_OG\[2\] is not a rigid transform"),
+        ({"X_OG": spoilt(1, 0.5, 3, 3)}, r"X_OG\[1\] has a last row other than 0 0 0 1"),
+        ({"X_OG": np.zeros((12, 3, 4))}, r"X_OG has shape \(12, 3, 4\); expected \(N, 4, 4\)"),
+        ({"width": np.full(12, np.inf)}, r"width\[0\] is inf"),
+        ({"width": (750_000_000,)}, r"width has shape \(\d+,\); expected \(12,\)"),
+        ({"id": np.array([*ids[:9], ids[4], *ids[10:]])}, rf"id\[4\] and id\[9\] are .*{ids[4]}"),
+        ({"id": np.array([""] * 12)}, r"id\[0\] and id\[1\] are both ''"),
+    ],
+)
+def test_a_file_that_no_set_can_be_of_is_refused(tmp_path, suffix, changed, said):
+    path = rewritten(tmp_path / f"a{suffix}", **changed)
+    with pytest.raises(InvalidInputError, match=rf"^{path}: {said}"):
+        GraspSet.load(path)
+
+
+def test_a_grasp_may_be_listed_more_than_once(tmp_path: Path):
+    several = grasps(4).select([0, 1, 0, 3, 1]).with_columns(instance=list("abcde"))
+    unknown = GraspSet.create(np.stack([np.eye(4)] * 2), object="mug")
+    for one in (several, unknown):
+        one.save(tmp_path / "a.h5")
+        assert_identical(GraspSet.load(tmp_path / "a.h5"), one)
+
+
+def test_texts_of_variable_length_are_read_as_files_of_before_have_them(tmp_path: Path):
+    path = tmp_path / "a.h5"
+    grasps().save(path)
+    with h5py.File(path, "a") as file:
+        for name in ("id", "object", "columns/instance"):
+            texts = file[name].asstr()[()]
+            del file[name]
+            file.create_dataset(name, data=texts, dtype=h5py.string_dtype(), compression="gzip")
+    loaded = GraspSet.load(path)
+    assert loaded.object.tolist() == grasps().object.tolist()
+    assert loaded.column("instance").tolist() == grasps().column("instance").tolist()
+
+
+def test_a_column_that_would_be_a_folder_of_the_file_is_refused(tmp_path: Path):
+    odd = grasps().with_columns(**{"a/b": 1.0})
+    with pytest.raises(InvalidInputError, match=r"no columns that are called 'a/b'.*write \.npz"):
+        odd.save(tmp_path / "a.h5")
+    odd.save(tmp_path / "a.npz")
+    assert "a/b" in GraspSet.load(tmp_path / "a.npz").column_names

@@ -69,6 +69,13 @@ def test_a_file_of_one_object_goes_to_all_its_instances(scene: Scene, tmp_path: 
     assert poses(named) == {"right": heights}
 
 
+def test_grasps_that_are_listed_more_than_once_are_told(scene: Scene, tmp_path: Path) -> None:
+    grasps = GraspSet.create(down((0, 0, 0), (0, 0, 0.01)), object="bar").select([0, 1, 0, 0])
+    grasps.save(tmp_path / "a.h5")
+    (note,) = read_grasps(scene, tmp_path / "a.h5").notes
+    assert note == f"2 grasps of {tmp_path / 'a.h5'} repeat others; each is judged once."
+
+
 def test_grasps_of_several_objects(scene: Scene, tmp_path: Path) -> None:
     X_OG = down((0, 0, 0), (0, 0, 0.01), (0, 0, 0.02))
     GraspSet.create(X_OG, object=["a", "bar", "b"]).save(tmp_path / "a.h5")

@@ -227,11 +227,11 @@ def test_other_files(tmp_path: Path) -> None:
     (tmp_path / "cut.npy").write_bytes(good.read_bytes()[:-20])
     (tmp_path / "empty.npy").write_bytes(b"")
     for name, message in {
-        "rect.npy": r"has shape \(3, 7\); GraspNet's grasps have \(N, 17\)",
-        "text.npy": "has values of type <U1; expected numbers",
-        "objects.npy": "is not a .npy file of numbers: Object arrays cannot be loaded",
+        "rect.npy": r"has shape \(3, 7\); expected \(N, 17\)",
+        "text.npy": r"has shape \(1,\); expected \(N, 17\)",
+        "objects.npy": "holds Python objects, which are not read",
         "zip.npy.npz": "is not a .npy file of numbers: the magic string is not correct",
-        "cut.npy": "is not a .npy file of numbers",
+        "cut.npy": "is damaged or cut off: an array of shape",
         "empty.npy": "is not a .npy file of numbers",
         "missing.npy": "cannot read .*: No such file or directory",
     }.items():
