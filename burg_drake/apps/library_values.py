@@ -155,7 +155,8 @@ def _read_masses(path: Path, names: set[str]) -> dict[str, float]:
     """Masses [kg] by object name, of a YAML file with a line `NAME: KG` for each object."""
     import yaml
 
-    from burg_drake.core.yaml_nodes import parse_nodes, read_text
+    from burg_drake.core.document_text import read_text
+    from burg_drake.core.yaml_nodes import parse_nodes
     from burg_drake.pipeline.source import object_name
 
     expected = "expected lines 'NAME: KG', such as 'mug: 0.118'"

@@ -8,14 +8,15 @@ from typing import Any
 import yaml
 
 from burg_drake.cameras.intrinsics import Intrinsics, of_camera
+from burg_drake.cameras.opencv_file import is_opencv, read_opencv
 from burg_drake.cameras.station_camera import SIMULATED, simulated_camera
-from burg_drake.core.errors import DocumentError, InvalidInputError
+from burg_drake.core.document_text import read_text
+from burg_drake.core.errors import DocumentError, InvalidInputError, quoted
 from burg_drake.core.files import atomic_write
+from burg_drake.core.json_text import DIGITS
 from burg_drake.core.schema import parse_document, save_document
-from burg_drake.core.yaml_nodes import parse_nodes, read_text
+from burg_drake.core.yaml_texts import Tree, parse_texts
 
-OPENCV_MARKS = ("%YAML:1.0", "!!opencv-matrix", "<opencv_storage>")
-"""Of files that OpenCV writes."""
 ROS_MATRIX = ("camera_matrix", "K", "k")
 ROS_DISTORTION = ("distortion_coefficients", "D", "d")
 """Keys of a calibration file, and of a printed message of ROS 1 and ROS 2."""
@@ -40,14 +41,13 @@ def load_intrinsics(path: str | Path) -> Intrinsics:
         station, camera = simulated_camera(str(path))
         return of_camera(station.camera(camera))
     text = read_text(path)
-    if any(mark in text for mark in OPENCV_MARKS):
-        return _of_opencv(text, str(path))
-    text = text.removesuffix("\n").removesuffix("\n---")  # behind a printed message
-    node = parse_nodes(text, str(path), "the document is empty; expected a camera's intrinsics")
-    keys = [key.value for key, _ in node.value] if isinstance(node, yaml.MappingNode) else ()
-    if "focal" not in keys and any(key in keys for key in ROS_MATRIX):
-        return _of_ros(yaml.safe_load(text), str(path))
-    return parse_document(text, Intrinsics, str(path))
+    name = str(path)
+    if is_opencv(text):
+        return _of_opencv(read_opencv(text, name), name)
+    data = parse_texts(text, name, empty="the document is empty; expected a camera's intrinsics")
+    if isinstance(data, dict) and "focal" not in data and any(key in data for key in ROS_MATRIX):
+        return _of_ros(data, name)
+    return parse_document(text, Intrinsics, name)
 
 
 def save_intrinsics(intrinsics: Intrinsics, path: str | Path, header: str = "") -> None:
@@ -104,11 +104,9 @@ def _matrix(rows: int, columns: int, data: list[float]) -> dict[str, Any]:
     return {"rows": rows, "cols": columns, "data": data}
 
 
-def _of_ros(data: dict[str, Any], name: str) -> Intrinsics:
-    model = str(data.get("distortion_model", "") or "")
-    K = _numbers(data, ROS_MATRIX, name)
-    if len(K) != 9:
-        raise DocumentError(f"{name}: the camera matrix has {len(K)} numbers; 9 are needed")
+def _of_ros(data: Tree, name: str) -> Intrinsics:
+    model = _text(data, "distortion_model", name)
+    K = _camera_matrix(data, name)
     if K[0] == 0.0:
         raise DocumentError(f"{name}: the camera is not calibrated (its fx is 0)")
     if abs(K[1]) > 1e-6 * K[0]:
@@ -118,7 +116,7 @@ def _of_ros(data: dict[str, Any], name: str) -> Intrinsics:
     if model not in ROS_MODELS:
         fisheye = " (a fisheye lens)" if model in ("equidistant", "fisheye") else ""
         raise InvalidInputError(
-            f"{name}: distortion_model {model!r}{fisheye} is not supported, plumb_bob and"
+            f"{name}: distortion_model {quoted(model)}{fisheye} is not supported, plumb_bob and"
             " rational_polynomial are; `burg-drake camera calibrate --model rational` makes one"
         )
     if any(coefficients) and len(coefficients) not in ROS_MODELS[model]:
@@ -128,33 +126,60 @@ def _of_ros(data: dict[str, Any], name: str) -> Intrinsics:
         )
     return _intrinsics(
         name,
-        camera=str(data.get("camera_name", "")),
-        size=(_pixels(data, "width", name), _pixels(data, "height", name)),
+        camera=_text(data, "camera_name", name),
+        size=_size(data, name),
         K=K,
         coefficients=coefficients if any(coefficients) else [],
     )
 
 
-def _refuse_part_of_image(data: dict[str, Any], name: str) -> None:
+def _refuse_part_of_image(data: Tree, name: str) -> None:
     """A message tells K of the sensor's image, and which part of it the images are."""
-    binning = [int(data.get(key) or 1) for key in ("binning_x", "binning_y")]
-    roi = data.get("roi") or {}
-    part = [int(roi.get(key) or 0) for key in ("x_offset", "y_offset", "width", "height")]
-    if max(binning) > 1 or any(part):
+    binning = [_whole(data, key, name) for key in ("binning_x", "binning_y") if key in data]
+    roi = data.get("roi")
+    if isinstance(roi, dict):
+        keys = ("x_offset", "y_offset", "width", "height")
+        part = [_whole(roi, key, name) for key in keys if key in roi]
+    else:
+        part = []
+    if any(n > 1 for n in binning) or any(part):
         raise InvalidInputError(
             f"{name}: images are a part of what the camera matrix is of (binning or roi); that is"
             " not supported: calibrate at the resolution that you use"
         )
 
 
-def _pixels(data: dict[str, Any], side: str, name: str) -> int:
-    value = data.get(f"image_{side}", data.get(side))
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise DocumentError(f"{name}: image_{side} must be a whole number of pixels, not {value!r}")
+def _size(data: Tree, name: str) -> tuple[int, int]:
+    """Width and height, which messages call by other keys than files."""
+    keys = [
+        side if side in data and f"image_{side}" not in data else f"image_{side}"
+        for side in ("width", "height")
+    ]
+    return _whole(data, keys[0], name), _whole(data, keys[1], name)
+
+
+def _whole(data: Tree, key: str, name: str) -> int:
+    value = data.get(key)
+    if isinstance(value, str) and len(value) <= DIGITS and value.isdecimal():
+        return int(value)
+    raise DocumentError(f"{name}: {key} must be a whole number of pixels, not {quoted(value)}")
+
+
+def _text(data: Tree, key: str, name: str) -> str:
+    value = data.get(key, "")
+    if not isinstance(value, str):
+        raise DocumentError(f"{name}: {key} is a structure; expected a text")
     return value
 
 
-def _numbers(data: dict[str, Any], keys: tuple[str, ...], name: str) -> list[float]:
+def _camera_matrix(data: Tree, name: str) -> list[float]:
+    K = _numbers(data, ROS_MATRIX, name)
+    if len(K) != 9:
+        raise DocumentError(f"{name}: the camera matrix has {len(K)} numbers; 9 are needed")
+    return K
+
+
+def _numbers(data: Tree, keys: tuple[str, ...], name: str) -> list[float]:
     """A matrix of a file, or a list of a message, whose key may be any of some."""
     key = next((key for key in keys if key in data), None)
     value = None if key is None else data[key]
@@ -168,31 +193,28 @@ def _numbers(data: dict[str, Any], keys: tuple[str, ...], name: str) -> list[flo
     raise DocumentError(f"{name}: {key or keys[0]} is not a list of numbers")
 
 
-def _of_opencv(text: str, name: str) -> Intrinsics:
-    import cv2
-
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        K = storage.getNode("camera_matrix").mat()
-        k = storage.getNode("distortion_coefficients").mat()
-        size = [int(storage.getNode(f"image_{side}").real()) for side in ("width", "height")]
-        is_fisheye = storage.getNode("fisheye_model").real() == 1.0
-        residual = storage.getNode("avg_reprojection_error")
-        rms = None if residual.empty() else float(residual.real())
-    except (cv2.error, SystemError) as error:
-        raise DocumentError(f"{name} is not a file of OpenCV that can be read") from error
-    if K is None or K.shape != (3, 3):
+def _of_opencv(data: Tree, name: str) -> Intrinsics:
+    if not isinstance(data, dict) or "camera_matrix" not in data:
         raise DocumentError(f"{name}: camera_matrix with 3 x 3 numbers is missing")
+    K = _camera_matrix(data, name)
+    try:
+        is_fisheye = float(data.get("fisheye_model", 0)) == 1.0
+        rms = float(data["avg_reprojection_error"]) if "avg_reprojection_error" in data else None
+    except (TypeError, ValueError) as error:
+        raise DocumentError(
+            f"{name}: fisheye_model and avg_reprojection_error have to be numbers"
+        ) from error
     if is_fisheye:
         raise InvalidInputError(f"{name}: the fisheye model is not supported; use --model rational")
-    coefficients = [] if k is None else k.ravel().tolist()
+    key = ROS_DISTORTION[0]
+    coefficients = _numbers(data, (key,), name) if key in data else []
     if not any(coefficients[5:]):
         coefficients = coefficients[:5]  # OpenCV pads to the longest model
     return _intrinsics(
         name,
         camera="",
-        size=(size[0], size[1]),
-        K=K.ravel().tolist(),
+        size=_size(data, name),
+        K=K,
         coefficients=coefficients if any(coefficients) else [],
         residual=rms,
     )

@@ -6,11 +6,16 @@ A grasp that slips and a pose out of reach are outcomes, not errors; see `core.o
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Sequence
 
 MANY = 24
 FEW = 8
 """More names than `MANY` are too many for a message; it then has the first `FEW`."""
+
+
+SHOWN = 60
+"""Characters of a value that a message repeats."""
 
 
 class BurgError(Exception):
@@ -54,6 +59,24 @@ class MissingDependencyError(BurgError, ImportError):
 
 class SimulationError(BurgError, RuntimeError):
     """Drake could not step or evaluate a diagram that should have been sound."""
+
+
+def quoted(value: object) -> str:
+    """A value from outside as a message repeats it: in quotes if it is a text, never long.
+
+    Of a long text the beginning and the end are shown, of a structure the first few items.
+    """
+    return shown(_QUOTES.repr(value), 2 * SHOWN)
+
+
+def shown(text: str, length: int = SHOWN) -> str:
+    """A text from outside as a message repeats it without quotes: the beginning of a long one."""
+    return text if len(text) <= length else f"{text[: length - 3]}..."
+
+
+_QUOTES = reprlib.Repr()
+_QUOTES.maxlevel = 2
+_QUOTES.maxstring = _QUOTES.maxother = _QUOTES.maxlong = SHOWN
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -21,6 +21,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet, require_sound
 from burg_drake.core.hdf5 import is_hdf5, open_hdf5
+from burg_drake.core.json_text import parse_json
 from burg_drake.core.numpy_file import open_npz
 from burg_drake.core.stored_array import NUMBERS, StoredArray
 
@@ -99,7 +100,8 @@ def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
     with open_npz(path) as file:
-        header = json.loads(str(file.array("header").read("U", ())))
+        text = str(file.array("header").read("U", ()))
+        header = parse_json(text, f"{path}: header")
         _check(path, header)
         further = {n.removeprefix(PREFIX): n for n in file.names if n.startswith(PREFIX)}
         return header, *_read_arrays(file.array, further)
@@ -143,6 +145,6 @@ def _read_hdf5(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
         version = int(file.attribute("version"))
         header: dict[str, Any] = {"format": str(file.attribute("format")), "version": version}
         _check(path, header)
-        header["provenance"] = json.loads(file.attribute("provenance"))
+        header["provenance"] = parse_json(file.attribute("provenance"), f"{path}: provenance")
         further = {name: f"columns/{name}" for name in file.names("columns")}
         return header, *_read_arrays(file.array, further)

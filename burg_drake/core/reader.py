@@ -12,7 +12,17 @@ from typing import Any, ClassVar
 
 import yaml
 
-from burg_drake.core.errors import DocumentError, FieldError, InvalidInputError, nearest
+from burg_drake.core.errors import (
+    DocumentError,
+    FieldError,
+    InvalidInputError,
+    nearest,
+    quoted,
+    shown,
+)
+
+LARGEST = 1 << 64
+"""Above all whole numbers that a document may have; seeds may have 64 bits."""
 
 
 class Reader:
@@ -37,7 +47,7 @@ class Reader:
             if key.value == "version":
                 given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
                 if given != str(current):
-                    what = f"{given} cannot be read; this release reads version {current}"
+                    what = f"{shown(given)} cannot be read; this release reads version {current}"
                     raise self.fail(value, "version", what)
                 return
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
@@ -70,7 +80,9 @@ class Reader:
     def choice(self, node: yaml.Node, where: str, options: dict[str, Any]) -> Any:
         if not isinstance(node, yaml.ScalarNode) or node.value not in options:
             given = node.value if isinstance(node, yaml.ScalarNode) else "a structure"
-            raise self.fail(node, where, f"{given!r} is not valid; {nearest(str(given), options)}")
+            raise self.fail(
+                node, where, f"{quoted(given)} is not valid; {nearest(str(given), options)}"
+            )
         return options[node.value]
 
     def read_sequence(self, node: yaml.Node, kind: Any, origin: Any, where: str) -> Any:
@@ -96,7 +108,7 @@ class Reader:
             if not isinstance(key, yaml.ScalarNode):
                 raise self.fail(key, where, "a key has to be a text, not a structure")
             if key.value in found:
-                raise self.fail(key, where, f"key {key.value!r} is given twice")
+                raise self.fail(key, where, f"key {quoted(key.value)} is given twice")
             found[key.value] = (key, value)
         return found
 
@@ -114,7 +126,7 @@ class Reader:
         prefix = f"{where}." if where else ""
         for name, (key, _) in entries.items():
             if name not in fields:
-                raise self.fail(key, where, f"unknown key {name!r}; {nearest(name, fields)}")
+                raise self.fail(key, where, f"unknown key {quoted(name)}; {nearest(name, fields)}")
         for name, field in fields.items():
             if name not in entries and field.default is field.default_factory:
                 raise self.fail(node, where, f"key {name!r} is missing")
@@ -145,17 +157,19 @@ class Reader:
         if not isinstance(node, yaml.ScalarNode) or node.tag == "tag:yaml.org,2002:null":
             raise self.fail(node, where, f"expected {expected[kind]}")
         if kind is str:
+            if "\0" in node.value:  # which no path and no name has
+                raise self.fail(node, where, f"{quoted(node.value)} has a NUL character")
             return node.value
         if kind is bool and node.value.lower() in ("true", "false"):
             return node.value.lower() == "true"
         try:
             if kind is not bool:
                 value = kind(node.value)
-                if math.isfinite(value):
+                if math.isfinite(value) and (kind is float or abs(value) < LARGEST):
                     return value
         except (ValueError, OverflowError):
             pass
-        raise self.fail(node, where, f"{node.value!r} is not {expected[kind]}")
+        raise self.fail(node, where, f"{quoted(node.value)} is not {expected[kind]}")
 
 
 def _inside(node: yaml.Node, place: Sequence[str | int]) -> yaml.Node:

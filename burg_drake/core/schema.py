@@ -20,6 +20,7 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
+from burg_drake.core.document_text import read_text
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import (
@@ -32,7 +33,7 @@ from burg_drake.core.frames import (
     rpy_from_rotation,
 )
 from burg_drake.core.reader import Reader
-from burg_drake.core.yaml_nodes import parse_nodes, read_text
+from burg_drake.core.yaml_nodes import parse_nodes
 
 T = TypeVar("T")
 Vector3 = tuple[float, float, float]

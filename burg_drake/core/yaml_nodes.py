@@ -6,31 +6,19 @@ from pathlib import Path
 
 import yaml
 
+from burg_drake.core.document_text import read_text
 from burg_drake.core.errors import DocumentError
-
-_LOADER = yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoader
+from burg_drake.core.yaml_events import LOADER, checked_events
 
 
 def load_nodes(path: str | Path) -> yaml.Node:
     """The root node of a YAML file.
 
     Raises:
-        DocumentError: it cannot be read, is not YAML, or is empty; the message names file and line.
+        DocumentError: it cannot be read, is not YAML, is beyond the limits of documents, or is
+            empty; the message names file and line.
     """
     return parse_nodes(read_text(path), str(path))
-
-
-def read_text(path: str | Path) -> str:
-    """The text of a document.
-
-    Raises:
-        DocumentError: it cannot be read.
-    """
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise DocumentError(f"cannot read {path}: {reason}") from error
 
 
 def parse_nodes(text: str, name: str, empty: str = "the document is empty") -> yaml.Node:
@@ -41,13 +29,20 @@ def parse_nodes(text: str, name: str, empty: str = "the document is empty") -> y
         name: stands for the file in messages.
         empty: what to say of a document without content.
     """
+    starts = 0
+    for event in checked_events(text, name):
+        starts += isinstance(event, yaml.DocumentStartEvent)
+        if starts > 1:
+            line = event.start_mark.line + 1
+            raise DocumentError(f"{name}:{line}: not valid YAML: a second document begins")
     try:
-        node = yaml.compose(text, Loader=_LOADER)
-    except yaml.YAMLError as error:
+        node = yaml.compose(text, Loader=LOADER)
+    except yaml.YAMLError as error:  # that only composing finds: the same anchor twice
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        raise DocumentError(f"{name}{line}: not valid YAML: {problem}") from error
+        raise DocumentError(
+            f"{name}{line}: not valid YAML: {str(error).splitlines()[0]}"
+        ) from error
     if node is None:
         raise DocumentError(f"{name}: {empty}")
     return node

@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.json_text import parse_json
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.judge import Verdict
 
@@ -119,7 +120,7 @@ def decode(line: bytes) -> tuple[str, Verdict]:
     Raises:
         ValueError, KeyError, TypeError, AttributeError: it was not written by `encode`.
     """
-    record: dict[str, Any] = json.loads(line)
+    record: dict[str, Any] = parse_json(line.decode(), "a line")
     return str(record["id"]), Verdict(
         outcome=Outcome(record["outcome"]),
         stage=Stage(record["stage"]),

@@ -30,10 +30,12 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.document_text import GRASP_FILE
+from burg_drake.core.errors import InvalidInputError, quoted
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_from_quaternion
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.json_text import load_json
 from burg_drake.formats.grasp_format import GraspFormat, Gripper, Imported
 from burg_drake.formats.left_behind import left_behind
 from burg_drake.formats.one_object import (
@@ -103,27 +105,10 @@ def read(path: Path, gripper: Gripper) -> Imported:
 
 
 def _load(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_without_twins)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise InvalidInputError(f"cannot read {path}: {reason}") from error
-    except json.JSONDecodeError as error:
-        raise InvalidInputError(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{path}: {error}") from error
+    document = load_json(path, GRASP_FILE)
     if not isinstance(document, dict):
         raise InvalidInputError(f"{path}: a {type(document).__name__} instead of a mapping")
     return document
-
-
-def _without_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    result = dict(pairs)
-    if len(result) < len(pairs):
-        keys = [key for key, _ in pairs]
-        twin = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"{twin!r} appears twice in the same mapping")
-    return result
 
 
 def _mapping(path: Path, document: dict[str, Any], key: str) -> dict[str, Any]:
@@ -140,11 +125,13 @@ def _success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
     where = f"{path}: grasps.{SUCCESS_COLUMN}"
     given = grasps[SUCCESS_COLUMN]
     if not isinstance(given, list) or len(given) != n:
-        shown = f"{len(given)} values" if isinstance(given, list) else repr(given)
+        shown = f"{len(given)} values" if isinstance(given, list) else quoted(given)
         raise InvalidInputError(f"{where} has {shown}; expected {n}, one a grasp")
     for i, value in enumerate(given):
         if not isinstance(value, (bool, int, float)) or value not in (0, 1):
-            raise InvalidInputError(f"{where}[{i}] is {value!r}; expected true, false, 0 or 1")
+            raise InvalidInputError(
+                f"{where}[{i}] is {quoted(value)}; expected true, false, 0 or 1"
+            )
     return np.array(given, dtype=float)
 
 
@@ -155,10 +142,14 @@ def _object(path: Path, document: dict[str, Any]) -> tuple[str, dict[str, Any], 
     object = _mapping(path, document, "object")
     file, scale = object.get("file"), object.get("scale")
     if not isinstance(file, str) or not file:
-        raise InvalidInputError(f"{path}: object.file is {file!r}; expected the name of a mesh")
+        raise InvalidInputError(
+            f"{path}: object.file is {quoted(file)}; expected the name of a mesh"
+        )
     is_number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
     if scale is None or not is_number or not 0.0 < scale < np.inf:
-        raise InvalidInputError(f"{path}: object.scale is {scale!r}; expected a number above 0")
+        raise InvalidInputError(
+            f"{path}: object.scale is {quoted(scale)}; expected a number above 0"
+        )
     name = object_name(file)
     return name, {"file": file, "scale": float(scale)}, (scale_note(name, file, scale),)
 
@@ -186,7 +177,7 @@ def _offset(
             return notes, poses[0]
     except (TypeError, ValueError):
         pass
-    raise InvalidInputError(f"{where} is {offset!r}; expected [[x, y, z], [x, y, z, w]]")
+    raise InvalidInputError(f"{where} is {quoted(offset)}; expected [[x, y, z], [x, y, z, w]]")
 
 
 def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import DocumentError, listing
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_from_quaternion
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
+from burg_drake.core.yaml_texts import load_texts
 from burg_drake.formats.grasp_format import PREGRASP_WIDTH, Gripper, Imported
 from burg_drake.formats.isaac_dialect import CLOSED, NAME, OPEN, Dialect
 from burg_drake.formats.one_object import object_name, scale_note
-from burg_drake.formats.yaml_text import load_texts
 
 GRIPPER_KEYS = ("gripper_frame_link", "gripper_frame")
 OBJECT_KEYS = ("object_file", "object_frame_link", "object_frame")

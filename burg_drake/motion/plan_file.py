@@ -22,9 +22,11 @@ import numpy as np
 
 import burg_drake
 from burg_drake.core.damaged import DAMAGED
-from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.document_text import GRASP_FILE
+from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, quoted
 from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array, check_pose
+from burg_drake.core.json_text import load_json
 from burg_drake.motion.limits import ArmLimits
 from burg_drake.motion.trajectory import PHASES, Origin, Plan, Trajectory
 
@@ -98,18 +100,16 @@ def load_plan(path: str | Path) -> Plan:
             phases or positions that do not belong together, or beyond its own limits.
     """
     try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except ValueError as error:
-        raise InvalidInputError(
-            f"{path} is not JSON ({error}); give a file of Plan.to_json (a CSV cannot be read back)"
+        document = load_json(path, GRASP_FILE)
+    except DocumentError as error:
+        raise DocumentError(
+            f"{error}; give a file of Plan.to_json (a CSV cannot be read back)"
         ) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InvalidInputError(f"{path} is no plan: it lacks format {FORMAT!r}")
     if document.get("version") != VERSION:
         raise InvalidInputError(
-            f"{path} has version {document.get('version')}; this release reads {VERSION}"
+            f"{path} has version {quoted(document.get('version'))}; this release reads {VERSION}"
         )
     try:
         return _plan(document)

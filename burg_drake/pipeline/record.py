@@ -17,7 +17,8 @@ import numpy as np
 
 from burg_drake.core.errors import DocumentError
 from burg_drake.core.files import atomic_write
-from burg_drake.core.schema import Vector3, parse_document, plain_data
+from burg_drake.core.json_text import load_json
+from burg_drake.core.schema import Vector3, load_document, plain_data
 from burg_drake.objects.entry import ContactGeometry, Fit, ObjectEntry, StablePose
 from burg_drake.objects.mass import Solid
 from burg_drake.pipeline.keys import VERSION, StageKeys
@@ -90,9 +91,8 @@ def write_record(home: Path, record: Record) -> None:
 def read_record(home: Path) -> Record | None:
     """The record in an object's folder, or None where this release can read none."""
     try:
-        text = (home / RECORD_FILE).read_text()
-        return parse_document(text, Record, RECORD_FILE)
-    except (OSError, UnicodeDecodeError, DocumentError):
+        return load_document(home / RECORD_FILE, Record)
+    except DocumentError:
         return None
 
 
@@ -135,7 +135,7 @@ def file_hashes(home: Path) -> dict[str, str]:
 
 def _read_json(home: Path) -> dict[str, Any] | None:
     try:
-        data = json.loads((home / RECORD_FILE).read_text())
-    except (OSError, ValueError):
+        data = load_json(home / RECORD_FILE)
+    except DocumentError:
         return None
     return data if isinstance(data, dict) else None

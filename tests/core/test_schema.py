@@ -154,7 +154,7 @@ def test_unreadable_files(tmp_path: Path):
 
     path = tmp_path / "d.yaml"
     assert message(path) == f"cannot read {path}: No such file or directory"
-    assert message(tmp_path) == f"cannot read {tmp_path}: Is a directory"
+    assert message(tmp_path) == f"cannot read {tmp_path}: it is a folder; expected a file"
     path.write_bytes(b"\xff\xfe\x00")
     assert message(path) == f"cannot read {path}: it is not a text file"
     for broken in (

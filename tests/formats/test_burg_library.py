@@ -238,7 +238,8 @@ TURNED = math.sqrt(0.5)
          "FILE:8: objects[0].mass: 'light' is not a finite number"),
         (one_object("  mass: .nan\n"), "FILE:8: objects[0].mass: '.nan' is not a finite number"),
         (one_object("  mass: !!python/object/apply:numpy.core.multiarray.scalar\n  - 1\n"),
-         "FILE:8: objects[0].mass: expected a finite number"),
+         "FILE:8: tag 'tag:yaml.org,2002:python/ob...numpy.core.multiarray.scalar' is not"
+         " supported; leave it out"),
         (one_object("  mass: -0.1\n"),
          "FILE:6: objects[0]: mass of 'mug' is -0.1; it must be >= 0"),
         (one_object("  friction_coeff: -1\n"),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ipaddress
-import json
 import socket
 from email.message import Message
 from http import HTTPStatus
 from io import BufferedIOBase
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
+
+from burg_drake.core.json_text import parse_json
 
 LONGEST_BODY = 10_000
 LONGEST_NUMBER = 12
@@ -97,8 +98,8 @@ def json_body(headers: Message, stream: BufferedIOBase) -> dict[str, Any]:
     if not _is_number(length) or int(length) > LONGEST_BODY:
         raise RequestError(HTTPStatus.BAD_REQUEST, "send a short body with its length")
     try:
-        body = json.loads(stream.read(int(length)))
-    except (ValueError, RecursionError) as error:
+        body = parse_json(stream.read(int(length)).decode(), "the body")
+    except ValueError as error:
         raise RequestError(HTTPStatus.BAD_REQUEST, f"no JSON: {error}") from error
     if not isinstance(body, dict):
         raise RequestError(HTTPStatus.BAD_REQUEST, "send a JSON object")

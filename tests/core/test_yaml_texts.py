@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from burg_drake.core.errors import DocumentError
-from burg_drake.formats.yaml_text import load_texts
+from burg_drake.core.yaml_texts import load_texts
 
 
 def random_tree(rng: np.random.Generator, depth: int) -> Any:

@@ -11,40 +11,45 @@ from typing import Any
 
 import yaml
 
-from burg_drake.core.errors import DocumentError
-from burg_drake.core.yaml_nodes import read_text
-
-_LOADER = yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoader
+from burg_drake.core.document_text import DOCUMENT, GRASP_FILE, Limits, read_text
+from burg_drake.core.errors import DocumentError, quoted
+from burg_drake.core.yaml_events import TAGS, Event, checked_events
 
 Tree = Any
 """A text, a list of trees, or a dict of trees by text."""
-Event = Any
-"""Of PyYAML, whose kinds of event have different attributes."""
+
+_STARTS = (yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.MappingStartEvent)
 
 
 def load_texts(path: str | Path) -> Tree:
-    """The first document of a YAML file.
+    """The first document of a YAML file of grasps.
 
     Raises:
-        DocumentError: it cannot be read, is not YAML or is empty, or a mapping has a key twice; the
-            message names file and line.
+        DocumentError: it cannot be read, is not YAML, is beyond the limits or is empty, or a
+            mapping has a key twice; the message names file and line.
     """
-    events = _events(path)
+    return parse_texts(read_text(path, GRASP_FILE), str(path), GRASP_FILE)
+
+
+def parse_texts(
+    text: str,
+    name: str,
+    limits: Limits = DOCUMENT,
+    tags: frozenset[str] = TAGS,
+    empty: str = "the document is empty",
+) -> Tree:
+    """As `load_texts`, from text.
+
+    Args:
+        text, name, limits, tags: see `checked_events`.
+        empty: what to say of a document without content.
+    """
+    events = checked_events(text, name, limits, tags)
     anchors: dict[str, Tree] = {}
     for event in events:
-        if isinstance(event, (yaml.ScalarEvent, yaml.SequenceStartEvent, yaml.MappingStartEvent)):
-            return _tree(event, events, anchors, str(path))
-    raise DocumentError(f"{path}: the document is empty")
-
-
-def _events(path: str | Path) -> Iterator[Event]:
-    try:
-        yield from yaml.parse(read_text(path), Loader=_LOADER)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f":{mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        raise DocumentError(f"{path}{line}: not valid YAML: {problem}") from error
+        if isinstance(event, _STARTS):
+            return _tree(event, events, anchors, name)
+    raise DocumentError(f"{name}: {empty}")
 
 
 def _tree(event: Event, events: Iterator[Event], anchors: dict[str, Tree], name: str) -> Tree:
@@ -53,9 +58,6 @@ def _tree(event: Event, events: Iterator[Event], anchors: dict[str, Tree], name:
     if kind is yaml.ScalarEvent:
         result: Tree = event.value
     elif kind is yaml.AliasEvent:
-        if event.anchor not in anchors:
-            line = event.start_mark.line + 1
-            raise DocumentError(f"{name}:{line}: alias *{event.anchor} has no anchor before it")
         return anchors[event.anchor]
     elif kind is yaml.SequenceStartEvent:
         result = []
@@ -69,7 +71,9 @@ def _tree(event: Event, events: Iterator[Event], anchors: dict[str, Tree], name:
             if not isinstance(key, str):
                 raise DocumentError(f"{name}:{line}: a key is a structure; expected a name")
             if key in result:
-                raise DocumentError(f"{name}:{line}: {key!r} appears twice in the same mapping")
+                raise DocumentError(
+                    f"{name}:{line}: {quoted(key)} appears twice in the same mapping"
+                )
             result[key] = _tree(next(events), events, anchors, name)
     if event.anchor is not None:
         anchors[event.anchor] = result
