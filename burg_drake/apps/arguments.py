@@ -122,6 +122,11 @@ def add_renaming(parser: Parser) -> None:
     )
 
 
+def add_quiet(parser: Parser) -> None:
+    """The option --quiet of verbs that take long."""
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
 def add_view(parser: Parser) -> None:
     """The options of verbs that show something."""
     parser.add_argument(

@@ -127,26 +127,25 @@ def _look(
     """Looks for the target in photos."""
     from burg_drake.cameras.charuco import find_target
     from burg_drake.core.errors import InvalidInputError
+    from burg_drake.core.progress import Pace, Progress, Reporter
 
-    views, rejected, number = [], [], 0
-    while True:
-        try:
-            frame = source.read()
-        except InvalidInputError as error:
-            rejected.append(("", str(error)))
-            continue
-        if frame is None:
-            break
-        number += 1
-        if sys.stderr.isatty():
-            print(f"\rlooked at {number} images ", end="", file=sys.stderr, flush=True)
-        found = find_target(frame.image, target, frame.name)
-        if isinstance(found, str):
-            rejected.append((frame.name, found))
-        else:
-            views.append(found)
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
+    views, rejected = [], []
+    with Reporter(True) as reporter:
+        pace = Pace(reporter.show, Progress("looking for the target", unit="images"))
+        while True:
+            try:
+                frame = source.read()
+            except InvalidInputError as error:
+                rejected.append(("", str(error)))
+                continue
+            if frame is None:
+                break
+            found = find_target(frame.image, target, frame.name)
+            if isinstance(found, str):
+                rejected.append((frame.name, found))
+            else:
+                views.append(found)
+            pace.step(note=f"{len(views)} with the target")
     return views, rejected
 
 

@@ -10,6 +10,7 @@ from burg_drake.apps.arguments import (
     DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
     ENGINE_NAMES,
+    add_quiet,
     add_scene,
     add_station,
     add_verb,
@@ -95,7 +96,7 @@ def add_to(verbs: Any) -> None:
         " there is no arm)",
     )
     add_retry_failed(parser, "grasps")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
+    add_quiet(parser)
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_renaming, add_verb, friction
+from burg_drake.apps.arguments import add_quiet, add_renaming, add_verb, friction
 from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.core.errors import InvalidInputError
 
@@ -68,6 +68,7 @@ def add_to(group: Any) -> None:
         help="coefficient (default: the object's); may be given several times",
     )
     add_renaming(parser)
+    add_quiet(parser)
 
 
 def run_score(arguments: argparse.Namespace) -> int:
@@ -102,6 +103,7 @@ def run_score(arguments: argparse.Namespace) -> int:
         source.scene,
         friction=dict(arguments.friction),
         by=arguments.by,
+        progress=not arguments.quiet,
     )
     _print_tables(scored)
     if output is not None:

@@ -7,6 +7,7 @@ from typing import Any
 from burg_drake.apps.arguments import (
     Parser,
     add_group,
+    add_quiet,
     add_verb,
     add_view,
     coefficient,
@@ -219,3 +220,4 @@ def _add_effort(parser: Parser) -> None:
     parser.add_argument(
         "--workers", type=positive_int, metavar="N", help="processes (default: one a processor)"
     )
+    add_quiet(parser)

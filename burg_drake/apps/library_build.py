@@ -102,11 +102,18 @@ def _build(
     arguments: argparse.Namespace,
 ) -> int:
     from burg_drake.apps.library_view import print_library
-    from burg_drake.apps.progress import object_progress
     from burg_drake.core.processes import default_workers
+    from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.pipeline.build import build_library
 
-    with object_progress(len(sources)) as progress:
+    with Reporter(not arguments.quiet) as reporter:
+        pace = Pace(reporter.show, Progress("building", total=len(sources), unit="objects"))
+
+        def progress(name: str, state: str, done: int, total: int) -> None:
+            """Objects that are up to date come first, and cost nothing."""
+            count = pace.skip if state == "cached" else pace.step
+            count(1, note=f"{name} {state}")
+
         report = build_library(
             sources,
             output,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
     DEFAULT_APPROACH_ANGLE,
+    add_quiet,
     add_scene,
     add_station,
     add_verb,
@@ -105,7 +106,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
     )
-    parser.add_argument("--quiet", action="store_true", help="no progress")
+    add_quiet(parser)
 
 
 def run_reach(arguments: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_verb, not_negative, positive_int, seed
+from burg_drake.apps.arguments import add_quiet, add_verb, not_negative, positive_int, seed
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def add_to(verbs: Any) -> None:
         "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
     )
     add_retry_failed(parser, "tests")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
+    add_quiet(parser)
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
 

@@ -12,6 +12,7 @@ from burg_drake.apps.arguments import (
     DEFAULT_ENGINE,
     ENGINE_NAMES,
     add_group,
+    add_quiet,
     add_scene,
     add_station,
     add_verb,
@@ -90,6 +91,7 @@ def _add_settle(group: Any) -> None:
         default=DEFAULT_ENGINE,
         help="how time is stepped (default: %(default)s)",
     )
+    add_quiet(settle)
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -137,6 +139,7 @@ def run_validate(arguments: argparse.Namespace) -> int:
 def run_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
     from burg_drake.apps.scene_file import require_another_file
+    from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.scene.scene import load_scene
     from burg_drake.simulation.settle_scene import settle_scene
     from burg_drake.station.check import check_scene
@@ -146,12 +149,16 @@ def run_settle(arguments: argparse.Namespace) -> int:
     scene = load_scene(arguments.scene)
     require_another_file(scene.path, arguments.output)
     station = load_station(arguments.station)
-    settled = settle_scene(
-        scene,
-        station,
-        engine=engine_preset(arguments.engine),
-        time_limit=arguments.time_limit,
-    )
+    with Reporter(not arguments.quiet) as reporter:
+        whole = Progress("settling", 0.0, arguments.time_limit, unit="s at most")
+        pace = Pace(reporter.show, whole)
+        settled = settle_scene(
+            scene,
+            station,
+            engine=engine_preset(arguments.engine),
+            time_limit=arguments.time_limit,
+            progress=lambda time, moving: pace.step(time, note=f"{moving} moving"),
+        )
     faults = _faults(settled, kept=arguments.keep)
     faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
     written = arguments.keep or not faults

@@ -10,7 +10,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.core.statistics": ["wilson_interval"],
         "burg_drake.evaluation.cascade": ["evaluate"],
         "burg_drake.evaluation.judge": ["Decision", "Judge", "Screen", "Verdict"],
-        "burg_drake.evaluation.progress": ["Progress"],
+        "burg_drake.core.progress": ["Progress"],
         "burg_drake.evaluation.feasibility": ["reach"],
         "burg_drake.evaluation.report": ["write_report"],
         "burg_drake.evaluation.run_store": ["Run", "load_run"],

@@ -21,6 +21,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
+from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
@@ -28,7 +29,6 @@ from burg_drake.evaluation.candidates import Candidate, Candidates, given_candid
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
-from burg_drake.evaluation.progress import Listener, Progress, Reporter
 from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run_document import (
     Grasps,
@@ -272,21 +272,17 @@ def _judge(
     done, total = len(run.candidates) - len(open_grasps), len(run.candidates)
     again = {grasp.id for grasp in open_grasps}
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
-    event = Progress("starting", done, total, before=done, outcomes=outcomes)
-    reporter.show(event)
+    pace = Pace(reporter.show, Progress("starting", done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
     stretch = Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
-    begun = first = time.monotonic()
+    begun = time.monotonic()
     try:
         with closing(judge_all(open_grasps, make_judge, workers=workers)) as judged:
             for candidate, verdict in judged:
                 journal.append(candidate.id, verdict)
-                outcomes[verdict.outcome] += 1
                 done += 1
-                if event.phase == "starting":  # the pace is that of judging alone
-                    event, first = replace(event, phase="judging", before=done), time.monotonic()
-                reporter.show(replace(event, done=done, elapsed=time.monotonic() - first))
+                pace.step(outcome=verdict.outcome)
     finally:
         seconds = round(time.monotonic() - begun, 3)
         stretch = replace(stretch, judged=done - total + len(open_grasps), seconds=seconds)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -17,11 +16,11 @@ from burg_drake.core.files import writable_folder
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.judge import Decide, Decision, Verdict, one_line
-from burg_drake.evaluation.progress import Listener, Progress, Reporter
 from burg_drake.evaluation.run_document import numbers
 from burg_drake.evaluation.screens import (
     arm_reach,
@@ -110,16 +109,10 @@ def reach(
         Reporter(progress) as reporter,
         closing(judge_all(list(candidates), factory, workers=workers)) as judged,
     ):
-        reporter.show(event)
-        start = time.monotonic()
+        pace = Pace(reporter.show, event, "judging")
         for candidate, verdict in judged:
-            if not verdicts:  # the pace is that of judging alone
-                event, start = replace(event, phase="judging"), time.monotonic()
             verdicts[candidate.id] = verdict
-            assert event.outcomes is not None
-            event.outcomes[verdict.outcome] += 1
-            done, elapsed = len(verdicts), time.monotonic() - start
-            reporter.show(replace(event, done=done, before=1, elapsed=elapsed))
+            pace.step(outcome=verdict.outcome)
     rows = [verdicts[id] for id in candidates.id]
     return _with_columns(candidates, rows, scene, station, exact)
 

@@ -7,7 +7,6 @@ answers known about the grasps of the last call, those of earlier calls with equ
 
 from __future__ import annotations
 
-import time
 from collections.abc import Collection, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -15,7 +14,9 @@ from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.processes import default_workers
+from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal, read_journal
@@ -27,7 +28,6 @@ from burg_drake.evaluation.probes import (
     known_answers,
     make_probes,
 )
-from burg_drake.evaluation.progress import Listener, Progress, Reporter
 from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_columns
 from burg_drake.evaluation.run_document import origin_of, software_versions
 from burg_drake.evaluation.run_store import JOURNAL_FILE, Run, load_run
@@ -36,6 +36,8 @@ from burg_drake.evaluation.table_file import require_writer, write_table
 TABLE_FILE = "robustness.csv"
 DEFAULT_BEST = 20
 """So many of the best grasps are asked about if none are named."""
+COST = {"tug": 40.0, "shake": 50.0, "friction": 30.0, "noise": 2.0}
+"""CPU time of tests in units of the grasp's own trial, measured on the built-in scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,7 @@ def assess_robustness(
             for id, verdict in read_journal(journal_path).items()
             if not verdict.is_open(retry_failed=retry_failed)
         }
-        _answer(probes, factory, journal, known, workers, reporter)
+        _answer(run, probes, factory, journal, known, workers, reporter)
     answers = read_journal(journal_path)
     found = tuple(_gather(grasp, answers, factory, context) for grasp in chosen)
     write_table(table, robustness_columns(found, settings, run.document.engine))
@@ -150,6 +152,7 @@ def _choose(run: Run, ids: Sequence[str] | None, best: int) -> list[Candidate]:
 
 
 def _answer(
+    run: Run,
     probes: Sequence[Probe],
     factory: ProbeJudgeFactory,
     journal: Journal,
@@ -159,21 +162,23 @@ def _answer(
 ) -> None:
     """Asks what is not known yet; each answer is on disk at once."""
     todo = [probe for probe in probes if probe.id not in known]
-    total = len({probe.grasp for probe in probes})
-    waiting: dict[str, int] = {}
-    for probe in todo:
-        waiting[probe.grasp] = waiting.get(probe.grasp, 0) + 1
-    before = total - len(waiting)
-    reporter.show(Progress("starting", before, total, before=before))
-    start = time.monotonic()
+    work = sum(COST[probe.test] for probe in todo)
+    expected = work * _trial_time(run, probes) / (workers or default_workers())
+    begin = Progress(
+        "starting", len(probes) - len(todo), len(probes), unit="tests", left=expected or None
+    )
+    pace = Pace(reporter.show, begin, "testing", work=work)
     with closing(judge_all(todo, factory, workers=workers)) as answered:
         for asked, verdict in answered:
             assert isinstance(asked, Probe)
             journal.append(asked.id, verdict)
-            waiting[asked.grasp] -= 1
-            done = total - sum(count > 0 for count in waiting.values())
-            elapsed = time.monotonic() - start
-            reporter.show(Progress("testing", done, total, before=before, elapsed=elapsed))
+            pace.step(work=COST[asked.test])
+
+
+def _trial_time(run: Run, probes: Sequence[Probe]) -> float:
+    """CPU time that the run's own trials of the grasps took on average [s]."""
+    took = [run.verdicts[id].cpu.get(Stage.EXECUTED, 0.0) for id in {p.grasp for p in probes}]
+    return sum(took) / max(len(took), 1)
 
 
 def _gather(

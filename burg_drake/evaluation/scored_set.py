@@ -13,6 +13,7 @@ from burg_drake.core.errors import InvalidInputError, MeshError, UnknownNameErro
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Stage
+from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import INSTANCE
 from burg_drake.evaluation.set_documents import set_documents
 from burg_drake.grasping.clearances import CLEARANCE_VERSION
@@ -31,6 +32,8 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
+BATCH = 2000
+"""Grasps that are scored at a time; a grasp's figures do not depend on it."""
 SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
 """Columns that only a scene gives."""
 
@@ -43,6 +46,7 @@ def scored_set(
     *,
     friction: Mapping[str, float] | None = None,
     by: str = DEFAULT_METRIC,
+    progress: bool | Listener = False,
 ) -> GraspSet:
     """Adds the metrics of `grasping.quality`, and in a scene the clearance of the open hand.
 
@@ -54,6 +58,7 @@ def scored_set(
             or on the only one of its object.
         friction: coefficients by object, in place of the library's; under "" for all others.
         by: the metric that becomes the score, `grasping.quality.METRICS`.
+        progress: True shows it on standard error; a function gets the events.
 
     Returns:
         The same grasps in the same order; `provenance["quality"]` tells with what they were scored.
@@ -79,22 +84,36 @@ def scored_set(
     columns: dict[str, Any] = {name: np.full(len(grasps), np.nan) for name in METRICS}
     columns["force_closure"] = np.zeros(len(grasps), bool)
     payloads = {}
-    for name in objects:
-        mine = np.flatnonzero(grasps.object == name)
-        payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
-        payloads[name] = asdict(payload)
-        up = None if X_WO is None else X_WO[mine, 2, :3]
-        quality = grasp_quality(grasps.X_OG[mine], _surface(library, name), payload, jaws, up=up)
-        for metric in METRICS:
-            columns[metric][mine] = getattr(quality, metric)
-    how: dict[str, Any] = {"payloads": payloads, **set_documents(library, scene, station, objects)}
-    if scene is not None and instance is not None and X_WO is not None:
-        columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station)
-        how["clearance_version"] = CLEARANCE_VERSION
+    with Reporter(progress) as reporter:
+        pace = Pace(reporter.show, Progress("scoring", total=len(grasps)))
+        for name in objects:
+            payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
+            payloads[name] = asdict(payload)
+            surface = _surface(library, name)
+            for some in _batches(grasps.object == name):
+                up = None if X_WO is None else X_WO[some, 2, :3]
+                quality = grasp_quality(grasps.X_OG[some], surface, payload, jaws, up=up)
+                for metric in METRICS:
+                    columns[metric][some] = getattr(quality, metric)
+                pace.step(len(some))
+        how: dict[str, Any] = {
+            "payloads": payloads,
+            **set_documents(library, scene, station, objects),
+        }
+        if scene is not None and instance is not None and X_WO is not None:
+            pace = Pace(reporter.show, Progress("clearance", total=len(grasps)))
+            columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station, pace)
+            how["clearance_version"] = CLEARANCE_VERSION
     kept = {name: values for name, values in grasps.columns.items() if name not in SCENE_COLUMNS}
     provenance = {**grasps.provenance, "quality": quality_provenance(jaws, by, **how)}
     unscored = replace(grasps, columns=kept, provenance=provenance)
     return unscored.with_columns(**columns, score=score_of(columns[by], by))
+
+
+def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """Indices of the rows chosen (N,), so many at a time."""
+    rows = np.flatnonzero(chosen)
+    return [rows[k : k + BATCH] for k in range(0, len(rows), BATCH)]
 
 
 def _friction(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
@@ -148,7 +167,7 @@ def _placed(instance: NDArray[np.str_], scene: Scene, station: Station) -> Array
 
 
 def _clearances(
-    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station
+    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: Pace
 ) -> dict[str, Any]:
     from burg_drake.grasping.clearance import HandClearance
     from burg_drake.station.diagram import build_station_diagram
@@ -156,12 +175,13 @@ def _clearances(
     screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
     columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
     for name in sorted(set(instance.tolist())):
-        mine = instance == name
-        found = screen.measure(name, X_WG[mine])
-        screened = np.where(found.clear, Stage.CLEAR.value, found.outcome)
-        values = (found.clearance, found.nearest, screened, found.blocker)
-        for column, value in zip(SCENE_COLUMNS, values, strict=True):
-            columns[column][mine] = value
+        for some in _batches(instance == name):
+            found = screen.measure(name, X_WG[some])
+            screened = np.where(found.clear, Stage.CLEAR.value, found.outcome)
+            values = (found.clearance, found.nearest, screened, found.blocker)
+            for column, value in zip(SCENE_COLUMNS, values, strict=True):
+                columns[column][some] = value
+            pace.step(len(some))
     return {
         name: values.astype(float if name == "clearance" else str)
         for name, values in columns.items()

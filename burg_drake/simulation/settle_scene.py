@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -90,6 +90,7 @@ def settle_scene(
     *,
     engine: Engine = ENGINES["standard"],
     time_limit: float = DEFAULT_TIME_LIMIT,
+    progress: Callable[[float, int], None] | None = None,
 ) -> SettledScene:
     """Simulates the objects of a scene until they are at rest.
 
@@ -102,6 +103,8 @@ def settle_scene(
         station: table and pose of the board.
         engine: how time is stepped.
         time_limit: simulated time allowed [s].
+        progress: called now and then with the simulated time since the last call [s] and how many
+            objects still move.
 
     Returns:
         The settled scene. Whatever has not moved keeps its pose to the last digit; other poses are
@@ -120,7 +123,7 @@ def settle_scene(
     simulator = Simulator(built.diagram)
     _soften(built, simulator.get_mutable_context())
     try:
-        duration, moving, fallen = _settle(simulator, built, time_limit)
+        duration, moving, fallen = _settle(simulator, built, time_limit, progress)
     except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
         raise SimulationError(
             f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
@@ -141,7 +144,10 @@ def settle_scene(
 
 
 def _settle(
-    simulator: Simulator, built: StationDiagram, time_limit: float
+    simulator: Simulator,
+    built: StationDiagram,
+    time_limit: float,
+    progress: Callable[[float, int], None] | None,
 ) -> tuple[float, dict[str, BodySpeed], set[str]]:
     """Time it took, what still moves, and what fell."""
     context = built.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
@@ -168,7 +174,9 @@ def _settle(
                 fallen.add(names[index])
                 body.Lock(context)
         moving = {names[i]: v for i, v in settled.moving.items() if names[i] not in fallen}
-        now = simulator.get_context().get_time()
+        before, now = now, simulator.get_context().get_time()
+        if progress is not None:
+            progress(now - before, len(moving))
         if settled.at_rest or now >= time_limit - 1e-9:
             return now, moving, fallen
 

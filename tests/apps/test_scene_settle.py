@@ -30,7 +30,7 @@ def edited(scene_file: Path, *edits: tuple[str, str]) -> Path:
 
 def settle(scene_file: Path, *options: str) -> tuple[int, Path]:
     out = scene_file.parent / "out" / "settled.yaml"
-    return main(["scene", "settle", str(scene_file), "-o", str(out), *options]), out
+    return main(["scene", "settle", str(scene_file), "-o", str(out), "--quiet", *options]), out
 
 
 def test_what_hovers_falls(scene_file: Path, capsys: Capture) -> None:

@@ -17,10 +17,10 @@ from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.progress import Progress
 from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import read_journal
-from burg_drake.evaluation.progress import Progress
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.table import TEXT
 from burg_drake.evaluation.table_file import read_table

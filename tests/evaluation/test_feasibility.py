@@ -10,8 +10,8 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.progress import Progress
 from burg_drake.evaluation.feasibility import reach, reach_columns
-from burg_drake.evaluation.progress import Progress
 from burg_drake.evaluation.table_file import read_table, write_table
 from burg_drake.motion.plan_file import load_plan
 from burg_drake.scene.scene import Scene, load_scene
