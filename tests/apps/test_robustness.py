@@ -11,6 +11,7 @@ import pytest
 from burg_drake.apps import robustness
 from burg_drake.apps.cli import main
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.progress import Progress
 from burg_drake.evaluation import probes
 from burg_drake.evaluation import robustness as tested
 from burg_drake.evaluation.journal import Journal, read_journal
@@ -88,6 +89,31 @@ def test_tests_that_could_not_be_simulated_are_tried_again(
     assert main([*command, *options]) == 0
     assert (tmp_path / "again.csv").read_bytes() == table.read_bytes()
     assert len(journal.read_bytes().splitlines()) == 7
+
+
+def test_it_says_at_once_how_long_it_takes(copied: Run, tmp_path: Path) -> None:
+    """From what the run's own trial took; noise alone is a part of it."""
+    events: list[Progress] = []
+
+    class Enough(Exception):
+        pass
+
+    def first(event: Progress) -> None:
+        events.append(event)
+        raise Enough
+
+    for tests in (("noise",), ("noise", "tug")):
+        settings = RobustnessSettings(tests=tests, repeats=4)
+        with pytest.raises(Enough):
+            assess_robustness(
+                copied, settings=settings, out=tmp_path / "r.csv", workers=2, progress=first
+            )
+    (id,) = copied.best()
+    trial = copied.verdicts[id].cpu[Stage.EXECUTED]
+    assert [(e.done, e.total, e.unit) for e in events] == [(0, 4, "tests"), (0, 5, "tests")]
+    noise, both = (e.remaining for e in events)
+    assert noise is not None and both is not None
+    assert 2 * trial < noise < 10 * trial < both < 60 * trial
 
 
 def test_two_workers_and_no_journal_give_the_same_bits(copied: Run, tmp_path: Path) -> None:
