@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from burg_drake.apps.arguments import Parser
@@ -45,12 +44,12 @@ def open_source(reference: str) -> Source:
         UnknownNameError: there is neither.
         DocumentError: its document does not fit the schema.
     """
-    from burg_drake.core.resources import builtin_names
+    from burg_drake.core.resources import builtin_names, expanded
     from burg_drake.objects.library import LIBRARY_FILE, load_library
     from burg_drake.scene.scene import load_scene
 
     scenes, libraries = builtin_names("scenes"), builtin_names("models")
-    path = Path(reference).expanduser()
+    path = expanded(reference)
     is_library = path.is_dir() or path.name == LIBRARY_FILE or reference in libraries
     if not is_library and reference not in scenes and not path.exists():
         raise UnknownNameError(

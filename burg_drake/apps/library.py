@@ -25,6 +25,9 @@ UNIT_NAMES = ("mm", "cm", "m", "in")
 CONTACT_KINDS = ("pieces", "compliant_pieces", "mesh", "primitive")
 
 FORMATS_TEXT = """\
+meshes: up to 512 MB and 2,000,000 triangles (1,000,000 of an open surface, which becomes a wall),
+textures up to 8192 x 8192 pixels; larger ones are refused
+
 format of masses.yaml: 'NAME: KG' lines, NAME a mesh file without its suffix
   mug: 0.118
   cracker_box: 0.411

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ def require_another_file(scene: Path, output: str) -> None:
     Raises:
         InvalidInputError: the files are one.
     """
-    if Path(output).resolve() == scene.resolve():
+    if os.path.realpath(output) == os.path.realpath(scene):
         raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
 
 

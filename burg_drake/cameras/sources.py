@@ -11,6 +11,7 @@ from burg_drake.cameras.frame_source import Frame as Frame
 from burg_drake.cameras.frame_source import FrameSource as FrameSource
 from burg_drake.cameras.station_camera import SIMULATED, simulated_camera
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.resources import expanded
 from burg_drake.scene.scene import Scene
 
 STREAMS = ("rtsp://", "rtsps://", "rtmp://", "http://", "https://", "udp://", "tcp://")
@@ -57,7 +58,7 @@ def open_source(
         raise InvalidInputError("a camera has no name; give 0, a file, a folder or sim:STATION")
     from burg_drake.cameras.sources_images import is_image
 
-    path = Path(text).expanduser()
+    path = expanded(text)
     if path.is_file() and not is_image(path):
         from burg_drake.cameras.sources_video import VideoSource
 
@@ -90,7 +91,7 @@ def image_paths(references: Sequence[str]) -> list[Path]:
 
     paths: list[Path] = []
     for reference in references:
-        path = Path(reference).expanduser()
+        path = expanded(reference)
         if path.is_dir():
             paths += images_in(path)
         elif path.exists():

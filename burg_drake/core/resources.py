@@ -6,6 +6,7 @@ references: `package://burg_drake/models/...` or a bare name such as `panda_tabl
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from pathlib import Path
 
@@ -54,17 +55,32 @@ def resolve(reference: str | Path, kind: str | None = None, base: Path | None = 
         return path
     if text.startswith("package://"):
         raise UnknownNameError(f"{text}: only {PACKAGE_URI}... is known here")
-    path = Path(text).expanduser()
+    path = expanded(text)
     if kind is not None and path.name == text and not path.suffix:
         builtin = data_root() / kind / (text if kind == "models" else f"{text}.yaml")
-        if builtin.exists():
+        if os.path.exists(builtin):
             return builtin
     located = path if base is None else base / path
-    if located.exists():
+    if os.path.exists(located):  # also tells of names that are too long, and of links in a circle
         return located.resolve()
     where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
     known = f"; {nearest(path.stem, builtin_names(kind))}" if kind else ""
     raise UnknownNameError(f"{text} does not exist{where}{known}")
+
+
+def expanded(text: str) -> Path:
+    """A path whose leading `~` or `~user` stands for a home folder.
+
+    Raises:
+        UnknownNameError: there is no such user.
+    """
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        user = Path(text).parts[0]
+        raise UnknownNameError(
+            f"{text}: {user!r} is nobody's home folder here; write the path out"
+        ) from error
 
 
 def builtin_names(kind: str) -> list[str]:

@@ -12,7 +12,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.core.errors import UnknownNameError, nearest
+import numpy as np
+
+from burg_drake.core.errors import MeshError, UnknownNameError, nearest
 from burg_drake.core.files import atomic_write
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import load_document, save_document
@@ -79,8 +81,9 @@ class ObjectLibrary:
             UnknownNameError: the file is missing.
         """
         path = self.root / relative
-        if not path.exists():
-            raise UnknownNameError(f"{path} is missing; build the library {self.name!r} again")
+        if not path.is_file():
+            what = "is missing" if not path.exists() else "is no file"
+            raise UnknownNameError(f"{path} {what}; build the library {self.name!r} again")
         return path
 
     def surface(self, name: str) -> trimesh.Trimesh:
@@ -95,14 +98,35 @@ class ObjectLibrary:
 
         Raises:
             UnknownNameError: no such object, or its mesh file is missing.
+            MeshError: the mesh file is damaged.
+        """
+        entry = self.entry(name)
+        mesh = self.mesh(entry.surface or entry.mesh)
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        return mesh
+
+    def mesh(self, relative: str) -> trimesh.Trimesh:
+        """A mesh file of the library, such as a convex piece, as it is [m], without colours.
+
+        Raises:
+            UnknownNameError: the file is missing.
+            MeshError: it is damaged.
         """
         import trimesh
 
-        entry = self.entry(name)
-        path = self.path(entry.surface or entry.mesh)
-        mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        path = self.path(relative)
+        try:
+            mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+            corners = np.asarray(mesh.vertices)[mesh.faces]  # fails for faces of no vertices
+        except Exception as error:  # the reader raises whatever it stumbles over
+            raise self.damaged(path) from error
+        if not len(corners) or not np.isfinite(corners).all():
+            raise self.damaged(path)
         return mesh
+
+    def damaged(self, path: Path) -> MeshError:
+        """The error of a mesh file that is not as it was built."""
+        return MeshError(f"{path} is damaged or no mesh; build the library {self.name!r} again")
 
     @cached_property
     def content(self) -> dict[str, str]:

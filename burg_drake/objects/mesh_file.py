@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -12,6 +13,15 @@ import trimesh
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import MeshError
+from burg_drake.objects.mesh_bounds import (
+    IMAGES,
+    STL_HEADER,
+    STL_TRIANGLE,
+    announced_triangles,
+    check_bytes,
+    check_textures,
+    check_triangles,
+)
 from burg_drake.objects.obj_file import face_palette
 
 FORMATS = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
@@ -27,10 +37,7 @@ TEXT_ONLY = (".obj", ".off")
 
 NEITHER = "its contents are neither text nor a known binary form"
 
-STL_HEADER, STL_TRIANGLE = 84, 50
-"""Bytes of a binary STL file's header with the number of triangles, and of a triangle."""
-
-REFERRED = (".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".webp", ".bin")
+REFERRED = (".mtl", ".bin", *IMAGES)
 """What they refer to."""
 
 
@@ -97,27 +104,38 @@ def _companions(path: Path) -> list[Path]:
         text = queue.pop().read_bytes()
         named = [p for p in beside if p.name.encode() in text or quote(p.name).encode() in text]
         fresh = [p for p in named if p not in found]
+        for file in fresh:
+            check_bytes(file)
         found += fresh
         queue += [p for p in fresh if p.suffix.lower() == ".mtl"]
     return sorted(found)
 
 
 def _check_file(path: Path) -> None:
+    name = os.fsencode(path)
+    if name.decode(errors="replace") != str(path):  # its readers could not be told the name
+        shown = name.decode(errors="backslashreplace")
+        raise MeshError(f"{shown}: the name is not UTF-8; rename the file, or the folder it is in")
+    if path.is_symlink() and not path.exists():
+        raise MeshError(f"{path}: a link to a file that does not exist, or to itself")
     if not path.is_file():
         raise MeshError(f"{path}: the mesh file does not exist")
     if path.suffix.lower() not in FORMATS:
         raise MeshError(f"{path}: {path.suffix or 'no suffix'} is not one of {', '.join(FORMATS)}")
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the mesh file is empty")
+    check_bytes(path)
 
 
 def read_mesh(path: Path) -> trimesh.Trimesh:
     """The triangles of a file; a scene of several bodies becomes one mesh.
 
     Raises:
-        MeshError: file missing, unreadable or without triangles.
+        MeshError: file missing, unreadable, without triangles, or too large (`mesh_bounds`).
     """
     _check_file(path)
+    check_triangles(announced_triangles(path), str(path))
+    check_textures(path, _companions(path))
     log = logging.getLogger("trimesh")
     if not log.handlers:  # or remarks on materials would go to standard error
         log.addHandler(logging.NullHandler())

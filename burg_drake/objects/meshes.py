@@ -17,6 +17,7 @@ from scipy.spatial import QhullError
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.objects.hulls import convex_hull
+from burg_drake.objects.mesh_bounds import check_triangles
 from burg_drake.objects.mesh_file import (
     FORMATS,
     mesh_hash,
@@ -155,7 +156,10 @@ def _solid(
     raw: trimesh.Trimesh, name: str, preparation: Preparation
 ) -> tuple[Repaired, float | None]:
     """The repaired and closed surface, and the thickness of the wall that it became, if any."""
+    check_triangles(len(raw.faces), name)
     repaired = repair(raw)
+    if preparation.openings == "wall" and not is_closed(repaired.mesh):
+        check_triangles(len(repaired.mesh.faces), name, wall=True)
     if preparation.wall_thickness is None or not len(repaired.mesh.faces):
         _check_hull(repaired.mesh, name)
     wall = close_openings(repaired, preparation.openings, preparation.wall_thickness)

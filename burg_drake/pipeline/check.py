@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from burg_drake.core.errors import MeshError
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.objects.mass import implausible
@@ -88,10 +89,10 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
         text = f"{home} was built by another release; build it again"
         yield _issue(name, "stale", text)
     else:
-        yield from _record_issues(name, entry, record, home)
+        yield from _record_issues(library, name, record, home)
     source = library.root / entry.source.path
     traced = bool(entry.source.path) and source.is_file()
-    if traced and record is not None and mesh_hash(source) != record.keys.mesh:
+    if traced and record is not None and _hash(source) != record.keys.mesh:
         yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
     if not missing:
         complaint = drake_complaint(library.root / entry.sdf)
@@ -99,12 +100,20 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
             yield _issue(name, "broken", f"Drake about {library.root / entry.sdf}: {complaint}")
 
 
+def _hash(source: Path) -> str:
+    """Of a mesh; empty where it can no longer be read."""
+    try:
+        return mesh_hash(source)
+    except MeshError:
+        return ""
+
+
 def _record_issues(
-    name: str, entry: ObjectEntry, record: Record, home: Path
+    library: ObjectLibrary, name: str, record: Record, home: Path
 ) -> Iterator[LibraryIssue]:
-    found = file_hashes(home)
-    listed = {Path(p).relative_to(home.name).as_posix() for p in entry.files}
-    lost = sorted(set(record.files) - set(found) - listed)
+    entry, found = library.entry(name), file_hashes(home)
+    listed = {library.root / p for p in entry.files}
+    lost = sorted(f for f in record.files if f not in found and home / f not in listed)
     if lost:
         yield _issue(name, "missing", f"{home / lost[0]} is missing; build it again")
     changed = sorted(f for f, sha in record.files.items() if found.get(f, sha) != sha)
@@ -165,33 +174,21 @@ def _issue(name: str, kind: IssueKind, message: str) -> LibraryIssue:
     return LibraryIssue(object=name, kind=kind, message=message)
 
 
-class _Remarks(logging.Handler):
-    """Collects what is logged."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.texts: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.texts.append(record.getMessage())
-
-
 def drake_complaint(sdf: Path) -> str:
     """What Drake's parser says against a model: its error or first warning; empty if nothing."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
+    from burg_drake.station.model_file import held_remarks  # imports Drake
+
     plant, graph = MultibodyPlant(0.001), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(graph)
-    remarks = _Remarks()
-    logger = logging.getLogger("drake")
-    logger.addHandler(remarks)
-    try:
-        Parser(plant).AddModels(str(sdf))
-        plant.Finalize()
-    except (RuntimeError, SystemExit) as error:
-        return " ".join(str(error).split())
-    finally:
-        logger.removeHandler(remarks)
-    return " ".join(remarks.texts[0].split()) if remarks.texts else ""
+    with held_remarks() as remarks:
+        try:
+            Parser(plant).AddModels(str(sdf))
+            plant.Finalize()
+        except (RuntimeError, ValueError, SystemExit) as error:
+            return " ".join(str(error).split())
+    doubts = [record.getMessage() for record in remarks if record.levelno >= logging.WARNING]
+    return " ".join(doubts[0].split()) if doubts else ""

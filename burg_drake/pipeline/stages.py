@@ -135,7 +135,8 @@ def _origin(source: ObjectSource, root: Path) -> tuple[str, str]:
     if isinstance(source.mesh, trimesh.Trimesh):
         return "", ""
     mesh = Path(source.mesh)
-    return mesh.name, Path(os.path.relpath(mesh.resolve(), root.resolve())).as_posix()
+    seen = os.path.relpath(os.path.realpath(mesh), os.path.realpath(root))
+    return mesh.name, Path(seen).as_posix()
 
 
 def _entry(

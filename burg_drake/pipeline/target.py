@@ -39,7 +39,7 @@ def opened_for_build(out: str | Path) -> Iterator[Path]:
     Raises:
         InvalidInputError: it cannot be written to, or another build is writing it.
     """
-    root = Path(out).resolve()
+    root = Path(os.path.realpath(out))
     new = [p for p in (root, *root.parents) if not os.path.lexists(p)]
     try:
         writable_folder(root)
@@ -84,7 +84,7 @@ def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection
     files = [s.mesh for s in sources if not isinstance(s.mesh, trimesh.Trimesh)]
     for mesh in files:
         file = Path(mesh)
-        for folder in {*file.absolute().parents, *file.resolve().parents}:
+        for folder in {*file.absolute().parents, *Path(os.path.realpath(file)).parents}:
             inside = replaced.get(_identity(folder)) if folder.exists() else None
             if inside is not None:
                 raise InvalidInputError(

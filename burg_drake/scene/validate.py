@@ -90,19 +90,24 @@ def placed_vertices(scene: Scene, instance: str) -> Array:
     """(N, 3) vertices of an instance's surface in the scene frame [m]."""
     entry = scene.entry(instance)
     mesh = scene.library.path(entry.surface or entry.mesh)
-    return transform_points(scene.X_SO(instance), read_vertices(mesh))
+    try:
+        p_OV = read_vertices(mesh)
+    except (OSError, ValueError) as error:
+        raise scene.library.damaged(mesh) from error
+    return transform_points(scene.X_SO(instance), p_OV)
 
 
 def read_vertices(mesh: Path) -> Array:
     """(N, 3) vertices of an .obj file as a library holds it.
 
     Raises:
-        InvalidInputError: the file has none.
+        OSError, ValueError: it cannot be read, or holds no vertices.
     """
     rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
-    if not rows:
-        raise InvalidInputError(f"{mesh} has no vertices; build its library again")
-    return np.array(rows, dtype=float)
+    p_OV = np.array(rows, dtype=float).reshape(-1, 3)
+    if not len(p_OV) or not np.isfinite(p_OV).all():
+        raise ValueError(f"{mesh} has no vertices that are numbers")
+    return p_OV
 
 
 def _bounds_issue(scene: Scene, name: str, p_SV: Array) -> SceneIssue | None:

@@ -16,10 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from burg_drake.core.errors import BurgError
 from burg_drake.core.frames import Array
@@ -145,10 +143,9 @@ def support_points(library: ObjectLibrary, name: str) -> Array:
     entry = library.entry(name)
     if entry.contact.primitive is not None:
         return np.asarray(primitive_mesh(entry.contact.primitive).vertices)
-    pieces: Sequence[Path] = [library.path(piece) for piece in entry.pieces]
-    if not pieces:
+    if not entry.pieces:
         return np.asarray(library.surface(name).vertices)
-    return np.vstack([trimesh.load_mesh(path, process=False).vertices for path in pieces])
+    return np.vstack([library.mesh(piece).vertices for piece in entry.pieces])
 
 
 def _judge(poses: Sequence[StablePose], outcomes: Sequence[_Outcome]) -> Confirmation:

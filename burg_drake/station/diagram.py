@@ -16,9 +16,11 @@ the robot: a real one compensates its own weight.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
+import numpy as np
 from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
@@ -35,11 +37,13 @@ from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.resources import data_root
+from burg_drake.objects.entry import MassProperties
+from burg_drake.objects.sdf import LINK
 from burg_drake.scene.scene import Scene
 from burg_drake.station.cameras import add_cameras
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.hollow import is_mesh, sdf_by_pieces
-from burg_drake.station.model_file import add_models
+from burg_drake.station.model_file import add_models, held_remarks
 from burg_drake.station.robot import (
     ROBOT_MODELS,
     Robot,
@@ -52,6 +56,9 @@ from burg_drake.station.surroundings import add_board, add_obstacles, add_table
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, SceneGraph
+
+SAME_INERTIA = 1e-6
+"""Masses and moments may differ by this share: Drake shifts moments to the origin and back."""
 
 RISE = "rise"
 """The joint of an object that can only be lifted off [m], see `build_station_diagram`."""
@@ -233,17 +240,38 @@ def _add_instance(
         )
     path = scene.library.path(scene.entry(name).sdf)
     try:
-        if by_pieces and is_mesh(scene, name):
-            (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
-        else:
-            (model,) = add_models(parser, path)
-    except RuntimeError as error:
+        with held_remarks() as remarks:
+            if by_pieces and is_mesh(scene, name):
+                (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
+            else:
+                (model,) = add_models(parser, path)
+            body = plant.GetBodyByName(LINK, model)
+            _require_inertia(body, scene.entry(name).mass_properties)
+    except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"
             f" {scene.library.name!r} again"
         ) from error
+    for remark in remarks:
+        logging.getLogger("drake").handle(remark)
     plant.RenameModelInstance(model, name)
-    return plant.GetBodyByName("body", model)
+    return body
+
+
+def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
+    """Checks that a body weighs what the library says: where no body can have the mass or inertia
+    of an SDF, Drake's parser warns, and takes others.
+
+    Raises:
+        ValueError: it does not.
+    """
+    inertia = body.default_spatial_inertia()
+    about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
+    moments = [*about_com.get_moments(), *about_com.get_products()]
+    if abs(inertia.get_mass() - listed.mass) > SAME_INERTIA * listed.mass:
+        raise ValueError(f"its mass is not {listed.mass:g} kg, as library.yaml says")
+    if not np.allclose(moments, listed.inertia, rtol=0.0, atol=SAME_INERTIA * max(moments)):
+        raise ValueError("its inertia is not what library.yaml says")
 
 
 def _add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:

@@ -6,7 +6,10 @@ Drake's parser reads SDFormat's own description again for each file that it open
 
 from __future__ import annotations
 
+import logging
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -35,6 +38,26 @@ def add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
         return list(parser.AddModelsFromString(whole, "sdf"))
     except (RuntimeError, ValueError) as error:
         raise type(error)(str(error).replace("<literal-string>.sdf", str(path))) from error
+
+
+@contextmanager
+def held_remarks() -> Iterator[list[logging.LogRecord]]:
+    """Keeps back what Drake logs, such as its doubts about a model.
+
+    Yields:
+        What is kept back, and grows meanwhile; hand on with `logging.getLogger("drake").handle`.
+    """
+    logger, held = logging.getLogger("drake"), list[logging.LogRecord]()
+
+    def hold(record: logging.LogRecord) -> bool:
+        held.append(record)
+        return False
+
+    logger.addFilter(hold)
+    try:
+        yield held
+    finally:
+        logger.removeFilter(hold)
 
 
 def file_uri(path: Path) -> str:

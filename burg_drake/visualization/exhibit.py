@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from pydrake.geometry import Box, Mesh, Meshcat, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
@@ -83,9 +82,7 @@ def prepare_exhibit(
 ) -> Exhibit:
     entry = library.entry(name)
     camera = camera_rotation(ELEVATION)
-    meshes = [
-        trimesh.load(library.path(piece), force="mesh", process=False) for piece in entry.pieces
-    ]
+    meshes = [library.mesh(piece) for piece in entry.pieces]
     hulls = [np.asarray(mesh.vertices) for mesh in meshes]
     corners = np.vstack([*hulls, hull_mesh(library.surface(name).vertices).vertices])
 

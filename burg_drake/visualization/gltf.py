@@ -19,6 +19,7 @@ from PIL import Image, ImageDraw, ImageFont
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
+from burg_drake.core.errors import MeshError
 from burg_drake.visualization.color_map import linear_light
 
 ROUGHNESS = 0.65
@@ -49,8 +50,16 @@ def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
 
     Returns:
         Drake's shape; the same look at the same place as the file's.
+
+    Raises:
+        MeshError: the file is damaged.
     """
-    scene = trimesh.load(path, force="scene", process=False)
+    try:
+        scene = trimesh.load(path, force="scene", process=False)
+    except Exception as error:  # the reader raises whatever it stumbles over
+        raise MeshError(f"{path} is damaged or no mesh") from error
+    if scene.is_empty:
+        raise MeshError(f"{path} is damaged or no mesh")
     for part in scene.geometry.values():
         material = getattr(part.visual, "material", None)
         if material is not None and getattr(material, "image", None) is not None:

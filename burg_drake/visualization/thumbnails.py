@@ -9,7 +9,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 from pydrake.geometry import (
@@ -155,7 +154,9 @@ class ObjectRenderer:
     def _add(self, name: str) -> None:
         entry = self._library.entry(name)
         paths = [self._library.path(piece) for piece in entry.pieces]
-        self._hulls[name] = tuple(hull_points(path) for path in paths)
+        self._hulls[name] = tuple(
+            np.asarray(self._library.mesh(piece).vertices) for piece in entry.pieces
+        )
         self._corners[name] = hull_mesh(self._library.surface(name).vertices).vertices
         visual = self._library.path(entry.mesh)
         try:
@@ -229,11 +230,6 @@ class ObjectRenderer:
         color = query.RenderColorImage(camera, world, X_PC).data
         label = query.RenderLabelImage(camera, world, X_PC).data
         return color[..., :3].astype(np.float64), label[..., 0].copy()
-
-
-def hull_points(path: Path) -> Array:
-    """(N, 3) vertices of a convex piece's file [m]."""
-    return np.asarray(trimesh.load(path, force="mesh", process=False).vertices)
 
 
 def exploded(hulls: Sequence[Array], share: float) -> list[Array]:

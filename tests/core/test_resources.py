@@ -69,6 +69,15 @@ def test_messages_list_what_exists(root: Path, tmp_path: Path):
     )
 
 
+@pytest.mark.parametrize("reference", ["~nobody-of-that-name/lib", "x" * 5000, "lib/link"])
+def test_paths_that_cannot_be(root: Path, reference: str):
+    """Nobody's home, a name beyond any limit, and a link to itself."""
+    Path("lib").mkdir()
+    Path("lib/link").symlink_to("link")
+    with pytest.raises(UnknownNameError, match=r"nobody's home folder|does not exist"):
+        resolve(reference, "models", Path.cwd())
+
+
 def test_the_installation_has_its_data():
     assert resolve("household", "models").joinpath("library.yaml").is_file()
     assert resolve("tabletop_six", "scenes").is_file()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.errors import DocumentError, InvalidInputError, MeshError, UnknownNameError
 from burg_drake.core.schema import Pose
 from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
 from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
@@ -101,3 +101,25 @@ def test_surfaces_have_no_seams_and_are_in_the_object_frame() -> None:
         assert surface.volume == pytest.approx(entry.mass_properties.volume, rel=1e-4)
     with pytest.raises(UnknownNameError, match="'bax' is not in library"):
         library.surface("bax")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\x8b\x00 garbage",
+        b"v 0 0 0\n",
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+        b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n",
+    ],
+)
+def test_damaged_meshes(library: ObjectLibrary, content: bytes) -> None:
+    (library.root / "box").mkdir()
+    (library.root / "box" / "mesh.obj").write_bytes(content)
+    with pytest.raises(MeshError, match=r"box/mesh\.obj is damaged or no mesh; build the library"):
+        library.surface("box")
+
+
+def test_a_folder_in_place_of_a_mesh(library: ObjectLibrary) -> None:
+    (library.root / "box" / "mesh.obj").mkdir(parents=True)
+    with pytest.raises(UnknownNameError, match=r"box/mesh\.obj is no file; build the library"):
+        library.surface("box")

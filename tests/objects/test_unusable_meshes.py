@@ -5,6 +5,7 @@ Those that can be repaired are in `test_broken_meshes`.
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from burg_drake.core.errors import MeshError
-from burg_drake.objects.meshes import load_mesh
+from burg_drake.objects import mesh_bounds
+from burg_drake.objects.mesh_bounds import STL_HEADER, STL_TRIANGLE, announced_triangles
+from burg_drake.objects.meshes import load_mesh, texture_image
 
 SIZE = np.array([0.1, 0.06, 0.04])
 
@@ -144,3 +148,60 @@ def test_files(tmp_path: Path, kind: str) -> None:
     with pytest.raises(MeshError) as caught:
         load_mesh(path)
     assert str(caught.value) == f"{path}: {expected}"
+
+
+def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
+    with pytest.raises(MeshError) as caught:
+        load_mesh(tmp_path / os.fsdecode(b"b\xe4r.obj"))
+    assert str(caught.value) == (
+        f"{tmp_path}/b\\xe4r.obj: the name is not UTF-8; rename the file, or the folder it is in"
+    )
+
+
+HEADERS = {
+    "a.stl": bytes(80) + struct.pack("<I", 12),
+    "b.stl": b"solid\n" + 12 * b"facet\nendfacet\n",
+    "a.ply": b"ply\nformat binary 1.0\ncomment face 99\nelement vertex 9\nelement face 12\n",
+    "a.off": b"OFF\n9 12 0\n",
+    "a.obj": 9 * b"v 0 0 0\n" + 12 * b"f 1 2 3\n",
+    "a.glb": b"glTF",
+}
+
+
+@pytest.mark.parametrize("name", HEADERS)
+def test_triangles_are_counted_before_a_file_is_read(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(HEADERS[name].ljust(STL_HEADER + 12 * STL_TRIANGLE))
+    assert announced_triangles(path) == (0 if name == "a.glb" else 12)
+
+
+def test_meshes_of_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mesh_bounds, "MOST_TRIANGLES", 100)
+    _box(2).export(tmp_path / "box.ply")
+    with pytest.raises(MeshError, match=r"box\.ply: 192 triangles; a mesh may have 100: decimate"):
+        load_mesh(tmp_path / "box.ply")
+    sheet = _raw(_box(2).vertices, _box(2).faces[:80])
+    with pytest.raises(
+        MeshError, match="80 triangles; an open surface that becomes a wall may have 50"
+    ):
+        load_mesh(sheet)
+
+
+def _with_texture(folder: Path, suffix: str) -> Path:
+    """A box with a texture of 40 x 30 pixels, beside the file or in it."""
+    box = trimesh.creation.box(SIZE)
+    material = trimesh.visual.material.SimpleMaterial(image=Image.new("RGB", (40, 30)))
+    box.visual = trimesh.visual.TextureVisuals(np.zeros((8, 2)), material)
+    box.export(folder / f"box{suffix}")
+    return folder / f"box{suffix}"
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".glb", ".gltf"])
+def test_textures_of_too_many_pixels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    mesh = _with_texture(tmp_path, suffix)
+    assert texture_image(load_mesh(mesh).visual) is not None
+    monkeypatch.setattr(mesh_bounds, "MOST_PIXELS", 1000)
+    with pytest.raises(MeshError, match=": 40 x 30 pixels; a texture may have 31 x 31: scale it"):
+        load_mesh(mesh)

@@ -87,6 +87,23 @@ def break_the_model(library: ObjectLibrary) -> None:
     sdf.write_text(sdf.read_text().replace("<mass>0.1", "<mass>-0.1"))
 
 
+def damage_the_source(library: ObjectLibrary) -> None:
+    (library.root.parent / "box.stl").write_bytes(b"")
+
+
+def _name_another_mesh(library: ObjectLibrary, mesh: str) -> None:
+    document = replace(library.document, objects={"box": replace(library.entry("box"), mesh=mesh)})
+    save_document(document, library.root / "library.yaml")
+
+
+def name_a_mesh_elsewhere(library: ObjectLibrary) -> None:
+    _name_another_mesh(library, "mesh.obj")
+
+
+def name_a_folder(library: ObjectLibrary) -> None:
+    _name_another_mesh(library, ".")
+
+
 @pytest.mark.parametrize(
     ("fault", "kind", "message"),
     [
@@ -102,6 +119,9 @@ def break_the_model(library: ObjectLibrary) -> None:
         ),
         (forget_the_object, "missing", "box is an object that library.yaml does not list; add"),
         (break_the_model, "broken", "box.sdf: "),
+        (damage_the_source, "stale", "box.stl has changed since; build it again"),
+        (name_a_mesh_elsewhere, "missing", "lib/mesh.obj is missing; build it again"),
+        (name_a_folder, "missing", "lib is missing; build it again"),
     ],
 )
 def test_faults(library: ObjectLibrary, fault: Fault, kind: str, message: str) -> None:

@@ -59,6 +59,18 @@ def test_a_file_or_link_of_the_users_is_not_replaced(tmp_path: Path, cube: Path)
     assert os.readlink(tmp_path / "lib" / "cube") == str(tmp_path / "nowhere")
 
 
+def test_links_in_a_circle(tmp_path: Path, cube: Path) -> None:
+    """Of the mesh it is one failure, of the folder nothing is begun."""
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(InvalidInputError, match=r"cannot write to folder .*loop"):
+        build_library([_source()], tmp_path / "loop")
+    (tmp_path / "loop.obj").symlink_to("loop.obj")
+    report = build_library([tmp_path / "loop.obj"], tmp_path / "lib", confirm=False)
+    assert report.failed["loop"].endswith(
+        "loop.obj: a link to a file that does not exist, or to itself"
+    )
+
+
 def test_a_refused_build_does_not_rename_the_library(tmp_path: Path) -> None:
     build_library([_source()], tmp_path / "lib", name="things")
     (tmp_path / "lib" / "mine").mkdir()

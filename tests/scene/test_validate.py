@@ -118,8 +118,9 @@ def test_read_vertices_reads_vertices_only(make_scene: MakeScene) -> None:
     assert vertices.min(axis=0) == pytest.approx([-0.03, -0.03, 0.0])
 
 
-def test_mesh_without_vertices(make_scene: MakeScene) -> None:
+@pytest.mark.parametrize("content", [b"# empty\n", b"v 0 0 0\nv 1 2\n", b"v 0 0 inf\n", b"\x8b"])
+def test_damaged_meshes(make_scene: MakeScene, content: bytes) -> None:
     scene = make_scene(("cube", (0.3, 0.2, 0.0)))
-    scene.library.path("cube/mesh.obj").write_text("# empty\n")
-    with pytest.raises(InvalidInputError, match="has no vertices"):
+    scene.library.path("cube/mesh.obj").write_bytes(content)
+    with pytest.raises(InvalidInputError, match=r"cube/mesh\.obj is damaged or no mesh; build the"):
         validate_scene(scene)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -334,3 +335,19 @@ def test_unknown_robot_and_incomplete_library(tmp_path: Path) -> None:
     save_scene(document, tmp_path / "scene.yaml")
     with pytest.raises(InvalidInputError, match=r"mug\.sdf cannot be loaded .* build the library"):
         build_station_diagram(load_scene(tmp_path / "scene.yaml"), station)
+
+
+@pytest.mark.parametrize("value", ["<mass>-0.3<", "<mass>0<", "<mass>0.2<", "<ixx>-1<", "<ixx>1<"])
+def test_a_body_weighs_what_the_library_says(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], value: str
+) -> None:
+    """Drake's parser only warns of masses and inertias that cannot be, and takes others."""
+    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    shutil.copytree(scene.library.root, tmp_path / "library")
+    sdf = tmp_path / "library" / "mug" / "mug.sdf"
+    tag = value[1 : value.index(">")]
+    sdf.write_text(re.sub(f"<{tag}>[^<]*<", value, sdf.read_text()))
+    save_scene(replace(scene.document, library="library"), tmp_path / "scene.yaml")
+    with pytest.raises(InvalidInputError, match=r"mug\.sdf cannot be loaded \(its (mass|inertia)"):
+        build_station_diagram(load_scene(tmp_path / "scene.yaml"), station, robot="none")
+    assert capfd.readouterr().err == ""
