@@ -37,6 +37,7 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
     from pathlib import Path
 
     from burg_drake.apps.scene_file import library_reference, require_another_file
+    from burg_drake.core.names import name_from
     from burg_drake.formats.burg_scene import read_burg_scene
     from burg_drake.objects.library import load_library
     from burg_drake.pipeline.scene_imports import burg_scene_document
@@ -49,7 +50,7 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
     document = burg_scene_document(
         scene,
         library,
-        name=arguments.name or output.stem,
+        name=arguments.name or name_from(output.stem),
         reference=library_reference(arguments.library, library, output.parent),
     )
     for note in scene.notes:

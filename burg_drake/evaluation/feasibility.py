@@ -15,6 +15,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.names import require_name
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidate_files import by_names
@@ -143,6 +144,7 @@ class ReachJudge:
         try:
             plan = self._planner.time(grasp.instance, motion, grasp.width)
             write = plan.to_csv if self._format == "csv" else plan.to_json
+            require_name(grasp.id)
             write(self._plans / f"{grasp.id}.{self._format}")
         except Exception as error:  # the grasp is reachable, whatever becomes of its plan
             return Decision(YES, reason=f"no plan: {one_line(error)}")

@@ -16,6 +16,7 @@ import numpy as np
 
 from burg_drake.core.errors import MeshError, UnknownNameError, nearest
 from burg_drake.core.files import atomic_write
+from burg_drake.core.names import require_name, require_names
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.objects.entry import (
@@ -38,6 +39,10 @@ class LibraryDocument:
     name: str
     description: str = ""
     objects: dict[str, ObjectEntry] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_name(self.name, "name")
+        require_names(self.objects, "objects")
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from typing import Any, Literal, cast
 import yaml
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.names import require_name
 from burg_drake.core.reader import Reader
 from burg_drake.core.schema import Vector3
 from burg_drake.core.yaml_nodes import load_nodes
@@ -144,6 +145,8 @@ class RecipeDocument:
     objects: dict[str, RecipeObject] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.name is not None:
+            require_name(self.name, "name")
         if not self.objects:
             raise InvalidInputError("objects is empty; add lines such as 'mug: {mesh: mug.obj}'")
 

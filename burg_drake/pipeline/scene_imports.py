@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.names import name_from
 from burg_drake.formats.burg_scene import BurgInstance, BurgScene
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.pipeline.source import object_name
@@ -35,7 +36,7 @@ def burg_scene_document(
     """
     names = _Names(scene, library)
     return SceneDocument(
-        name=name or scene.path.stem,
+        name=name or name_from(scene.path.stem),
         description=f"Imported from BURG-Toolkit's {scene.path.name}",
         library=reference or str(library.root),
         board=_board(scene),

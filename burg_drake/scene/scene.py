@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
+from burg_drake.core.names import require_name
 from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose, dump_document, load_document, save_document
+from burg_drake.core.schema import Pose, dump_document, load_document, plain_data, save_document
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.markers import MarkerLayout, Markers, marker_layout
-
-NAME_PATTERN = re.compile(r"[\w.-]+")
-"""Names of instances are parts of grasp ids, of file names and of paths in Meshcat."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,11 +32,7 @@ class Instance:
     X_SO: Pose = Pose()
 
     def __post_init__(self) -> None:
-        if not NAME_PATTERN.fullmatch(self.name or self.object):
-            raise InvalidInputError(
-                f"name {self.name or self.object!r} cannot be used in paths;"
-                " give letters, digits, '_', '-' and '.'"
-            )
+        require_name(self.name or self.object, "name" if self.name else "object")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +80,9 @@ class SceneDocument:
     board: Board = Board()
     instances: tuple[Instance, ...] = ()
     background: tuple[Instance, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_name(self.name, "name")
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,13 +153,7 @@ class Scene:
     def content(self) -> str:
         """Hash of the placement and of every object in it; file locations do not count."""
         objects = {i.object for i in (*self.instances.values(), *self.background.values())}
-        placed = SceneDocument(
-            name="",
-            library="",
-            board=self.board,
-            instances=self.document.instances,
-            background=self.document.background,
-        )
+        placed = plain_data(replace(self.document, description="")) | {"name": "", "library": ""}
         return content_hash(
             dump_document(placed), {name: self.library.content[name] for name in objects}
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from burg_drake.core.errors import FieldError, UnknownNameError
 from burg_drake.core.frames import Array, inverse
+from burg_drake.core.names import require_name
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document
 
@@ -66,6 +67,7 @@ class Hand:
     fingers: tuple[Finger, Finger]
 
     def __post_init__(self) -> None:
+        require_name(self.name, "name")
         low, high = self.opening
         if not 0.0 <= low < high:
             raise FieldError(

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.names import require_name, require_names
 from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose, Vector3, dump_document, load_document
+from burg_drake.core.schema import Pose, Vector3, dump_document, load_document, plain_data
 from burg_drake.station.hand import Hand, locate_hand
 
 FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']""")
@@ -152,6 +153,9 @@ class StationDocument:
     background: dict[str, Obstacle] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_name(self.name, "name")
+        require_names(self.cameras, "cameras")
+        require_names(self.background, "background")
         if self.arm is None:
             return
         x, y, z = self.arm.X_WA.translation
@@ -208,10 +212,10 @@ class Station:
         """Hash of the station, its hand document and the robot's model files with their meshes;
         names and file locations do not count."""
         arm = self.document.arm and replace(self.document.arm, model="")
-        placed = replace(self.document, name="", description="", hand="", arm=arm)
+        placed = plain_data(replace(self.document, description="", hand="", arm=arm))
         models = [self.hand_model, *([self.arm_model] if self.arm_model else [])]
         files = [file for model in models for file in (model, *_named_files(model))]
-        return content_hash(dump_document(placed), dump_document(self.hand), files)
+        return content_hash(dump_document(placed | {"name": ""}), dump_document(self.hand), files)
 
 
 def _named_files(model: Path) -> list[Path]:
