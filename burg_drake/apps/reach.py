@@ -79,8 +79,8 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--plans",
         metavar="DIR",
-        help="new or empty folder for the timed motion of each grasp that the arm can execute,"
-        " about 1.5 MB each",
+        help="folder for the timed motion of each grasp that the arm can execute, about 1.5 MB"
+        " each; the same command goes on where an interrupted one stopped",
     )
     parser.add_argument(
         "--plan-format",
@@ -123,6 +123,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
         raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
     if arguments.only_reachable and arguments.output is None:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
+    if arguments.plans:
+        arguments.after_interrupt = "; the same command goes on from here"
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     require_sound_scene(scene, station)
@@ -146,7 +148,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     yes = judged.column("outcome") == Outcome.REACHABLE
     unplanned = yes & (judged.column("reason") != "")
     if arguments.plans is not None:
-        print(f"wrote {(yes & ~unplanned).sum()} plans to {arguments.plans}")
+        print(f"{(yes & ~unplanned).sum()} plans are in {arguments.plans}")
     if output is not None:
         _write(judged.select(yes) if arguments.only_reachable else judged, output, station)
     _print_failures(judged.select(~answered), "could not be judged", len(judged))

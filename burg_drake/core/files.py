@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import stat
 import tempfile
@@ -11,6 +12,9 @@ from pathlib import Path
 from typing import BinaryIO
 
 from burg_drake.core.errors import InvalidInputError
+
+UNFINISHED = re.compile(r"\..+\.[0-9a-f]{16}")
+"""Names of what `atomic_write` has not renamed yet."""
 
 
 def open_regular(path: str | Path) -> BinaryIO:
@@ -58,6 +62,13 @@ def atomic_write(path: str | Path, content: str | bytes) -> None:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Removes what `atomic_write` leaves in a folder when its process is killed."""
+    for path in folder.iterdir():
+        if UNFINISHED.fullmatch(path.name) and path.is_file():
+            path.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | Path) -> Path:

@@ -18,7 +18,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import writable_folder
+from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import Listener, Pace, Progress, Reporter
@@ -32,12 +32,11 @@ from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run_document import (
     Grasps,
-    Input,
     Library,
     RunDocument,
     Stretch,
     TableFormat,
-    input_reference,
+    input_of,
     numbers,
     portable_reference,
     require_same_run,
@@ -147,6 +146,7 @@ def evaluate(
             reporter,
         )
         make_judge = StationJudgeFactory(scene, station, engine, mode)
+        remove_unfinished(folder)
         left = _open_grasps(run, retry_failed)
         run = _judge(run, left, make_judge, journal, workers, reporter)
         return _finish(run, table)
@@ -170,14 +170,8 @@ def _document(
     library = portable_reference(scene.library.root, folder)
     return RunDocument(
         command=_command(),
-        scene=Input(
-            name=scene.name, path=input_reference(scene.path, "scenes"), content=scene.content
-        ),
-        station=Input(
-            name=station.name,
-            path=input_reference(station.path, "stations"),
-            content=station.content,
-        ),
+        scene=input_of(scene, "scenes"),
+        station=input_of(station, "stations"),
         library=Library(
             name=scene.library.name,
             path=library if library.startswith(PACKAGE_URI) else str(scene.library.root.resolve()),

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import writable_folder
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.names import require_name
@@ -22,7 +21,9 @@ from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.judge import Decide, Decision, Verdict, one_line
-from burg_drake.evaluation.run_document import numbers
+from burg_drake.evaluation.plan_folder import PlanFolder, plans_document
+from burg_drake.evaluation.plan_folder import PlanFormat as PlanFormat
+from burg_drake.evaluation.run_document import input_of, numbers
 from burg_drake.evaluation.screens import (
     arm_reach,
     arm_screen,
@@ -37,7 +38,6 @@ from burg_drake.motion.witness import Witness
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.station import Station, load_station
 
-PlanFormat = Literal["csv", "json"]
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
 """What becomes of a grasp, unless the computation itself fails."""
@@ -68,8 +68,11 @@ def reach(
             instance, such as those of `read_grasps`.
         exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
             screening, several times faster.
-        plans: folder, new or empty, that gets the timed motion of each grasp that the arm can
-            execute, as `INSTANCE-GRASP.csv`; see `motion.plan_file`.
+        plans: folder that gets the timed motion of each grasp that the arm can execute, as
+            `INSTANCE-GRASP.csv`, see `motion.plan_file`: a new or empty one, or that of an
+            interrupted call, which the same call goes on with. What is finished is kept, and
+            grasps are tried again whose worker process was ended from outside or whose plan is
+            missing.
         plan_format: `json` for files that `load_plan` reads.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
@@ -86,7 +89,7 @@ def reach(
     Raises:
         InvalidInputError: the station has no arm, or one that stands in something, collides in
             its home posture, or does not reach the board; a set does not fit the scene; the folder
-            cannot be written, or is not empty.
+            cannot be written, or holds something else, or plans of something else.
         UnknownNameError: a reference, instance or object that does not exist.
         SimulationError: the worker processes die.
     """
@@ -102,18 +105,38 @@ def reach(
     given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
     candidates = given_candidates(scene, given)
     require_usable_arm(scene, station)
-    folder = None if plans is None else _empty_folder(plans)
     verdicts: dict[str, Verdict] = {}
-    factory = ReachJudgeFactory(scene, station, exact, folder, plan_format)
-    event = Progress("starting", total=len(candidates), outcomes=Counter(), good=YES)
-    with (
-        Reporter(progress) as reporter,
-        closing(judge_all(list(candidates), factory, workers=workers)) as judged,
-    ):
+    with Reporter(progress) as reporter, ExitStack() as opened:
+        folder = journal = None
+        if plans is not None:
+            folder = PlanFolder(
+                Path(plans),
+                plans_document(
+                    input_of(scene, "scenes"),
+                    input_of(station, "stations"),
+                    candidates,
+                    numbers(arm_settings(exact=exact)),
+                    exact=exact,
+                    format=plan_format,
+                ),
+            )
+            journal = opened.enter_context(folder.opened())
+            verdicts = folder.finished()
+        factory = ReachJudgeFactory(scene, station, exact, folder)
+        left = [candidate for candidate in candidates if candidate.id not in verdicts]
+        outcomes = Counter(v.outcome for v in verdicts.values())
+        done, total = len(candidates) - len(left), len(candidates)
+        event = Progress("starting", done, total, outcomes=outcomes, good=YES)
         pace = Pace(reporter.show, event, "judging")
-        for candidate, verdict in judged:
+        for candidate, verdict in opened.enter_context(
+            closing(judge_all(left, factory, workers=workers))
+        ):
             verdicts[candidate.id] = verdict
+            if journal is not None:
+                journal.append(candidate.id, verdict)
             pace.step(outcome=verdict.outcome)
+        if folder is not None:
+            verdicts = folder.verdicts()  # with the digits that a later call will find
     rows = [verdicts[id] for id in candidates.id]
     return _with_columns(candidates, rows, scene, station, exact)
 
@@ -134,7 +157,7 @@ class ReachJudge:
         wanted = factory.plans is not None
         self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=wanted))
         self.stages: tuple[tuple[Stage, Decide], ...] = ((Stage.PLANNED, self._plan),)
-        self._plans, self._format = factory.plans, factory.plan_format
+        self._plans = factory.plans
         self._planner = Planner(arm) if wanted else None
 
     def _plan(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
@@ -143,9 +166,9 @@ class ReachJudge:
         assert isinstance(motion, Witness)
         try:
             plan = self._planner.time(grasp.instance, motion, grasp.width)
-            write = plan.to_csv if self._format == "csv" else plan.to_json
             require_name(grasp.id)
-            write(self._plans / f"{grasp.id}.{self._format}")
+            path = self._plans.plan(grasp.id)
+            (plan.to_csv if path.suffix == ".csv" else plan.to_json)(path)
         except Exception as error:  # the grasp is reachable, whatever becomes of its plan
             return Decision(YES, reason=f"no plan: {one_line(error)}")
         return Decision(YES, margins={"duration": plan.duration})
@@ -157,29 +180,17 @@ class ReachJudgeFactory:
 
     Attributes:
         scene, station: where the grasps are.
-        exact, plans, plan_format: as in `reach`.
+        exact: as in `reach`.
+        plans: where plans go, if they are wanted.
     """
 
     scene: Scene
     station: Station
     exact: bool = True
-    plans: Path | None = None
-    plan_format: PlanFormat = "csv"
+    plans: PlanFolder | None = None
 
     def __call__(self) -> ReachJudge:
         return ReachJudge(self)
-
-
-def _empty_folder(path: str | Path) -> Path:
-    """Makes a folder for plans, which are not to be mixed up with those of another call."""
-    folder = writable_folder(path)
-    held = sorted(item.name for item in folder.iterdir() if not item.name.startswith("."))
-    if held:
-        raise InvalidInputError(
-            f"folder {folder} is not empty, it has {held[0]}; plans go to a folder of their own:"
-            " choose another one, or empty it"
-        )
-    return folder
 
 
 def _with_columns(

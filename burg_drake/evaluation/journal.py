@@ -19,6 +19,8 @@ from burg_drake.core.json_text import parse_json
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.judge import Verdict
 
+JOURNAL_FILE = "journal.jsonl"
+
 
 class Journal:
     """A journal opened for writing; one process at a time can hold it."""
@@ -40,7 +42,7 @@ class Journal:
             os.close(self._file)
             raise InvalidInputError(
                 f"{path.parent} is being written by another process; wait for it,"
-                " or choose another -o"
+                " or choose another folder"
             ) from error
         content = path.read_bytes()
         whole = content.rfind(b"\n") + 1

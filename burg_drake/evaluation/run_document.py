@@ -15,7 +15,9 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import PACKAGE_URI, data_root
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.origin import Origin, engine_label
+from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import Engine
+from burg_drake.station.station import Station
 
 TableFormat = Literal["csv", "parquet"]
 
@@ -198,13 +200,17 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
     old, new = identity(there), identity(here)
     if old["engine"] != new["engine"] or old["mode"] != new["mode"]:
         del old["settings of engine, trial and arm"]  # they differ too, which says nothing more
-    topics = [k for k in old if k in new and old[k] != new[k]]
-    differences = [f"{k} is {old[k]} there, {new[k]} here" for k in topics]
-    if differences:
+    found = differences(old, new)
+    if found:
         raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(differences)}); choose another -o, or"
-            " delete it"
+            f"{folder} holds another run ({'; '.join(found)}); choose another -o, or delete it"
         )
+
+
+def differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
+    """Topics that two identities have in common and differ in, in words."""
+    topics = [k for k in there if k in here and there[k] != here[k]]
+    return [f"{k} is {there[k]} there, {here[k]} here" for k in topics]
 
 
 def portable_reference(path: Path, folder: Path) -> str:
@@ -222,6 +228,12 @@ def input_reference(path: Path, kind: str) -> str:
     """How a user refers to a document: the bare name of a built-in one, else the path."""
     builtin = path.resolve().parent == (data_root() / kind).resolve()
     return path.stem if builtin else str(path)
+
+
+def input_of(document: Scene | Station, kind: str) -> Input:
+    """The record of a scene or station; `kind` is the folder of the built-in ones."""
+    path = input_reference(document.path, kind)
+    return Input(name=document.name, path=path, content=document.content)
 
 
 def numbers(settings: object) -> dict[str, float]:

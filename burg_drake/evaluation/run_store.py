@@ -25,6 +25,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.evaluation.candidates import Candidate, Candidates
+from burg_drake.evaluation.journal import JOURNAL_FILE as JOURNAL_FILE
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.rows import best_rows, unknown_grasp
@@ -39,7 +40,6 @@ RUN_FILE = "run.yaml"
 SCENE_FILE = "scene.yaml"
 STATION_FILE = "station.yaml"
 GRASPS_FILE = "grasps.npz"
-JOURNAL_FILE = "journal.jsonl"
 REPORT_FILE = "report.html"
 RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
 

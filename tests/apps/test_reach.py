@@ -40,10 +40,13 @@ def test_a_table_and_plans(grasps: Path, tmp_path: Path, capsys: Capture) -> Non
     assert ["box", "2", "1", "1", "100.0", "%"] in rows
     assert ["reachable", "1", "50.0", "%"] in rows
     assert ["collision_target", "1", "50.0", "%", "box", "(1)"] in rows
-    assert "clear grasps per CPU second" in out and f"wrote 1 plans to {plans}" in out
+    assert "clear grasps per CPU second" in out and f"1 plans are in {plans}" in out
     found = read_table(table)
     assert found["outcome"].tolist() == ["reachable", "collision_target"]
-    assert [path.name for path in plans.iterdir()] == [f"{found['id'][0]}.csv"]
+    assert [path.name for path in plans.glob("*.csv")] == [f"{found['id'][0]}.csv"]
+    before = {path: path.read_bytes() for path in (table, *plans.iterdir())}
+    assert reach(grasps, "-o", str(table), "--plans", str(plans)) == 0
+    assert {path: path.read_bytes() for path in (table, *plans.iterdir())} == before
 
 
 def test_only_what_is_reachable_is_written(grasps: Path, tmp_path: Path, capsys: Capture) -> None:
@@ -68,7 +71,7 @@ def test_plans_that_cannot_be_written_are_counted(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, usual)
     captured = capsys.readouterr()
-    assert f"wrote 0 plans to {plans}" in captured.out and list(plans.iterdir()) == []
+    assert f"0 plans are in {plans}" in captured.out and not any(plans.glob("*.csv*"))
     found = read_table(table)
     assert found["outcome"].tolist() == ["reachable", "collision_target"]
     name = plans / f"{found['id'][0]}.csv"
@@ -85,8 +88,8 @@ def test_plans_of_an_earlier_call_are_left_alone(
     (tmp_path / "plans" / "box-1.csv").write_text("")
     assert reach(grasps, "--plans", str(tmp_path / "plans")) == 2
     assert capsys.readouterr().err == (
-        f"burg-drake: error: folder {tmp_path / 'plans'} is not empty, it has box-1.csv; plans go"
-        " to a folder of their own: choose another one, or empty it\n"
+        f"burg-drake: error: folder {tmp_path / 'plans'} is not empty, it has box-1.csv, and"
+        " no plans.yaml; plans go to a folder of their own: choose another one, or empty it\n"
     )
 
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from known_judge import refuse
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
@@ -95,8 +102,9 @@ def test_a_plan_leads_from_home_over_the_pregrasp_up(
     judged: GraspSet, plans: Path, scene: Scene, station: Station
 ) -> None:
     good = judged.column("outcome") == "reachable"
-    written = sorted(path.stem for path in plans.iterdir())
-    assert written == sorted(f"box-{id}" for id in judged.id[good])
+    written = sorted(path.name for path in plans.iterdir())
+    names = [f"box-{id}.json" for id in judged.id[good]]
+    assert written == sorted([*names, "journal.jsonl", "plans.yaml"])
     plan = load_plan(plans / f"box-{judged.id[0]}.json")
     arm = station.document.arm
     assert arm is not None
@@ -124,15 +132,67 @@ def test_answers_do_not_depend_on_neighbours_or_workers(
 def test_plans_go_to_a_folder_of_their_own(
     judged: GraspSet, plans: Path, scene: Scene, station: Station
 ) -> None:
-    """Those of an earlier call would be taken for motions of this one."""
-    before = {path: path.stat().st_mtime_ns for path in plans.iterdir()}
+    """Those of another question would be taken for motions of this one."""
+    before = contents(plans)
+    given = GraspSet.create(GRASPS[:2], object="box", width=0.06)
     with pytest.raises(InvalidInputError) as error:
-        reach(scene, station, {}, plans=plans)
-    assert str(error.value) == (
-        f"folder {plans} is not empty, it has {min(path.name for path in before)}; plans go to a"
-        " folder of their own: choose another one, or empty it"
+        reach(scene, station, given, exact=False, plans=plans)
+    assert re.fullmatch(
+        rf"folder {plans} has plans of something else \(grasps is 4, content \w+ there, 2, content"
+        r" \w+ here; check is exact there, screening here; format is json there, csv here\);"
+        " choose another one, or delete it",
+        str(error.value),
     )
-    assert {path: path.stat().st_mtime_ns for path in plans.iterdir()} == before
+    assert contents(plans) == before
+
+
+def contents(folder: Path) -> dict[str, tuple[int, bytes]]:
+    return {p.name: (p.stat().st_mtime_ns, p.read_bytes()) for p in folder.iterdir()}
+
+
+def test_what_is_finished_is_not_asked_again(
+    judged: GraspSet, plans: Path, scene: Scene, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.feasibility.ReachJudgeFactory", lambda *_: refuse)
+    given = GraspSet.create(GRASPS, object="box", width=0.06)
+    before = contents(plans)
+    again = reach(scene, station, given, plans=plans, plan_format="json")
+    assert contents(plans) == before
+    for name, values in judged.columns.items():
+        np.testing.assert_array_equal(again.column(name), values)
+
+
+KILLED = """
+import sys
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.feasibility import reach
+grasps = GraspSet.load(sys.argv[1])
+reach("tabletop_six", "panda_tabletop", grasps, plans=sys.argv[2], plan_format="json", workers=1)
+"""
+
+
+def test_a_killed_call_is_gone_on_with(
+    judged: GraspSet, plans: Path, scene: Scene, station: Station, tmp_path: Path
+) -> None:
+    """Killed while it writes a plan, or just after; what is half written goes."""
+    folder = tmp_path / "plans"
+    given = GraspSet.create(GRASPS, object="box", width=0.06)
+    given.save(tmp_path / "grasps.npz")
+    name = f"box-{judged.id[0]}.json"
+    command = [sys.executable, "-c", KILLED, str(tmp_path / "grasps.npz"), str(folder)]
+    process = subprocess.Popen(command, start_new_session=True)
+    while not any(folder.glob(f"*{name}*")) and process.poll() is None:
+        time.sleep(0.0005)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    (folder / f".{name}.0123456789abcdef").write_text("half of a pl")
+    found = reach(scene, station, given, plans=folder, plan_format="json", workers=1)
+    ours, theirs = contents(folder), contents(plans)
+    assert ours.keys() == theirs.keys()
+    for file in set(ours) - {"journal.jsonl"}:
+        assert ours[file][1] == theirs[file][1], file
+    for column in set(judged.columns) - {"cpu"}:
+        np.testing.assert_array_equal(found.column(column), judged.column(column))
 
 
 def test_a_plan_that_fails_leaves_the_answer(
@@ -149,7 +209,8 @@ def test_a_plan_that_fails_leaves_the_answer(
     assert found.column("outcome").tolist() == ["reachable"]
     (reason,) = found.column("reason")
     assert reason.startswith(f"no plan: InvalidInputError: cannot write {taken}: ")
-    assert "duration" not in found.columns and list(tmp_path.iterdir()) == [taken]
+    assert "duration" not in found.columns
+    assert {path.name for path in tmp_path.iterdir()} == {taken.name, "journal.jsonl", "plans.yaml"}
 
 
 def test_what_cannot_be_answered_has_no_outcome(
