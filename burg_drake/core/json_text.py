@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,7 @@ def parse_json(text: str, name: str, limits: Limits = DOCUMENT) -> Any:
     def mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         result = dict(pairs)
         if len(result) < len(pairs):
-            keys = [key for key, _ in pairs]
-            twin = next(key for k, key in enumerate(keys) if key in keys[:k])
+            twin = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
             raise DocumentError(f"{name}: {quoted(twin)} appears twice in the same mapping")
         return result
 
