@@ -8,6 +8,7 @@ import re
 import secrets
 import stat
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -44,23 +45,38 @@ def atomic_write(path: str | Path, content: str | bytes) -> None:
     Raises:
         InvalidInputError: the place cannot be written to.
     """
-    path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
-    temporary = None
+    atomic_write_all({Path(path): content})
+
+
+def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
+    """Writes several files, and renames them into place only when all of them are on the disk.
+
+    Args:
+        contents: text (stored as UTF-8) or bytes by file.
+
+    Raises:
+        InvalidInputError: one of the places cannot be written to; then none is replaced, unless it
+            is the renaming that fails.
+    """
+    written: dict[Path, Path] = {}
+    path = Path()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-        with temporary.open("xb") as stream:  # with the permissions that the user's umask leaves
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(temporary, path)
+        for path, content in contents.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+            written[path] = temporary
+            with temporary.open("xb") as stream:  # with the permissions that the umask leaves
+                stream.write(content.encode() if isinstance(content, str) else content)
+                stream.flush()
+                os.fsync(stream.fileno())
+        for path, temporary in written.items():
+            os.replace(temporary, path)
     except OSError as error:
         raise InvalidInputError(
             f"cannot write {path}: {error.strerror or error}; choose a writable place"
         ) from error
     finally:
-        if temporary is not None:
+        for temporary in written.values():
             temporary.unlink(missing_ok=True)
 
 

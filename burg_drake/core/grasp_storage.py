@@ -2,7 +2,8 @@
 
 Both hold the same: a header (format, version, provenance as JSON), the columns that every set has,
 and further columns. In HDF5 these are attributes of the root (`format`, `version`, `provenance`),
-datasets `X_OG`, `width`, `id`, `object`, `score`, and datasets of the group `columns`.
+datasets `X_OG`, `width`, `id`, `object`, `score`, and datasets of the group `columns`. A dataset's
+attributes say its `unit` and `description`, see `core.columns`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.columns import describe
 from burg_drake.core.damaged import reading
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
@@ -135,9 +137,11 @@ def _write_dataset(group: Any, name: str, values: NDArray[Any]) -> None:
     if values.dtype.kind == "U":
         encoded = np.char.encode(values, "utf-8")
         type = h5py.string_dtype("utf-8", max(1, encoded.dtype.itemsize))
-        group.create_dataset(name, data=encoded.astype(type), dtype=type, **packed)
+        data = group.create_dataset(name, data=encoded.astype(type), dtype=type, **packed)
     else:
-        group.create_dataset(name, data=values, **packed)
+        data = group.create_dataset(name, data=values, **packed)
+    if (column := describe(name)) is not None:
+        data.attrs.update(unit=column.unit, description=column.description)
 
 
 def _read_hdf5(path: Path) -> tuple[dict[str, Any], Columns, Columns]:

@@ -47,6 +47,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.columns import GIVEN
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidates
@@ -63,8 +64,6 @@ CPU_COLUMNS = {
     Stage.PLANNED: "cpu_plan",
     Stage.EXECUTED: "cpu_trial",
 }
-GIVEN = "given_"
-"""Columns that came with the grasps begin with this."""
 TEXT = (
     *("id", "instance", "object", "outcome", "stage", "blocker", "reason", "touched"),
     *("engine", "run"),

@@ -1,4 +1,8 @@
-"""The results table as a file for other tools, CSV or Parquet; numbers keep every bit."""
+"""The results table as a file for other tools, CSV or Parquet; numbers keep every bit.
+
+Units and meaning of columns go with it: in the metadata of Parquet's fields, and of a CSV file in a
+file beside it, by the W3C's standard Metadata Vocabulary for Tabular Data (CSV on the Web).
+"""
 
 from __future__ import annotations
 
@@ -9,12 +13,14 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.columns import describe
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.core.files import atomic_write
+from burg_drake.core.files import atomic_write, atomic_write_all
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
 from burg_drake.evaluation.trial import MOVED, PUSHED
@@ -24,8 +30,15 @@ T = TypeVar("T", int, float)
 HEAD = 1 << 16
 """Characters that are looked at to recognise a file."""
 
+DATATYPES = {"U": "string", "f": "double", "i": "integer", "u": "integer", "O": "integer"}
+"""Of CSV on the Web, by the kind of an array."""
+
 METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key of their metadata."""
+
+
+METADATA_SUFFIX = "-metadata.json"
+"""Of the file beside a CSV file: where the standard has readers look for it."""
 
 
 def require_writer(table: str) -> None:
@@ -44,6 +57,8 @@ def require_writer(table: str) -> None:
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
+    Beside a CSV file `csv_metadata` goes to a file whose name has `METADATA_SUFFIX` behind it.
+
     Args:
         path: the file.
         columns: equally long arrays by name.
@@ -56,7 +71,37 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
     if path.suffix == ".parquet":
         atomic_write(path, _parquet_bytes(columns, metadata or {}))
     else:
-        atomic_write(path, _csv_text(columns))
+        description = json.dumps(csv_metadata(path.name, columns), indent=1) + "\n"
+        beside = path.with_name(path.name + METADATA_SUFFIX)
+        atomic_write_all({beside: description, path: _csv_text(columns)})
+
+
+def csv_metadata(name: str, columns: Columns) -> dict[str, Any]:
+    """JSON values that describe a CSV file by the standard of CSV on the Web.
+
+    Args:
+        name: of the file.
+        columns: as for `write_table`. The standard restricts the names of columns, so that those
+            of the file are among the titles as they are, and their signs encoded in the names.
+    """
+    described = []
+    for title, values in columns.items():
+        column = describe(title)
+        entry = {
+            "name": quote(title, safe="").replace("-", "%2D").replace("~", "%7E"),
+            "titles": title,
+            "datatype": DATATYPES[values.dtype.kind],
+        }
+        if column is not None:
+            entry["dc:description"] = column.description
+            if column.unit:
+                entry["schema:unitText"] = column.unit
+        described.append(entry)
+    return {
+        "@context": ["http://www.w3.org/ns/csvw", {"@language": "en"}],
+        "url": name,
+        "tableSchema": {"columns": described},
+    }
 
 
 def read_table(path: Path) -> Columns:
@@ -121,9 +166,13 @@ def _csv_text(columns: Columns) -> str:
 def _cells(values: NDArray[Any]) -> list[Any]:
     """Python values of a column, an empty text for NaN; csv writes floats by repr: lossless.
 
-    Whole numbers with gaps are objects, None in the gaps, which csv leaves empty.
+    Infinity is `INF`, as XML and with it CSV on the Web have it. Whole numbers with gaps are
+    objects, None in the gaps, which csv leaves empty.
     """
-    return ["" if value != value else value for value in values.tolist()]
+    special = {math.inf: "INF", -math.inf: "-INF"}
+    if values.dtype.kind != "f" or np.isfinite(values).all():
+        return list(values.tolist())
+    return ["" if value != value else special.get(value, value) for value in values.tolist()]
 
 
 def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
@@ -135,10 +184,17 @@ def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
         else arrow.array(values, from_pandas=True)  # NaN becomes null
         for name, values in columns.items()
     }
-    table = arrow.table(arrays).replace_schema_metadata({METADATA_KEY: json.dumps(metadata)})
+    table = arrow.table(arrays)
+    fields = [field.with_metadata(_field_metadata(field.name)) for field in table.schema]
+    table = table.cast(arrow.schema(fields, {METADATA_KEY: json.dumps(metadata)}))
     sink = arrow.BufferOutputStream()
     parquet.write_table(table, sink)
     return bytes(sink.getvalue().to_pybytes())
+
+
+def _field_metadata(name: str) -> dict[str, str]:
+    column = describe(name)
+    return {} if column is None else {"unit": column.unit, "description": column.description}
 
 
 def _pyarrow() -> tuple[Any, Any]:

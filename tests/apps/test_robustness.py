@@ -10,6 +10,7 @@ import pytest
 
 from burg_drake.apps import robustness
 from burg_drake.apps.cli import main
+from burg_drake.core.columns import describe
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.progress import Progress
 from burg_drake.evaluation import probes
@@ -45,6 +46,7 @@ def test_the_table_has_what_the_functions_say(copied: Run) -> None:
     table = read_table(copied.path / "robustness.csv")
     (id,) = copied.best()
     assert table["id"].tolist() == [id]
+    assert all(map(describe, table))
     candidate = copied.candidate(id)
     trial = HandTrial(copied.scene(), copied.station(), engine=copied.document.engine)
     grip = take_grip(trial, candidate.instance, candidate.X_OG)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write, require_writable, writable_folder
+from burg_drake.core.files import atomic_write, atomic_write_all, require_writable, writable_folder
 
 
 def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):
@@ -84,3 +84,13 @@ def test_a_file_that_could_be_written_is_not_made(tmp_path: Path):
 def test_writable_folder_is_made_and_left_empty(tmp_path: Path):
     assert writable_folder(tmp_path / "runs" / "first") == tmp_path / "runs" / "first"
     assert not list((tmp_path / "runs" / "first").iterdir())
+
+
+def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> None:
+    table, beside = tmp_path / "a.csv", tmp_path / "a.json"
+    atomic_write_all({table: "1", beside: b"2"})
+    assert (table.read_text(), beside.read_text()) == ("1", "2")
+    with pytest.raises(InvalidInputError, match=r"cannot write .*a\.csv/below"):
+        atomic_write_all({beside: "new", table / "below": "new"})
+    assert (table.read_text(), beside.read_text()) == ("1", "2")
+    assert sorted(tmp_path.iterdir()) == [table, beside]

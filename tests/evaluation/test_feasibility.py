@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from known_judge import refuse
 
+from burg_drake.core.columns import describe
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
@@ -244,6 +245,7 @@ def test_a_set_has_to_name_its_objects(scene: Scene, station: Station) -> None:
 
 
 def test_a_table_has_it_all(judged: GraspSet, tmp_path: Path) -> None:
+    assert all(map(describe, reach_columns(judged)))
     write_table(tmp_path / "reach.csv", reach_columns(judged))
     back = read_table(tmp_path / "reach.csv")
     assert back["id"].tolist() == [f"box-{id}" for id in judged.id]

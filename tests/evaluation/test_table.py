@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -115,6 +117,34 @@ def test_each_mode_has_the_columns_of_what_it_asks() -> None:
     assert not found["hand"] & (arm | trial)
     assert found["reach"] == found["hand"] | arm
     assert found["arm"] == found["hand"] | arm | trial
+
+
+def test_every_column_has_its_unit_and_meaning_in_the_files(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow.parquet")
+    verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
+    one = [Trial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
+    table = trial_columns(one, replace(ORIGIN, mode="arm"), instances=INSTANCES, joints=7)
+    table |= {"given_label": np.array([1]), "tug_+x_g": np.array([math.inf])}
+    for suffix in ("csv", "parquet"):
+        write_table(tmp_path / f"r.{suffix}", table)
+    described = json.loads((tmp_path / "r.csv-metadata.json").read_text("utf-8"))
+    assert described["url"] == "r.csv"
+    by_title = {c["titles"]: c for c in described["tableSchema"]["columns"]}
+    assert list(by_title) == list(table)
+    fields = pyarrow.read_schema(tmp_path / "r.parquet")
+    for name, column in by_title.items():
+        metadata = fields.field(name).metadata
+        assert metadata[b"description"].decode() == column["dc:description"] != ""
+        assert metadata[b"unit"].decode() == column.get("schema:unitText", "")
+        # The standard's names: https://www.w3.org/TR/tabular-metadata/#dfn-column-name
+        assert re.fullmatch(r"(\w|%[0-9A-F]{2})(\w|[.]|%[0-9A-F]{2})*", column["name"], re.A)
+        assert unquote(column["name"]) == name
+    assert by_title["slip"]["schema:unitText"] == "m"
+    assert by_title["slip"]["datatype"] == "double"
+    assert by_title["seed"]["datatype"] == "integer"
+    assert by_title["outcome"]["datatype"] == "string"
+    assert (tmp_path / "r.csv").read_text().splitlines()[1].endswith(",1,INF")
+    assert read_table(tmp_path / "r.csv")["tug_+x_g"].tolist() == [math.inf]
 
 
 def test_a_row_of_an_arm_trial_gives_back_all_that_it_was(tmp_path: Path) -> None:

@@ -1,0 +1,182 @@
+"""What columns of tables and grasp sets mean, and their units: one declaration for all of them.
+
+Files carry it along: Parquet and HDF5 with each column, CSV in a file beside it. docs/results.md
+prints it, and a test holds the two together.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+TEXT: Final = ""
+"""Unit of what is no number."""
+PLAIN: Final = "1"
+"""Unit of numbers without one: ratios, counts, labels."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Meaning of a column.
+
+    Attributes:
+        unit: `TEXT`, `PLAIN`, or a unit such as m, rad, N, s; `g` is the standard gravity of
+            9.81 m/s2, and `weights` are those of the object.
+        description: what its values are, in which frame.
+    """
+
+    unit: str
+    description: str
+
+
+_GRASP = {
+    "id": Column(TEXT, "the grasp; in results and reach tables INSTANCE-GRASP"),
+    "instance": Column(TEXT, "the object's name in the scene"),
+    "object": Column(TEXT, "the object's name in its library"),
+    "width": Column("m", "distance of the contacts along the closing direction"),
+    "score": Column(PLAIN, "quality, higher is better; its meaning is its source's"),
+    "x": Column("m", "origin of the grasp frame G in the object frame O"),
+    "y": Column("m", "origin of the grasp frame G in the object frame O"),
+    "z": Column("m", "origin of the grasp frame G in the object frame O"),
+    "qw": Column(PLAIN, "rotation of G in O as a unit quaternion: real part"),
+    "qx": Column(PLAIN, "rotation of G in O as a unit quaternion: x"),
+    "qy": Column(PLAIN, "rotation of G in O as a unit quaternion: y"),
+    "qz": Column(PLAIN, "rotation of G in O as a unit quaternion: z"),
+    "X_OG": Column(
+        "m",
+        "pose of G in O bit for bit, in tables the upper three rows of the matrix",
+    ),
+}
+
+_VERDICT = {
+    "outcome": Column(TEXT, "what became of the grasp"),
+    "stage": Column(TEXT, "the stage that decided the outcome"),
+    "blocker": Column(TEXT, "the body that was in the way"),
+    "reason": Column(TEXT, "why there is no outcome, or no plan: the message of what failed"),
+    "touched": Column(TEXT, "what the arm touched first against its plan, as LINK vs BODY"),
+}
+
+_MARGINS = {
+    "overlap": Column("m", "how deep the open hand overlaps what it collides with; 0 if clear"),
+    "clearance": Column("m", "signed distance of the open hand from what is nearest to it"),
+    "slip": Column("m", "way of the target in the hand since the grip, at the origin of G"),
+    "tilt": Column("rad", "turn of the target in the hand since the grip"),
+    "pad_force": Column("N", "normal force of the weaker pad along the closing direction"),
+    "patch_area": Column("m2", "contact patch of the pad with the smaller one"),
+    "lift": Column("m", "how far the target's centre of mass rose"),
+    "others_moved": Column("m", "largest displacement of any other object's centre of mass"),
+    "end_time": Column("s", "simulated time at which the outcome was decided"),
+    "arm_clearance": Column(
+        "m", "least distance that the robot keeps on its way, or signed distance of what is in it"
+    ),
+    "joint_excess": Column("rad", "how far the closest configuration is beyond a joint limit"),
+    "duration": Column("s", "of the planned motion"),
+    "tracking_error": Column("rad", "largest deviation of a joint from its command"),
+    "tracking_distance": Column("m", "largest deviation of the origin of G from where commanded"),
+    "pushed": Column("m", "largest displacement of any free object before the hand closed"),
+    "friction": Column(PLAIN, "coefficient of the target; empty in results: the library's"),
+    "mass": Column("kg", "of the target; empty in results: the library's"),
+    "cpu": Column("s", "CPU time of all stages"),
+    "cpu_clear": Column("s", "CPU time of the hand's screen"),
+    "cpu_reach": Column("s", "CPU time of the arm's screen and the search for motions"),
+    "cpu_plan": Column("s", "CPU time of the motion's timing"),
+    "cpu_trial": Column("s", "CPU time of the trial"),
+}
+
+_ORIGIN = {
+    "seed": Column(PLAIN, "of the sampling, in robustness tables of the perturbations"),
+    "engine": Column(TEXT, "preset by which time was stepped; marked if it is none"),
+    "run": Column(TEXT, "short hash of all that decides about results; hash in run.yaml"),
+    "scene": Column(TEXT, "where the scene was, or the name of a built-in one"),
+    "scene_content": Column(TEXT, "content hash of the scene with its objects"),
+    "station": Column(TEXT, "where the station was, or the name of a built-in one"),
+    "station_content": Column(TEXT, "content hash of the station with its models"),
+    "mode": Column(TEXT, "what was asked of each grasp: hand, reach or arm"),
+    "engine_settings": Column(TEXT, "of the engine as NAME=VALUE, SI units"),
+    "trial_settings": Column(TEXT, "of the trial's phases as NAME=VALUE, SI units"),
+    "versions": Column(TEXT, "of software and machine as NAME=VALUE"),
+}
+
+_ROBUSTNESS = {
+    "friction_min": Column(PLAIN, "smallest coefficient that lifts; 0 below what was tried"),
+    "repeats": Column(PLAIN, "number of perturbed repeats"),
+    "lifted": Column(PLAIN, "how many perturbed repeats lifted"),
+    "success": Column(PLAIN, "share of the perturbed repeats that lifted"),
+    "success_low": Column(PLAIN, "lower end of Wilson's 95 % interval of that share"),
+    "success_high": Column(PLAIN, "upper end of Wilson's 95 % interval of that share"),
+    "failed": Column(TEXT, "tests that could not be simulated"),
+    "settings": Column(TEXT, "of the tests as NAME=VALUE, SI units"),
+}
+
+_QUALITY = {
+    "force_closure": Column(PLAIN, "1 if the contacts' line lies within both friction cones"),
+    "friction_needed": Column(PLAIN, "coefficient from which on it would"),
+    "antipodal_angle": Column("rad", "largest angle of closing direction and inward normal"),
+    "slide": Column("m", "way that the object slides in the hand until held; inf if never"),
+    "epsilon": Column(PLAIN, "radius of the largest ball within the wrench space"),
+    "volume": Column(PLAIN, "of the wrench space"),
+    "load_margin": Column("weights", "force that the grip bears in the worst direction"),
+    "gravity_margin": Column("weights", "force that the grip bears along gravity"),
+    "contact_offset": Column("m", "distance of the centre of mass from the contacts' line"),
+    "nearest": Column(TEXT, "the body that the open hand is nearest to, or overlaps"),
+    "screened": Column(TEXT, "clear, or the collision of the open hand"),
+    "collides_with": Column(TEXT, "the body that it collides with"),
+}
+
+_FOREIGN = {
+    "pregrasp_width": Column("m", "distance between the pads with which the hand arrives"),
+    "object_in_gripper": Column(PLAIN, "label: 1 if the grasp holds its object, 0 if not"),
+    "label": Column(PLAIN, "of VGN and GIGA: 1 if the grasp holds its object, 0 if not"),
+    "scene_id": Column(TEXT, "of VGN and GIGA: the scene of a grasp"),
+    "height": Column("m", "of GraspNet-1Billion: of the fingers"),
+    "depth": Column("m", "of GraspNet-1Billion: how far the fingers reach beyond the centre"),
+    "object_id": Column(PLAIN, "of GraspNet-1Billion: number of the object"),
+    "name": Column(TEXT, "of Isaac Sim: the grasp's name in its file"),
+}
+
+GROUPS: Mapping[str, Mapping[str, Column]] = {
+    "Grasps": _GRASP,
+    "Verdicts": _VERDICT,
+    "Margins and cost": _MARGINS,
+    "Origin of a row": _ORIGIN,
+    "Robustness": _ROBUSTNESS,
+    "Analytic quality": _QUALITY,
+    "From other projects": _FOREIGN,
+}
+"""All columns with names of their own, by subject."""
+
+FAMILIES: Mapping[str, Column] = {
+    "moved_NAME": Column("m", "largest displacement of the centre of mass of an object"),
+    "pushed_NAME": Column("m", "displacement of an object before the hand closed"),
+    "q_grasp_NUMBER": Column("rad", "position of a joint of the arm at the grasp, from 1"),
+    "q_pregrasp_NUMBER": Column("rad", "position of a joint of the arm at the pregrasp, from 1"),
+    "tug_AXIS_g": Column("g", "acceleration along an axis of G that the grip bears; or inf"),
+    "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
+    "shake_AXIS_g": Column("g", "amplitude of an oscillation along an axis of G that it bears"),
+    "n_OUTCOME": Column(PLAIN, "how many perturbed repeats ended so"),
+}
+"""Columns whose names have a part that differs, written in capitals."""
+
+_ALL = {name: column for group in GROUPS.values() for name, column in group.items()}
+_PARTS = {"NAME": ".+", "NUMBER": r"\d+", "AXIS": "[+-]?[xyz]", "OUTCOME": "[a-z_]+"}
+_FAMILIES = tuple(
+    (re.compile(re.sub("[A-Z]{2,}", lambda part: _PARTS[part[0]], name)), column)
+    for name, column in FAMILIES.items()
+)
+GIVEN = "given_"
+"""Columns of results that came with the grasps begin with this."""
+
+
+def describe(name: str) -> Column | None:
+    """What a column is; None of one that others have made up."""
+    if name in _ALL:
+        return _ALL[name]
+    for pattern, column in _FAMILIES:
+        if pattern.fullmatch(name):
+            return column
+    if name.startswith(GIVEN):
+        theirs = describe(name.removeprefix(GIVEN)) or Column(TEXT, "not known here")
+        return replace(theirs, description=f"came with the grasps: {theirs.description}")
+    return None

@@ -1,0 +1,74 @@
+"""Units and meaning of columns: one declaration, in every file and in the document."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from burg_drake.core.columns import FAMILIES, GROUPS, describe
+from burg_drake.core.frames import make_pose
+from burg_drake.core.grasps import GraspSet
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "results.md"
+
+
+def test_the_document_has_each_column_as_it_is_declared() -> None:
+    rows = re.findall(r"^\| `(.+?)` \| (.*?) \| (.+) \|$", DOCUMENT.read_text("utf-8"), re.M)
+    groups = [*GROUPS.values(), FAMILIES]
+    declared = [(n, c.unit, c.description) for group in groups for n, c in group.items()]
+    assert [(name, unit.strip(), text) for name, unit, text in rows] == declared
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("moved_a mug.2", "m"),
+        ("pushed", "m"),
+        ("pushed_mug", "m"),
+        ("q_grasp_7", "rad"),
+        ("tug_+x_g", "g"),
+        ("tug_-z_N", "N"),
+        ("shake_x_g", "g"),
+        ("n_lifted_disturbed", "1"),
+        ("given_slide", "m"),
+        ("given_theirs", ""),
+    ],
+)
+def test_names_with_varying_parts(name: str, unit: str) -> None:
+    column = describe(name)
+    assert column is not None and column.unit == unit
+
+
+@pytest.mark.parametrize("name", ["theirs", "q_grasp_", "tug_w_g", "moved_", "slip2"])
+def test_what_others_made_up_is_not_known(name: str) -> None:
+    assert describe(name) is None
+
+
+def test_datasets_of_grasps_say_their_units(tmp_path: Path) -> None:
+    grasps = GraspSet.create(
+        make_pose(p_AB=np.zeros((2, 3))),
+        object="mug",
+        width=0.04,
+        columns={"slide": np.zeros(2), "theirs": np.zeros(2), "blocker": np.array(["", "box"])},
+    )
+    path = tmp_path / "grasps.h5"
+    grasps.save(path)
+    with h5py.File(path) as file:
+        assert file["width"].attrs["unit"] == "m"
+        assert file["columns/slide"].attrs["unit"] == "m"
+        assert "slides in the hand" in file["columns/slide"].attrs["description"]
+        assert file["columns/blocker"].attrs["unit"] == ""
+        assert "unit" not in file["columns/theirs"].attrs
+        assert all(file[name].attrs["description"] for name in ("X_OG", "id", "object", "score"))
+    assert GraspSet.load(path).width.tolist() == [0.04, 0.04]
+
+
+def test_metrics_are_described() -> None:
+    from burg_drake.evaluation.scored_set import SCENE_COLUMNS
+    from burg_drake.grasping.quality import METRICS
+
+    assert all(map(describe, (*METRICS, *SCENE_COLUMNS)))
