@@ -90,6 +90,37 @@ def source_rgba(mesh: trimesh.Trimesh) -> tuple[float, float, float, float] | No
     return r, g, b, a
 
 
+def make_opaque(mesh: trimesh.Trimesh) -> float | None:
+    """Takes the alpha out of the colours of a mesh, in place; images have none where they are used.
+
+    Exporters leave an alpha in colours that is not meant to be seen: glTF ignores that of materials
+    that do not blend, and scanners fill that of vertices with anything. What is to be seen through
+    is told by the source's `rgba`.
+
+    Returns:
+        The lowest alpha that was taken out, 0 to 1; None if the mesh was opaque.
+    """
+    visual = mesh.visual
+    if visual is None or not visual.defined or texture_image(mesh) is not None:
+        return None
+    if visual.kind == "texture":
+        name = "baseColorFactor" if hasattr(visual.material, "baseColorFactor") else "diffuse"
+        colours = getattr(visual.material, name, None)
+        holder: Any = visual.material
+    else:
+        name, holder = f"{visual.kind}_colors", visual
+        colours = getattr(visual, name)
+    if colours is None or np.shape(colours)[-1] < 4:
+        return None
+    opaque = np.array(colours)
+    lowest = float(opaque[..., 3].min()) / 255.0
+    if lowest == 1.0:
+        return None
+    opaque[..., 3] = 255
+    setattr(holder, name, opaque)
+    return lowest
+
+
 def _companions(path: Path) -> list[Path]:
     """Files in the mesh's folder, or in a folder in it, that its text names, and that those name in
     turn."""

@@ -20,6 +20,7 @@ from burg_drake.objects.hulls import convex_hull
 from burg_drake.objects.mesh_bounds import check_triangles
 from burg_drake.objects.mesh_file import (
     FORMATS,
+    make_opaque,
     mesh_hash,
     mesh_name,
     read_mesh,
@@ -133,6 +134,11 @@ def load_mesh(
             raw.apply_transform(make_pose(R_ZUP_YUP))
             sentences.append("turned from glTF's y-up to z-up")
     _check_numbers(raw, name)
+    if (alpha := make_opaque(raw)) is not None:
+        sentences.append(
+            f"colours made opaque, some had an alpha of {alpha:.2g};"
+            " rgba in an objects.yaml makes an object translucent"
+        )
     if scale != 1.0:
         raw.apply_scale(scale)
         sentences.append(f"scaled by {scale:g}")

@@ -60,7 +60,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
     makers = (_release("trimesh"), _release("manifold3d"))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)
-    visual = content_hash(VERSION, "visual", *surface, _floats(source.rgba))
+    visual = content_hash(VERSION, "opaque visual", *surface, _floats(source.rgba))
     maker = [_release("coacd")] if given is None else []
     pieces = content_hash(VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker)
     rest = content_hash(

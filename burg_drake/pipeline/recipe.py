@@ -74,7 +74,7 @@ class Defaults:
         openings: what becomes of an open surface: `wall` or `close`.
         contact: what of the object touches others in simulation.
         decomposition: parameters of the convex decomposition.
-        rgba: colour, 0 to 1 each.
+        rgba: colour and opacity, 0 to 1 each; all other colours are opaque.
     """
 
     unit: Unit | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from burg_drake.objects.meshes import (
     texture_image,
     unit_scale,
 )
+from burg_drake.objects.obj_file import write_visual
 
 SIZE = (0.10, 0.06, 0.03)
 
@@ -263,3 +265,37 @@ def test_random_bytes_are_no_mesh(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(MeshError, match=f"not a readable {suffix} mesh") as caught:
         load_mesh(path)
     assert "No module" not in str(caught.value)
+
+
+def coloured(kind: str, alpha: int) -> trimesh.Trimesh:
+    """A ball whose red has an alpha, in one of the ways in which meshes have colours."""
+    ball = trimesh.creation.icosphere(1, 0.05)
+    if kind in ("OPAQUE", "MASK", "BLEND"):
+        material = trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[200, 0, 0, alpha], alphaMode=kind
+        )
+        uv = np.zeros((len(ball.vertices), 2))
+        ball.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    elif kind == "vertex":
+        ball.visual.vertex_colors = np.tile([200, 0, 0, alpha], (len(ball.vertices), 1))
+    else:
+        ball.visual.face_colors = np.tile([200, 0, 0, alpha], (len(ball.faces), 1))
+        ball.visual.face_colors[:3, 1] = 90
+    return ball
+
+
+@pytest.mark.parametrize("kind", ["OPAQUE", "MASK", "BLEND", "vertex", "face"])
+def test_an_alpha_in_the_colours_does_not_make_a_mesh_translucent(
+    tmp_path: Path, kind: str
+) -> None:
+    for alpha, told in ((90, True), (255, False)):
+        mesh: str | Path | trimesh.Trimesh = coloured(kind, alpha)
+        if kind != "face":  # which glTF does not have
+            mesh = tmp_path / f"{alpha}.glb"
+            coloured(kind, alpha).export(mesh)
+        loaded = load_mesh(mesh)
+        assert any("colours made opaque" in line for line in loaded.repairs) is told
+        write_visual(loaded.visual, tmp_path / "mesh.obj", rgba=loaded.rgba)
+        material = (tmp_path / "mesh.mtl").read_text()
+        assert set(re.findall(r"^d (.*)$", material, flags=re.MULTILINE)) == {"1"}
+        assert "Kd 0.7843 0" in material
