@@ -30,9 +30,10 @@ if TYPE_CHECKING:
 
     from burg_drake.core.frames import Array
     from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.best_grasps import Ranking
     from burg_drake.station.station import Station
 
-DEFAULT_LIMIT = 300
+DEFAULT_MOST = 20
 
 
 def add_to(group: Any) -> None:
@@ -43,10 +44,14 @@ def add_to(group: Any) -> None:
         run_show,
         "show grasps in Meshcat, coloured by outcome, score or any other column",
         "burg-drake grasps show runs/first",
-        "burg-drake grasps show runs/first --instance mug --outcome lifted,slipped",
+        "burg-drake grasps show runs/first --instance mug --outcome lifted,slipped --all",
+        "burg-drake grasps show runs/first --select mug-0123456789ab",
         "burg-drake grasps show runs/first --color slip --range 0 0.005",
         "burg-drake grasps show grasps.h5 --color clearance --html grasps.html",
         "burg-drake grasps show mug.h5 --library household --object mug",
+        "",
+        "A click on a grasp of a page, or in its list, shows the whole gripper there; in the live",
+        "view the slider `grasp` of Meshcat's controls does, best ones of each object first.",
     )
     show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
     add_file_options(show)
@@ -80,13 +85,18 @@ def _add_choice(show: argparse.ArgumentParser) -> None:
         type=_outcomes,
         help="only grasps with these outcomes: " + ", ".join(Outcome),
     )
-    show.add_argument(
-        "--limit",
+    count = show.add_mutually_exclusive_group()
+    count.add_argument(
+        "--most",
         metavar="N",
         type=positive_int,
-        default=DEFAULT_LIMIT,
-        help="at most N grasps of each object, taken evenly (default: %(default)s)",
+        default=DEFAULT_MOST,
+        help="the best N grasps of each object: of a run those that were lifted, as `replay --best`"
+        " ranks them, and then those that came farthest; of a file those with the highest scores,"
+        " or without scores evenly taken (default: %(default)s)",
     )
+    count.add_argument("--all", action="store_true", help="all grasps")
+    show.add_argument("--select", metavar="ID", help="begin with the whole gripper at this grasp")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,12 +107,14 @@ class Content:
         grasps: all of them; with the column `instance` where there is a scene.
         source: where their objects are.
         station: for the hand, and where the scene is.
+        ranking: of the grasps.
         title: of the page.
     """
 
     grasps: GraspSet
     source: Source
     station: Station
+    ranking: Ranking
     title: str
 
 
@@ -112,18 +124,35 @@ def run_show(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.live import open_view, present
     from burg_drake.evaluation.run_grasps import column_called
     from burg_drake.visualization.grasp_legend import color_by
+    from burg_drake.visualization.grasp_picker import GraspPicker
     from burg_drake.visualization.grasp_view import draw_grasps
+    from burg_drake.visualization.gripper_view import GripperView
 
     content = _content(arguments)
-    grasps = _choose(content.grasps, arguments)
+    chosen, selected, caption = _choose(content, arguments)
+    grasps, station = content.grasps.select(chosen), content.station
     color = arguments.color and column_called(grasps, arguments.color)
     groups, legend = color_by(grasps, color, arguments.range)
-    width = _widths(grasps, content.station.hand.opening[1])
+    width = _widths(grasps, station.hand.opening[1])
     meshcat = open_view(arguments)
-    draw_grasps(meshcat, _place(content, grasps, width, meshcat), width, groups)
-    caption = f"{len(grasps)} of {len(content.grasps)} grasps"
+    X_WG = _place(content, grasps, width, meshcat)
+    draw_grasps(meshcat, X_WG, width, groups)
+    gripper = GripperView(meshcat, station.hand, station.hand_model)
+    if selected is not None:
+        gripper.put(X_WG[selected], width[selected])
     print_legend(legend)
-    present(meshcat, arguments, title=content.title, caption=[caption], legend=legend)
+    if len(grasps) < len(content.grasps):
+        print(caption)
+    present(
+        meshcat,
+        arguments,
+        title=content.title,
+        caption=[caption],
+        legend=legend,
+        controls=GraspPicker(
+            gripper, X_WG, width, _holders(grasps), _labels(grasps), groups, selected
+        ),
+    )
     return 0
 
 
@@ -139,6 +168,7 @@ def _widths(grasps: GraspSet, widest: float) -> Array:
 
 
 def _content(arguments: argparse.Namespace) -> Content:
+    from burg_drake.evaluation.best_grasps import ranked_set
     from burg_drake.evaluation.candidate_files import read_grasps
     from burg_drake.evaluation.grasp_input import read_input
     from burg_drake.formats.conversion import with_objects_renamed
@@ -168,10 +198,11 @@ def _content(arguments: argparse.Namespace) -> Content:
     if source.scene is not None:
         given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
         grasps = _on_instances(given.by_instance)
-    return Content(grasps, source, station, title=path.name)
+    return Content(grasps, source, station, ranked_set(grasps), title=path.name)
 
 
 def _content_of_run(arguments: argparse.Namespace) -> Content:
+    from burg_drake.evaluation.best_grasps import ranked_run
     from burg_drake.evaluation.run_grasps import run_grasps
     from burg_drake.evaluation.run_store import load_run
 
@@ -183,7 +214,9 @@ def _content_of_run(arguments: argparse.Namespace) -> Content:
             )
     scene = run.scene()
     source = Source(scene.library, scene)
-    return Content(run_grasps(run), source, run.station(), title=f"{scene.name}: grasps")
+    grasps = run_grasps(run)
+    title = f"{scene.name}: grasps"
+    return Content(grasps, source, run.station(), ranked_run(run, grasps), title=title)
 
 
 def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
@@ -194,10 +227,14 @@ def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
     )
 
 
-def _choose(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
-    """The grasps to be drawn."""
+def _choose(content: Content, arguments: argparse.Namespace) -> tuple[list[int], int | None, str]:
+    """Indices of the grasps to be drawn, which of these has the gripper, and what people are told
+    about the choice."""
     import numpy as np
 
+    from burg_drake.evaluation.best_grasps import best_of_each, index_of
+
+    grasps = content.grasps
     keep = np.ones(len(grasps), dtype=bool)
     for column in ("instance", "object"):
         name = getattr(arguments, column)
@@ -210,15 +247,40 @@ def _choose(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
             keep &= grasps.column(column) == name
     if arguments.outcome is not None:
         keep &= np.isin(grasps.column("outcome"), [o.value for o in arguments.outcome])
-    holder = grasps.column("instance" if "instance" in grasps.columns else "object")
-    chosen: list[int] = []
-    for name in dict.fromkeys(holder[keep].tolist()):
-        members = np.flatnonzero(keep & (holder == name))
-        count = min(len(members), arguments.limit)
-        chosen += [int(members[k * len(members) // count]) for k in range(count)]
-    if not chosen:
+    if not keep.any():
         raise InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
-    return grasps.select(chosen)
+    most = None if arguments.all else arguments.most
+    holder = np.array(_holders(grasps))
+    chosen = best_of_each(holder, keep, content.ranking, most)
+    caption = f"{len(chosen):,} of {len(grasps):,} grasps shown"
+    if len(chosen) < keep.sum():
+        by = content.ranking.by
+        how = f"the best {most} of each object by {by}" if by else f"{most} of each object, evenly"
+        caption += f": {how}; --most N or --all shows more"
+    selected = None
+    if arguments.select is not None:
+        index = index_of(grasps, arguments.select, arguments.file)
+        if index not in chosen:
+            same = [k for k, other in enumerate(chosen) if holder[other] == holder[index]]
+            chosen.insert(same[-1] + 1 if same else len(chosen), index)
+        selected = chosen.index(index)
+    return chosen, selected, caption
+
+
+def _holders(grasps: GraspSet) -> list[str]:
+    """The instance of each grasp, or without a scene the object."""
+    return list(grasps.column("instance" if "instance" in grasps.columns else "object").tolist())
+
+
+def _labels(grasps: GraspSet) -> list[str]:
+    """What a list says of each grasp: its score or outcome, and its identifier."""
+    from burg_drake.evaluation.best_grasps import shown_ids
+    from burg_drake.visualization.grasp_legend import default_column
+
+    column = default_column(grasps)
+    values = [""] * len(grasps) if column is None else grasps.column(column).tolist()
+    texts = [value if isinstance(value, str) else f"{value:.3g}" for value in values]
+    return [f"{text} {id}".strip() for text, id in zip(texts, shown_ids(grasps), strict=True)]
 
 
 def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -> Array:
@@ -226,7 +288,7 @@ def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -
     import numpy as np
 
     from burg_drake.visualization.grasp_gallery import show_with_grasps
-    from burg_drake.visualization.scene_view import show_scene
+    from burg_drake.visualization.scene_view import aim_camera, show_scene
 
     scene, station = content.source.scene, content.station
     if scene is None:
@@ -234,7 +296,10 @@ def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -
     X_WS = station.document.X_WS.matrix()
     X_SO = {name: scene.X_SO(name) for name in set(grasps.column("instance").tolist())}
     show_scene(scene, station, meshcat, robot="none")
-    return X_WS @ np.stack([X_SO[n] for n in grasps.column("instance").tolist()]) @ grasps.X_OG
+    X_WG = X_WS @ np.stack([X_SO[n] for n in grasps.column("instance").tolist()]) @ grasps.X_OG
+    ends = np.vstack([X_WG[:, :3, 3], station.hand.X_AH(X_WG)[:, :3, 3]])
+    aim_camera(scene, station, meshcat, robot="none", also=ends)
+    return X_WG
 
 
 def _outcomes(text: str) -> set[Outcome]:

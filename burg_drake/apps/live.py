@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import argparse
 import logging
+import select
 import sys
-import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
 
+    from burg_drake.visualization.grasp_picker import GraspPicker
     from burg_drake.visualization.legend import ColorBar, LegendEntry
+
+POLL_INTERVAL = 0.1
+"""Between looks at the controls of a live view [s]."""
 
 
 def open_view(arguments: argparse.Namespace) -> Meshcat:
@@ -45,29 +50,51 @@ def present(
     title: str,
     caption: Sequence[str] = (),
     legend: Sequence[LegendEntry | ColorBar] = (),
+    controls: GraspPicker | None = None,
 ) -> None:
-    """Saves the page if --html was given; else prints the address and waits, unless told not to."""
+    """Saves the page if --html was given; else prints the address and waits, unless told not to.
+
+    Args:
+        meshcat: the view.
+        arguments: those of `add_view`.
+        title: of the page.
+        caption: lines of the page.
+        legend: of the page.
+        controls: of the page; in the live view a slider of Meshcat does the same.
+    """
     if arguments.html is not None:
         from burg_drake.visualization.page import save_html
 
-        save_html(meshcat, arguments.html, title=title, caption=caption, legend=legend)
+        save_html(
+            meshcat, arguments.html, title=title, caption=caption, legend=legend, controls=controls
+        )
         print(f"wrote {arguments.html}")
         return
     if arguments.no_wait:  # the address would be gone before anyone can open it
         print(f"{title}: not kept open; give --html FILE for a page that stays")
         return
     print(f"{title}: open {meshcat.web_url()} in a browser", flush=True)
+    if controls is not None:
+        controls.add_slider(meshcat)
     meshcat.Flush()
-    wait()
+    wait(None if controls is None else lambda: controls.follow_slider(meshcat))
 
 
-def wait() -> None:
-    """Returns on Enter (at a terminal) or Ctrl-C."""
+def wait(poll: Callable[[], None] | None = None) -> None:
+    """Returns on Enter (at a terminal) or Ctrl-C.
+
+    Args:
+        poll: called several times a second until then.
+    """
+    terminal = sys.stdin is not None and sys.stdin.isatty()
+    print(f"Press {'Enter' if terminal else 'Ctrl-C'} to end. ", flush=True)
     try:
-        if sys.stdin is not None and sys.stdin.isatty():
-            input("Press Enter to end. ")
-        else:
-            print("Press Ctrl-C to end.", flush=True)
-            threading.Event().wait()
-    except (KeyboardInterrupt, EOFError):
+        while True:
+            if poll is not None:
+                poll()
+            if not terminal:
+                time.sleep(POLL_INTERVAL)
+            elif select.select([sys.stdin], [], [], POLL_INTERVAL)[0]:
+                return
+    except KeyboardInterrupt:
         print()

@@ -37,12 +37,14 @@ class HandVisual:
         shape: for Meshcat.
         color: of shapes that have none of their own.
         X_HV: (4, 4) where it is on the open hand.
+        slide: (3,) how far it moves in H for each metre by which the hand closes.
         corners: (N, 3) that its bounds follow from, in its own frame V [m].
     """
 
     shape: Shape
     color: Rgba
     X_HV: Array
+    slide: Array
     corners: Array
 
 
@@ -68,12 +70,19 @@ def hand_visuals(hand: Hand, model: Path, *, opacity: float = 1.0) -> tuple[Hand
     for finger, joint in zip(hand.fingers, added.joints, strict=True):
         joint.set_default_translation(finger.open)
     diagram = builder.Build()
-    context = plant.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    context, closed = (
+        plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext()) for _ in range(2)
+    )
+    for finger, joint in zip(hand.fingers, added.joints, strict=True):
+        joint.set_translation(closed, finger.closed)
+    way = hand.opening[1] - hand.opening[0]
     inspector = diagram.scene_graph().model_inspector()
     visuals = []
     for index in plant.GetBodyIndices(added.instance):
         body = plant.get_body(index)
         X_HB = plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+        p_HB_closed = plant.EvalBodyPoseInWorld(closed, body).translation()
+        slide = np.round((p_HB_closed - X_HB[:3, 3]) / way, 9)
         for geometry in plant.GetVisualGeometriesForBody(body):
             shape = inspector.GetShape(geometry)
             given = inspector.GetIllustrationProperties(geometry).GetPropertyOrDefault(
@@ -81,7 +90,7 @@ def hand_visuals(hand: Hand, model: Path, *, opacity: float = 1.0) -> tuple[Hand
             )
             color = Rgba(given.r(), given.g(), given.b(), opacity * given.a())
             X_HV = X_HB @ inspector.GetPoseInFrame(geometry).GetAsMatrix4()
-            visuals.append(HandVisual(_drawn(shape, opacity), color, X_HV, _corners(shape)))
+            visuals.append(HandVisual(_drawn(shape, opacity), color, X_HV, slide, _corners(shape)))
     return tuple(visuals)
 
 

@@ -15,6 +15,7 @@ from pydrake.geometry import Meshcat
 
 from burg_drake.core.files import atomic_write
 from burg_drake.visualization.camera_aim import VIEW_ASPECT
+from burg_drake.visualization.grasp_picker import GraspPicker
 from burg_drake.visualization.legend import SCRIPT, STYLE, ColorBar, LegendEntry, legend_html
 
 PANE = '<div id="meshcat-pane">'
@@ -28,6 +29,7 @@ def save_html(
     title: str,
     caption: Sequence[str] = (),
     legend: Sequence[LegendEntry | ColorBar] = (),
+    controls: GraspPicker | None = None,
 ) -> None:
     """Writes what Meshcat shows, with its animation, as a page that needs no network.
 
@@ -37,6 +39,7 @@ def save_html(
         title: of the page.
         caption: lines below the title.
         legend: colours and what they stand for.
+        controls: further ones, below the legend.
 
     Raises:
         InvalidInputError: the file cannot be written.
@@ -49,15 +52,22 @@ def save_html(
     inside, closing, after = after.partition("</div>")
     page = f'{before}<div id="view">{opening}{inside}{closing}</div>{after}'
     head, body, tail = page.rpartition("</body>")
-    atomic_write(path, head + panel(title, caption, legend) + body + tail)
+    atomic_write(path, head + panel(title, caption, legend, controls) + body + tail)
 
 
-def panel(title: str, caption: Sequence[str], legend: Sequence[LegendEntry | ColorBar]) -> str:
+def panel(
+    title: str,
+    caption: Sequence[str],
+    legend: Sequence[LegendEntry | ColorBar],
+    controls: GraspPicker | None = None,
+) -> str:
     """HTML of the panel, and how page and view behave."""
     lines = "".join(f"<p>{escape(line)}</p>" for line in caption)
+    more = "" if controls is None else controls.html()
     return (
         f'<style>{_STYLE}{STYLE}</style><details id="burg" open><summary>{escape(title)}</summary>'
-        f"{lines}{legend_html(legend)}</details><script>{_SCRIPT}{SCRIPT}</script>"
+        f"{lines}{legend_html(legend)}{more}</details><script>{_SCRIPT}{SCRIPT}</script>"
+        f"{'' if controls is None else controls.behaviour()}"
     )
 
 
@@ -67,7 +77,8 @@ _STYLE = """
 body { display: flex; width: 100vw; height: 100vh; height: 100dvh; overflow: hidden; }
 #view { position: relative; flex: 1; order: 1; min-width: 0; min-height: 0; overflow: hidden; }
 #view #meshcat-pane { position: absolute; inset: 0; width: 100%; height: 100%; }
-#view .dg.main { max-width: 100%; max-height: 100%; overflow-y: auto; }
+#view .dg.main { max-width: 100%; }
+#view .dg.main > ul { max-height: 48vh; overflow-x: hidden; overflow-y: auto; }
 #burg { box-sizing: border-box; flex: none; width: 312px; max-width: 40vw; padding: 10px 14px;
   overflow: auto; font: 14px/1.45 system-ui, sans-serif; color: #222; background: #fff;
   border-right: 1px solid #c5cad0; }

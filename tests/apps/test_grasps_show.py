@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +15,8 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.run_store import Run
 from burg_drake.formats.grasp_files import write_grasp_file
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.station import load_station
 
 Capture = pytest.CaptureFixture[str]
 N = 12
@@ -77,10 +82,66 @@ def test_in_the_scene_by_any_column(file: Path, capsys: Capture) -> None:
 
 def test_choice(file: Path, capsys: Capture) -> None:
     library = ("--library", "household", "--color", "object")
-    assert shown(capsys, file, *library, "--object", "bowl") == ["■ bowl (4)"]
-    assert shown(capsys, file, *library, "--limit", 3) == ["■ bowl (3)", "■ mug (3)"]
+    assert shown(capsys, file, *library, "--object", "bowl") == [
+        "■ bowl (4)",
+        "4 of 12 grasps shown",
+    ]
+    assert shown(capsys, file, *library, "--most", 3) == [
+        "■ bowl (3)",
+        "■ mug (3)",
+        "6 of 12 grasps shown: the best 3 of each object by score; --most N or --all shows more",
+    ]
+    assert shown(capsys, file, *library, "--all") == ["■ mug (8)", "■ bowl (4)"]
     named = ("--grasps-object", "mug=can", "--grasps-object", "bowl=box")
     assert shown(capsys, file, *library, *named) == ["■ can (8)", "■ box (4)"]
+
+
+def picker(page: Path) -> tuple[list[str], dict[str, Any], str]:
+    """The list of a page, its data, and what is chosen at first."""
+    text = page.read_text()
+    options = re.findall(r'<option value="(-?\d+)"( selected="selected")?>([^<]*)<', text)
+    (data,) = re.findall(r'<script type="application/json" id="picker">(.*?)</script>', text)
+    (chosen,) = (label for _, selected, label in options if selected)
+    return [label for _, _, label in options], json.loads(data), chosen
+
+
+def test_the_list_has_the_best_first_and_any_that_is_asked_for(
+    file: Path, grasps: GraspSet, tmp_path: Path, capsys: Capture
+) -> None:
+    page, worst = tmp_path / "page.html", str(grasps.id[0])
+    options = ("--library", "household", "--most", 2, "--html", page)
+    shown(capsys, file, *options)
+    labels, _, chosen = picker(page)
+    best = [7, 6, 11, 10]  # of mug and bowl by score
+    assert labels == ["no gripper", *(f"{grasps.score[k]:.3g} {grasps.id[k]}" for k in best)]
+    assert chosen == "no gripper"
+    shown(capsys, file, *options, "--select", worst)
+    labels, data, chosen = picker(page)
+    assert chosen == labels[3] == f"0.02 {worst}"
+    assert len(data["grasps"]) == len(labels) - 1 == 5
+    line = refused(capsys, file, *options, "--select", worst[:-1])
+    assert f"grasps.h5 has no grasp {worst[:-1]!r}; did you mean {worst!r}" in line
+
+
+def test_the_gripper_is_put_where_the_grasp_is(
+    file: Path, grasps: GraspSet, tmp_path: Path, capsys: Capture
+) -> None:
+    """Of the Panda hand, G is 0.1034 m before the flange, and two parts slide, half each."""
+    page = tmp_path / "page.html"
+    shown(capsys, file, "--scene", "tabletop_six", "--html", page, "--object", "mug")
+    labels, data, _ = picker(page)
+    assert len(labels) == 9 and all(label.split()[1].startswith("mug-") for label in labels[1:])
+    X_WO = load_station("panda_tabletop").document.X_WS.matrix()
+    X_WO = X_WO @ load_scene("tabletop_six").X_SO("mug")
+    for entry, k in zip(data["grasps"], range(7, -1, -1), strict=True):
+        X_WG, X_WH = (np.reshape(entry[frame], (4, 4)).T for frame in "GH")
+        assert pytest.approx(X_WO @ grasps.X_OG[k], abs=2e-6) == X_WG
+        assert X_WH[:3, 3] == pytest.approx(X_WG[:3, 3] - 0.1034 * X_WG[:3, 2], abs=1e-5)
+        assert entry["closed"] == pytest.approx(0.03)  # from 80 mm to 50 mm
+        assert data["groups"][entry["group"]].startswith("/drake/grasps/")
+    slides = sorted(np.round(slide, 6).tolist() for _, slide in data["slides"])
+    assert [abs(v) for slide in slides for v in slide if v] == [0.5, 0.5]
+    assert np.sum(slides, axis=0) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_what_the_file_says_of_its_objects(

@@ -275,7 +275,7 @@ def test_grasps_in_colour(run: Run, tmp_path: Path, capsys: Capture) -> None:
     ("options", "line"),
     [
         (["--outcome", "lifted,dropped"], "■ lifted (1)"),
-        (["--instance", "box", "--limit", "1"], "■ lifted (1)"),
+        (["--instance", "box", "--most", "1"], "■ lifted (1)"),
     ],
 )
 def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Capture) -> None:

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recording import RecordingMeshcat
 
-from burg_drake.core.frames import inverse, transform_points
+from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy, transform_points
 from burg_drake.station.hand import locate_hand
+from burg_drake.visualization.gripper_view import GRIPPER_PATH, GripperView
 from burg_drake.visualization.hand_visuals import hand_visuals
 
 
@@ -57,3 +59,25 @@ def test_other_shapes(tmp_path: Path) -> None:
 def test_opacity() -> None:
     hand, model, _ = locate_hand("panda_hand")
     assert {v.color.a() for v in hand_visuals(hand, model, opacity=0.25)} == {0.25}
+
+
+@pytest.mark.parametrize("name", ["panda_hand", "wsg_50"])
+@pytest.mark.parametrize("width", [0.02, 0.05])
+def test_pads_of_a_gripper_that_is_closed_to_a_width(
+    recorder: RecordingMeshcat, name: str, width: float
+) -> None:
+    hand, model, _ = locate_hand(name)
+    gripper = GripperView(recorder, hand, model)  # type: ignore[arg-type]
+    assert recorder.properties[GRIPPER_PATH, "visible"] is False
+    X_WG = make_pose(rotation_from_rpy([2.9, 0.2, 1.0]), (0.3, 0.1, 0.2))
+    gripper.put(X_WG, width)
+    assert recorder.properties[GRIPPER_PATH, "visible"] is True
+    points = []
+    for k, visual in enumerate(hand_visuals(hand, model)):
+        (path,) = (p for p in recorder.transforms if p.endswith(f"/{k}") and p.count("/") == 4)
+        points.append(transform_points(inverse(X_WG) @ recorder.X_WP(path), visual.corners))
+    low = np.vstack(points)
+    low = low[low[:, 2] > -0.005]  # what reaches as far as the pads
+    assert np.abs(low[:, 0]).min() == pytest.approx(width / 2, abs=2e-3)
+    gripper.put(X_WG, 1.0)
+    assert gripper.closed_by(1.0) == 0.0 and gripper.shown

@@ -1,0 +1,45 @@
+"""Which grasps are looked at first: by score, evenly without, and as runs rank them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import UnknownNameError
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.best_grasps import best_of_each, index_of, ranked_set, shown_ids
+
+HOLDER = np.array(["mug", "box", "mug", "mug", "box", "mug"])
+ALL = np.ones(6, dtype=bool)
+
+
+def grasps(score: list[float] | None) -> GraspSet:
+    X_OG = np.tile(np.eye(4), (6, 1, 1))
+    X_OG[:, 2, 3] = np.arange(6)
+    return GraspSet.create(X_OG, object=HOLDER, score=score)
+
+
+def test_by_score_with_unknown_ones_last() -> None:
+    ranking = ranked_set(grasps([1.0, np.nan, 3.0, np.nan, 5.0, 2.0]))
+    assert ranking.by == "score"
+    assert best_of_each(HOLDER, ALL, ranking, None) == [2, 5, 0, 3, 4, 1]
+    assert best_of_each(HOLDER, ALL, ranking, 1) == [2, 4]
+    assert best_of_each(HOLDER, np.arange(6) != 2, ranking, 1) == [5, 4]
+
+
+def test_evenly_without_scores() -> None:
+    ranking = ranked_set(grasps(None))
+    assert ranking.by == ""
+    assert best_of_each(HOLDER, ALL, ranking, 2) == [0, 3, 1, 4]
+
+
+def test_identifiers_with_and_without_instances() -> None:
+    plain = grasps(None)
+    twice = GraspSet.concatenate(
+        plain.select([0, 2]).with_columns(instance=name) for name in ("mug_1", "mug_2")
+    )
+    id = str(plain.id[2])
+    assert index_of(plain, id, "file") == 2
+    assert index_of(twice, f"mug_2-{id}", "file") == shown_ids(twice).index(f"mug_2-{id}") == 3
+    with pytest.raises(UnknownNameError, match=f"file has no grasp '{id}'.*mug_[12]-{id}"):
+        index_of(twice, id, "file")
