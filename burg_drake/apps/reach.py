@@ -200,6 +200,7 @@ def _output(arguments: argparse.Namespace) -> Path | Output | None:
 
 
 def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
+    from burg_drake.core.references import with_told_references
     from burg_drake.evaluation.feasibility import reach_columns
     from burg_drake.evaluation.table_file import write_table
     from burg_drake.station.gripper import gripper_of
@@ -207,7 +208,8 @@ def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
     if isinstance(output, Output):
         output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
         return
-    write_table(output, reach_columns(grasps), dict(grasps.provenance))
+    provenance = with_told_references(grasps.provenance, output.absolute().parent)
+    write_table(output, reach_columns(grasps), provenance)
     print(f"wrote {len(grasps)} grasps to {output}")
 
 

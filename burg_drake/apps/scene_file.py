@@ -25,7 +25,7 @@ def require_another_file(scene: Path, output: str) -> None:
 def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
     """How a scene file in `folder` refers to a library so that it is found from there: the name of
     a built-in one, else package:// or the relative path."""
+    from burg_drake.core.references import portable_reference
     from burg_drake.core.resources import builtin_names
-    from burg_drake.evaluation.run_document import portable_reference
 
     return given if given in builtin_names("models") else portable_reference(library.root, folder)

@@ -6,12 +6,12 @@ import errno
 import os
 import re
 import secrets
-import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from burg_drake.core.document_text import require_regular
 from burg_drake.core.errors import InvalidInputError
 
 UNFINISHED = re.compile(r"\..+\.[0-9a-f]{16}")
@@ -24,15 +24,11 @@ def open_regular(path: str | Path) -> BinaryIO:
     Raises:
         InvalidInputError: it is not there, cannot be read, or is no file.
     """
+    require_regular(path)
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):
-            raise InvalidInputError(f"cannot read {path}: it is not a regular file")
         return open(path, "rb")
-    except (OSError, ValueError) as error:
-        if isinstance(error, InvalidInputError):
-            raise
-        why = error.strerror if isinstance(error, OSError) else error
-        raise InvalidInputError(f"cannot read {path}: {why}") from error
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def atomic_write(path: str | Path, content: str | bytes) -> None:

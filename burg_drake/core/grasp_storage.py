@@ -3,7 +3,8 @@
 Both hold the same: a header (format, version, provenance as JSON), the columns that every set has,
 and further columns. In HDF5 these are attributes of the root (`format`, `version`, `provenance`),
 datasets `X_OG`, `width`, `id`, `object`, `score`, and datasets of the group `columns`. A dataset's
-attributes say its `unit` and `description`, see `core.columns`.
+attributes say its `unit` and `description`, see `core.columns`. Paths in the provenance are told
+from where the file is, and are absolute again once it is read.
 """
 
 from __future__ import annotations
@@ -19,12 +20,14 @@ from numpy.typing import NDArray
 
 from burg_drake.core.columns import describe
 from burg_drake.core.damaged import reading
+from burg_drake.core.document_text import DOCUMENT
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet, require_sound
 from burg_drake.core.hdf5 import is_hdf5, open_hdf5
 from burg_drake.core.json_text import parse_json
 from burg_drake.core.numpy_file import open_npz
+from burg_drake.core.references import with_found_references, with_told_references
 from burg_drake.core.stored_array import NUMBERS, StoredArray
 
 FORMAT = "burg_drake.grasps"
@@ -45,7 +48,8 @@ def save_grasps(grasps: GraspSet, path: str | Path) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".h5", ".hdf5"):
         raise InvalidInputError(f"{path} ends in {suffix!r}; give a name that ends in .npz or .h5")
-    header = {"format": FORMAT, "version": VERSION, "provenance": dict(grasps.provenance)}
+    provenance = with_told_references(grasps.provenance, Path(path).absolute().parent)
+    header = {"format": FORMAT, "version": VERSION, "provenance": provenance}
     fixed = {name: getattr(grasps, name) for name in FIXED}
     write = _npz if suffix == ".npz" else _hdf5
     atomic_write(path, write(header, fixed, dict(grasps.columns)))
@@ -58,7 +62,8 @@ def load_grasps(path: str | Path) -> GraspSet:
         header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
         if not isinstance(header["provenance"], dict):
             raise ValueError("its provenance is no mapping")
-        grasps = GraspSet(**fixed, provenance=header["provenance"], columns=columns)
+        provenance = with_found_references(header["provenance"], path.absolute().parent)
+        grasps = GraspSet(**fixed, provenance=provenance, columns=columns)
         require_sound(grasps)
         return grasps
 
@@ -102,8 +107,10 @@ def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
     with open_npz(path) as file:
-        text = str(file.array("header").read("U", ()))
-        header = parse_json(text, f"{path}: header")
+        stored = file.array("header")
+        if stored.itemsize > 4 * DOCUMENT.size:
+            raise ValueError("its header is too long")
+        header = parse_json(str(stored.read("U", ())), f"{path}: header")
         _check(path, header)
         further = {n.removeprefix(PREFIX): n for n in file.names if n.startswith(PREFIX)}
         return header, *_read_arrays(file.array, further)
@@ -149,6 +156,7 @@ def _read_hdf5(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
         version = int(file.attribute("version"))
         header: dict[str, Any] = {"format": str(file.attribute("format")), "version": version}
         _check(path, header)
-        header["provenance"] = parse_json(file.attribute("provenance"), f"{path}: provenance")
+        provenance = str(file.attribute("provenance"))
+        header["provenance"] = parse_json(provenance, f"{path}: provenance")
         further = {name: f"columns/{name}" for name in file.names("columns")}
         return header, *_read_arrays(file.array, further)

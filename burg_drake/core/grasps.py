@@ -230,6 +230,14 @@ class GraspSet:
         return load_grasps(path)
 
 
+def parts_of(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The provenances of the sets that a set was joined of, which `parts` lists or has by name."""
+    parts = provenance.get("parts")
+    if isinstance(parts, Mapping):
+        parts = list(parts.values())
+    return [p for p in parts if isinstance(p, Mapping)] if isinstance(parts, (list, tuple)) else []
+
+
 def require_sound(grasps: GraspSet) -> None:
     """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
 

@@ -156,13 +156,15 @@ def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
 def _of_instances(grasps: GraspSet) -> dict[str, GraspSet]:
     """Grasps of a file that names instances, each set with its own provenance."""
     owner = grasps.columns[INSTANCE]
-    parts = grasps.provenance.get("parts", {})
-    parts = parts if isinstance(parts, Mapping) else {}
+    given = grasps.provenance.get("parts")
+    parts = given if isinstance(given, Mapping) else {}
     rest = _without_instance(grasps)
-    return {
-        name: dataclasses.replace(rest.select(owner == name), provenance=parts.get(name, {}))
-        for name in dict.fromkeys(owner.tolist())
-    }
+    found = {}
+    for name in dict.fromkeys(owner.tolist()):
+        part = parts.get(name)
+        provenance = part if isinstance(part, Mapping) else {}
+        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
+    return found
 
 
 def _of_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:

@@ -22,6 +22,7 @@ from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import Listener, Pace, Progress, Reporter
+from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
@@ -38,7 +39,6 @@ from burg_drake.evaluation.run_document import (
     TableFormat,
     input_of,
     numbers,
-    portable_reference,
     require_same_run,
     run_hash,
     software_versions,

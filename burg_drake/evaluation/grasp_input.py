@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import GraspSet, parts_of
 from burg_drake.evaluation.run_grasps import run_documents, run_grasps
 from burg_drake.evaluation.run_store import load_run
 from burg_drake.evaluation.table_file import is_table
@@ -75,11 +75,9 @@ def hand_of(grasps: GraspSet) -> dict[str, str] | None:
 def _hands(provenance: Mapping[str, Any]) -> list[dict[str, str]]:
     """The hand that a provenance names, or else those of its parts."""
     hand = provenance.get("hand")
-    if isinstance(hand, Mapping) and "name" in hand:
-        return [dict(hand)]
-    parts = provenance.get("parts", ())
-    parts = parts.values() if isinstance(parts, Mapping) else parts
-    return [hand for part in parts if isinstance(part, Mapping) for hand in _hands(part)]
+    if isinstance(hand, Mapping) and isinstance(hand.get("name"), str):
+        return [{key: value for key, value in hand.items() if isinstance(value, str)}]
+    return [hand for part in parts_of(provenance) for hand in _hands(part)]
 
 
 def hand_reference(path: str | Path) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -12,7 +11,7 @@ from typing import Literal
 from burg_drake import __version__
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.resources import PACKAGE_URI, data_root
+from burg_drake.core.resources import data_root
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.origin import Origin, engine_label
 from burg_drake.scene.scene import Scene
@@ -23,8 +22,6 @@ TableFormat = Literal["csv", "parquet"]
 
 HASH_DIGITS = 12
 """Digits of a hash that people get to see."""
-SHIPPED = ("models", "scenes", "stations")
-"""Folders of the package's data."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,17 +208,6 @@ def differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
     """Topics that two identities have in common and differ in, in words."""
     topics = [k for k in there if k in here and there[k] != here[k]]
     return [f"{k} is {there[k]} there, {here[k]} here" for k in topics]
-
-
-def portable_reference(path: Path, folder: Path) -> str:
-    """How a document in `folder` refers to a file or folder: package:// for what the package
-    ships, else the relative path."""
-    path = path.resolve()
-    for name in SHIPPED:
-        shipped = data_root() / name
-        if path.is_relative_to(shipped):
-            return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
-    return os.path.relpath(path, folder.resolve())
 
 
 def input_reference(path: Path, kind: str) -> str:

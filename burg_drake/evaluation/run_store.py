@@ -22,6 +22,7 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.outcome import Outcome
+from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.evaluation.candidates import Candidate, Candidates
@@ -29,7 +30,7 @@ from burg_drake.evaluation.journal import JOURNAL_FILE as JOURNAL_FILE
 from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.rows import best_rows, unknown_grasp
-from burg_drake.evaluation.run_document import RunDocument, origin_of, portable_reference
+from burg_drake.evaluation.run_document import RunDocument, origin_of
 from burg_drake.evaluation.table import Columns, make_columns, table_row
 from burg_drake.evaluation.trial import Trial
 from burg_drake.objects.library import ObjectLibrary, load_library

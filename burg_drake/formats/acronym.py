@@ -43,11 +43,11 @@ from burg_drake.formats.one_object import (
     HANDS,
     SUCCESS_COLUMN,
     check_hand,
-    description_of,
     object_name,
     only_object,
     scale_note,
     success_of,
+    told_description,
 )
 from burg_drake.formats.rigid import nearest_rigid
 
@@ -125,7 +125,7 @@ def _read(path: Path, file: Hdf5File, gripper: Gripper) -> Imported:
         columns=columns,
         provenance={
             "format": FORMAT.name,
-            "file": str(path),
+            "file": str(path.absolute()),
             "object_files": {name: described},
         },
     )
@@ -177,7 +177,7 @@ def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     import h5py
 
     name = only_object(grasps, KIND)
-    described = description_of(grasps, name)
+    described = told_description(grasps, name, path)
     success = success_of(grasps)
     notes = _notes(grasps, name, described, success)
     buffer = io.BytesIO()
@@ -242,7 +242,7 @@ FORMAT = GraspFormat(
     frame="object",
     source="github.com/NVlabs/acronym, acronym_tools/acronym.py; Eppner et al., ICRA 2021",
     carries=("score as object_in_gripper", "width", "further numbers", "mesh, scale and mass"),
-    cannot_carry=("several objects", "text columns", "provenance"),
+    cannot_carry=("ids", "several objects", "text columns", "provenance"),
     X_GF=X_GF,
     recognises=recognises,
     read=read,

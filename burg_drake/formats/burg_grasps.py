@@ -66,7 +66,7 @@ def _read(path: Path, gripper: Gripper) -> Imported:
         values = make_pose(values[:, ROTATION].reshape(-1, 3, 3), values[:, TRANSLATION])
         where = f"{path}: columns 0 to 11"
     X_SF, notes = nearest_rigid(values, where)
-    provenance = {"format": FORMAT.name, "file": str(path)}
+    provenance = {"format": FORMAT.name, "file": str(path.absolute())}
     grasps = GraspSet.create(
         X_SF @ X_GF, object="", width=width, score=score, provenance=provenance
     )
@@ -90,7 +90,7 @@ FORMAT = GraspFormat(
     frame="world",
     source="github.com/mrudorfer/burg-toolkit, burg_toolkit/grasp.py",
     carries=(),
-    cannot_carry=("width", "score", "names of objects", "further columns", "provenance"),
+    cannot_carry=("ids", "width", "score", "names of objects", "further columns", "provenance"),
     X_GF=lambda gripper: X_GF,
     recognises=_recognises,
     read=_read,

@@ -41,11 +41,11 @@ from burg_drake.formats.left_behind import left_behind
 from burg_drake.formats.one_object import (
     SUCCESS_COLUMN,
     check_hand,
-    description_of,
     object_name,
     only_object,
     scale_note,
     success_of,
+    told_description,
 )
 from burg_drake.formats.rigid import nearest_rigid
 
@@ -95,7 +95,7 @@ def read(path: Path, gripper: Gripper) -> Imported:
         score=score,
         provenance={
             "format": FORMAT.name,
-            "file": str(path),
+            "file": str(path.absolute()),
             "object_files": {name: described},
         },
     )
@@ -188,7 +188,7 @@ def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
             or the place cannot be written to.
     """
     name = only_object(grasps, KIND)
-    described = description_of(grasps, name)
+    described = told_description(grasps, name, path)
     success = success_of(grasps)
     unknown = int(np.isnan(success).sum())
     if 0 < unknown < len(grasps):
@@ -222,7 +222,13 @@ FORMAT = GraspFormat(
     frame="object",
     source="github.com/NVlabs/GraspGen, docs/GRASP_DATASET_FORMAT.md",
     carries=("score as object_in_gripper", "mesh and scale"),
-    cannot_carry=("several objects", "scores other than 0 and 1", "width", "further columns"),
+    cannot_carry=(
+        "ids",
+        "several objects",
+        "scores other than 0 and 1",
+        "width",
+        "further columns",
+    ),
     X_GF=X_GF,
     recognises=recognises,
     read=read,

@@ -83,7 +83,7 @@ def _read(path: Path, gripper: Gripper) -> Imported:
         X_CF @ X_FG(rows[:, DEPTH], gripper),
         object="",
         score=rows[:, SCORE],
-        provenance={"format": FORMAT.name, "file": str(path)},
+        provenance={"format": FORMAT.name, "file": str(path.absolute())},
         columns={
             PREGRASP_WIDTH: rows[:, WIDTH],
             "height": rows[:, HEIGHT],
@@ -98,7 +98,10 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     n = len(grasps)
     carried = ("score", PREGRASP_WIDTH, "height", "depth", "object_id")
     opening, assumed = _openings(grasps, gripper)
-    notes = (*left_behind(grasps, carried, FORMAT.title), *assumed)
+    notes = (
+        *left_behind(grasps, carried, FORMAT.title),
+        *assumed,
+    )
     score = grasps.score
     if np.isnan(score).any():
         notes += (f"{int(np.isnan(score).sum())} grasps without a score got 0.",)
@@ -113,7 +116,7 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     rows[:, TRANSLATION] = X_CF[:, :3, 3]
     rows[:, OBJECT] = _numbers(grasps, "object_id", NO_OBJECT)
     write_npy(path, rows.astype(np.float32))
-    return notes
+    return (*notes, "Numbers are stored in single precision.")
 
 
 def _openings(grasps: GraspSet, gripper: Gripper) -> tuple[Array, tuple[str, ...]]:
@@ -155,6 +158,7 @@ FORMAT = GraspFormat(
     source="github.com/graspnet/graspnetAPI, graspnetAPI/grasp.py",
     carries=("score", "pregrasp_width", "height", "depth", "object_id"),
     cannot_carry=(
+        "ids",
         "width",
         "names of objects",
         "further columns",

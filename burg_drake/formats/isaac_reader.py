@@ -73,7 +73,7 @@ def read_yaml(dialect: Dialect, path: Path, gripper: Gripper) -> Imported:
         columns={**further, **columns},
         provenance={
             "format": dialect.name,
-            "file": str(path),
+            "file": str(path.absolute()),
             "object_files": {object: described},
         },
     )

@@ -13,7 +13,7 @@ from burg_drake.core.grasps import GraspSet
 
 
 def left_behind(grasps: GraspSet, carried: Collection[str], title: str) -> tuple[str, ...]:
-    """A sentence about the columns that get lost; none if nothing gets lost.
+    """A sentence about the columns that get lost, `id` among them; none if nothing gets lost.
 
     Args:
         grasps: what is written.
@@ -23,7 +23,7 @@ def left_behind(grasps: GraspSet, carried: Collection[str], title: str) -> tuple
     lost = [
         name
         for name in grasps.column_names
-        if name != "id" and name not in carried and _holds_something(grasps.column(name))
+        if name not in carried and _holds_something(grasps.column(name))
     ]
     return (f"{title} has no place for {listing(lost)}.",) if lost else ()
 

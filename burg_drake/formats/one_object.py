@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import GraspSet, parts_of
 from burg_drake.core.outcome import UNTRIED, Outcome
+from burg_drake.core.references import with_told_references
 from burg_drake.formats.grasp_format import Gripper
 
 SUCCESS_COLUMN = "object_in_gripper"
@@ -56,16 +58,34 @@ def object_name(file: str) -> str:
 
 def description_of(grasps: GraspSet, name: str) -> dict[str, Any]:
     """What is told of an object: its mesh `file`, its `scale` and more; empty if nothing is."""
-    return _find(grasps.provenance, name) or {}
+    found = _find(grasps.provenance, name) or {}
+    return {key: value for key, value in found.items() if _is_description(key, value)}
+
+
+def told_description(grasps: GraspSet, name: str, path: Path) -> dict[str, Any]:
+    """The same, with the mesh as a file at `path` refers to it."""
+    described: dict[str, Any] = with_told_references(
+        description_of(grasps, name), path.absolute().parent
+    )
+    return described
+
+
+def _is_description(key: str, value: Any) -> bool:
+    """Whether it is a name of a file, or else finite numbers; provenances come from anywhere."""
+    if key == "file":
+        return isinstance(value, str) and bool(value)
+    try:
+        return bool(np.isfinite(np.asarray(value, dtype=float)).all())
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
 def _find(provenance: Mapping[str, Any], name: str) -> dict[str, Any] | None:
     files = provenance.get("object_files")
     if isinstance(files, Mapping) and isinstance(files.get(name), Mapping):
         return dict(files[name])
-    parts = provenance.get("parts", ())
-    for part in parts.values() if isinstance(parts, Mapping) else parts:
-        if isinstance(part, Mapping) and (found := _find(part, name)):
+    for part in parts_of(provenance):
+        if found := _find(part, name):
             return found
     return None
 

@@ -102,7 +102,7 @@ def _read(path: Path, gripper: Gripper) -> Imported:
         X_VF @ inverse(_X_GF(gripper)),
         object="",
         width=width,
-        provenance={"format": FORMAT.name, "file": str(path)},
+        provenance={"format": FORMAT.name, "file": str(path.absolute())},
         columns=columns,
     )
     return Imported(grasps, FORMAT.frame, notes)
@@ -221,7 +221,7 @@ FORMAT = GraspFormat(
     frame="world",
     source="github.com/ethz-asl/vgn, src/vgn/io.py",
     carries=("width of successes", "label", "scene_id"),
-    cannot_carry=("score", "names of objects", "further columns", "provenance"),
+    cannot_carry=("ids", "score", "names of objects", "further columns", "provenance"),
     X_GF=_X_GF,
     recognises=_recognises,
     read=_read,

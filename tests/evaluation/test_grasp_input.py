@@ -82,7 +82,7 @@ def test_sampled_sets_name_their_hand(scene: Scene, tmp_path: Path) -> None:
     station = load_station("panda_wsg")
     grasps = sample_grasps(scene, station, 3)
     assert hand_of(grasps) == {"name": "wsg_50", "document": str(station.hand_path)}
-    both = GraspSet.concatenate([grasps, grasps])
+    both = GraspSet.concatenate([grasps, sample_grasps(scene, station, 3, seed=1)])
     assert (hand_of(both) or {})["name"] == "wsg_50"
     both.save(tmp_path / "both.h5")
     assert hand_reference(tmp_path / "both.h5") == str(station.hand_path)

@@ -14,9 +14,10 @@ import yaml
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.outcome import Outcome
+from burg_drake.core.references import portable_reference
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import write_report
-from burg_drake.evaluation.run_document import RunDocument, portable_reference, run_hash
+from burg_drake.evaluation.run_document import RunDocument, run_hash
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.scene.scene import Scene

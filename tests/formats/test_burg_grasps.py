@@ -75,7 +75,7 @@ def test_rows_of_the_internal_array(tmp_path: Path) -> None:
 def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
     grasps = random_grasps(100, seed)
     notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
-    assert notes == ("BURG-Toolkit has no place for width, object, score.",)
+    assert notes == ("BURG-Toolkit has no place for width, id, object, score.",)
     assert FORMAT.recognises(tmp_path / "a.npy")
     written = np.load(tmp_path / "a.npy")
     np.testing.assert_allclose(written[:, :3, 0], grasps.X_OG[:, :3, 0], atol=1e-15)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import re
 import subprocess
 import sys
 import tracemalloc
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from burg_drake.formats.grasp_files import (
     write_grasp_file,
 )
 from burg_drake.formats.grasp_format import PANDA, Gripper, GripperJoint
+from burg_drake.formats.one_object import description_of
 
 SINGLE_PRECISION = ("graspnet", "burg")
 WITH_WIDTH = ("burg_drake", "acronym", "isaac_grasp", "vgn")
@@ -84,6 +87,33 @@ def test_ways_through_two_formats_end_where_they_began(
     twice = read_grasp_file(written(once, other, tmp_path), other).grasps
     last = read_grasp_file(written(twice, "burg_drake", tmp_path / "last")).grasps
     assert_same_poses(last.X_OG, grasps.X_OG, one, other)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_no_file_tells_where_things_are_on_this_machine(
+    name: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
+) -> None:
+    mesh = tmp_path / "lib" / "mug" / "mesh.obj"
+    mesh.parent.mkdir(parents=True)
+    mesh.touch()
+    told = {
+        **{key: str(mesh.parent) for key in ("scene", "library", "station", "run", "file")},
+        "hand": {"name": "palm", "document": str(mesh)},
+        "object_files": {"mug": {"file": str(mesh), "scale": 1.0}},
+    }
+    grasps = dataclasses.replace(random_grasps(3, 11, success=True), provenance={"parts": [told]})
+    path = written(grasps, name, tmp_path / "out")
+    texts = [path.read_bytes()]
+    if name == "burg_drake":
+        grasps.save(path.with_suffix(".npz"))
+        assert GraspSet.load(path).provenance == GraspSet.load(path.with_suffix(".npz")).provenance
+        with zipfile.ZipFile(path.with_suffix(".npz")) as archive:
+            texts += [archive.read(entry).replace(b"\0", b"") for entry in archive.namelist()]
+        assert all(b"../lib/mug/mesh.obj" in text for text in texts[:2])
+    assert not any(str(tmp_path).encode() in text for text in texts)
+    if name in ("burg_drake", "acronym", "graspgen"):
+        again = description_of(read_grasp_file(path).grasps, "mug")
+        assert again["file"] == (str(mesh) if name == "burg_drake" else "../lib/mug/mesh.obj")
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -21,6 +21,8 @@ from burg_drake.grasping.antipodal import sample_antipodal
 DOWN_THE_CAMERA = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
 """Approach along the camera's z, closing along its y: columns are x, y, z of their grasp frame."""
 
+SINGLE = "Numbers are stored in single precision."
+
 
 def grasp_group(path: Path, *rows: tuple[Any, ...]) -> Path:
     """What `GraspGroup.save_npy` writes of `Grasp(score, width, height, depth, R, t, id)`."""
@@ -85,7 +87,7 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
         object_id=rng.integers(-1, 80, 200),
     )
     notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
-    assert notes == ("GraspNet-1Billion has no place for width, object.",)
+    assert notes == ("GraspNet-1Billion has no place for width, id, object.", SINGLE)
     assert np.load(tmp_path / "a.npy").dtype == np.float32
     assert FORMAT.recognises(tmp_path / "a.npy")
     back = FORMAT.read(tmp_path / "a.npy", PANDA).grasps
@@ -108,8 +110,10 @@ def test_what_is_not_known_gets_what_networks_write(tmp_path: Path) -> None:
     grasps = GraspSet.create(make_pose(p_AB=[[0, 0, 0.5], [0, 0, 0.6]]), object="")
     notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
     assert notes == (
+        "GraspNet-1Billion has no place for id.",
         "2 grasps of unknown width got the hand's opening of 0.08 m.",
         "2 grasps without a score got 0.",
+        SINGLE,
     )
     rows = np.load(tmp_path / "a.npy").astype(float)
     np.testing.assert_allclose(rows[:, :4], [[0, 0.08, 0.02, 0.02]] * 2, rtol=1e-6)
@@ -175,10 +179,11 @@ def test_openings_are_given_known_or_assumed(tmp_path: Path) -> None:
     notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
     np.testing.assert_allclose(np.load(tmp_path / "a.npy")[:, 1], [0.06, 0.05, 0.08, 0.08])
     assert notes == (
-        "GraspNet-1Billion has no place for width.",
+        "GraspNet-1Billion has no place for width, id.",
         "width is the opening on arrival there: 2 grasps got the distance of their contacts and"
         " 20 mm, at most 0.08 m.",
         "1 grasps of unknown width got the hand's opening of 0.08 m.",
+        SINGLE,
     )
 
 

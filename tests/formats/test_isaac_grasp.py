@@ -204,7 +204,8 @@ def test_written_joints_are_those_of_each_finger(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(3, 5)
-    assert isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA) == ()
+    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
+    assert notes == ("Isaac Sim grasp editor has no place for id.",)
     data = yaml.safe_load((tmp_path / "out.yaml").read_text())
     assert data["object_frame_link"] == "/World/mug"
     assert data["gripper_frame_link"] == "/World/panda_hand"
@@ -235,6 +236,7 @@ def test_widths_that_the_hand_does_not_have_are_said(tmp_path: Path) -> None:
     expected = (
         "widths of 2 grasps are beyond the opening of hand 'panda_hand', 0 to 0.08 m; so are their"
         " joints.",
+        "Isaac Sim grasp editor has no place for id.",
     )
     assert isaac_grasp.FORMAT.write(wide, tmp_path / "a.yaml", PANDA) == expected
     on_arrival = four.with_columns(pregrasp_width=[0.02, 0.12, -0.01, float(np.float32(0.08))])

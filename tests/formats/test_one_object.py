@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,22 @@ def test_descriptions_are_found_in_joined_sets() -> None:
     joined = GraspSet.concatenate([GraspSet.create(THREE, object="bowl"), one])
     assert description_of(one, "mug") == description_of(joined, "mug") == mug
     assert description_of(joined, "bowl") == {}
+
+
+@pytest.mark.parametrize(
+    "provenance",
+    [
+        {"object_files": {"mug": {"file": 5, "scale": "big", "mass": 10**400, "com": [[1], 2]}}},
+        {"object_files": {"mug": "mug.obj"}},
+        {"object_files": 7},
+        {"parts": 5},
+        {"parts": [1, {"parts": "abc"}]},
+        {"parts": {"a": None}},
+    ],
+)
+def test_a_provenance_that_says_nonsense_describes_nothing(provenance: dict[str, object]) -> None:
+    grasps = GraspSet.create(THREE, object="mug")
+    assert description_of(dataclasses.replace(grasps, provenance=provenance), "mug") == {}
 
 
 def test_success_comes_from_the_column_then_outcomes_then_scores() -> None:

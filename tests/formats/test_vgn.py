@@ -69,7 +69,7 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
     path = tmp_path / "grasps.csv"
     failed = grasps.column("label") == 0
     assert FORMAT.write(grasps, path, PANDA) == (
-        "VGN and GIGA has no place for object, score.",
+        "VGN and GIGA has no place for id, object, score.",
         f"{failed.sum()} failures got the hand's opening of 0.08 m as width.",
     )
     assert FORMAT.recognises(path)
@@ -104,6 +104,7 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     grasps = GraspSet.create(X_OG, object="").with_columns(outcome=outcome)
     notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
     assert notes == (
+        "VGN and GIGA has no place for id.",
         "1 failures got the hand's opening of 0.08 m as width.",
         "2 grasps have no width; empty cells.",
     )
