@@ -12,6 +12,7 @@ import yaml
 
 from burg_drake.apps import cli
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.resources import resolve
 from burg_drake.evaluation.run_store import Run
 from burg_drake.formats.grasp_files import FORMATS
 
@@ -115,7 +116,7 @@ def test_outcomes_of_a_run(mug: str, run: Run, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.startswith(f"{run.path}: run, 3 grasps of box in the frame")
     with h5py.File("out/box.h5") as file:
         assert file["grasps/qualities/flex/object_in_gripper"][()].tolist() == [1, 0, 0]
-        assert Path(file["object/file"].asstr()[()]).is_file()
+        assert resolve(file["object/file"].asstr()[()]).is_file()
     assert convert(str(run.table_path), "r.h5") == 2
     assert "is the table of a run; give the run's folder" in capsys.readouterr().err
 

@@ -114,6 +114,7 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     assert set(back.column("scene_id").tolist()) == {"scene_7"}
     plain = GraspSet.create(X_OG, object="", width=0.05)
     assert FORMAT.write(plain, tmp_path / "b.csv", PANDA) == (
+        "VGN and GIGA has no place for id.",
         "No grasp has a label; these cells are empty.",
     )
 
