@@ -7,6 +7,8 @@ import math
 import textwrap
 from typing import Any, NoReturn
 
+from burg_drake.core.errors import quoted, shown
+
 DEFAULT_STATION = "panda_tabletop"
 # Kept in step with station.engine, which imports too much for a help text; a test compares them.
 ENGINE_NAMES = ("reference", "standard", "screening")
@@ -15,6 +17,12 @@ DEFAULT_ENGINE = "standard"
 DEFAULT_APPROACH_ANGLE = 75.0
 # Likewise those that the package installs.
 SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
+
+
+MOST = 10_000_000
+"""What is counted: grasps, trials, rows."""
+MOST_WORKERS = 1024
+LARGEST_SEED = (1 << 64) - 1
 
 
 class Parser(argparse.ArgumentParser):
@@ -141,43 +149,42 @@ def add_view(parser: Parser) -> None:
 
 
 def positive_int(text: str) -> int:
-    """A whole number from 1."""
+    """A whole number from 1 that can be counted to."""
+    return _whole(text, 1, MOST)
+
+
+def workers(text: str) -> int:
+    """A number of processes."""
+    return _whole(text, 1, MOST_WORKERS)
+
+
+def _whole(text: str, low: int, high: int) -> int:
     try:
         value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
+    except ValueError:  # also of 4,300 digits
+        value = low - 1
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not a whole number from {low} to {high}"
+        )
     return value
 
 
 def seed(text: str) -> int:
-    """A whole number from 0."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0")
-    return value
+    """A whole number from 0 with at most 64 bits, as documents have it."""
+    return _whole(text, 0, LARGEST_SEED)
 
 
 def port(text: str) -> int:
     """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if not 1024 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1024 to 65535")
-    return value
+    return _whole(text, 1024, 65535)
 
 
 def positive(text: str) -> float:
     """A finite number above 0."""
     value = number(text)
     if value <= 0.0:
-        raise argparse.ArgumentTypeError(f"{text} is not above 0")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not above 0")
     return value
 
 
@@ -185,7 +192,7 @@ def not_negative(text: str) -> float:
     """A finite number from 0."""
     value = number(text)
     if value < 0.0:
-        raise argparse.ArgumentTypeError(f"{text} is below 0")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
     return value
 
 
@@ -193,7 +200,9 @@ def approach_angle(text: str) -> float:
     """An angle from straight down in degrees, above 0 to 180."""
     value = number(text)
     if not 0.0 < value <= 180.0:
-        raise argparse.ArgumentTypeError(f"{text} is not an angle above 0, at most 180 degrees")
+        raise argparse.ArgumentTypeError(
+            f"{shown(text)} is not an angle above 0, at most 180 degrees"
+        )
     return value
 
 
@@ -204,7 +213,7 @@ def number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not a finite number")
     return value
 
 
@@ -212,7 +221,7 @@ def named_positive(text: str) -> tuple[str, float]:
     """`NAME=VALUE` with a value above 0."""
     name, equals, value = text.rpartition("=")
     if not equals or not name:
-        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as mug=0.118")
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not NAME=VALUE, such as mug=0.118")
     try:
         return name, positive(value)
     except argparse.ArgumentTypeError as error:
@@ -229,7 +238,7 @@ def coefficient(text: str) -> float:
     """A friction coefficient from 0."""
     mu = number(text)
     if mu < 0.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a friction coefficient from 0")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a friction coefficient from 0")
     return mu
 
 
@@ -237,7 +246,7 @@ def renaming(text: str) -> tuple[str, str]:
     """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
     theirs, _, ours = text.rpartition("=")
     if not ours:
-        raise argparse.ArgumentTypeError(f"{text!r} is not THEIRS=OURS, such as Mug_3f2a=mug")
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not THEIRS=OURS, such as Mug_3f2a=mug")
     return theirs, ours
 
 
@@ -245,5 +254,7 @@ def measured_mm(text: str) -> tuple[float, float]:
     """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
     values = [positive(part) for part in text.split(",")]
     if len(values) > 2:
-        raise argparse.ArgumentTypeError(f"{text!r} is not X or X,Y, such as 98.5 or 98.5,99.2")
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
+        )
     return values[0], values[-1]

@@ -8,7 +8,9 @@ Exit codes: 0 all went well; 1 finished, with failures to report; 2 the input ca
 from __future__ import annotations
 
 import argparse
+import io
 import os
+import select
 import signal
 import sys
 from collections.abc import Sequence
@@ -32,11 +34,13 @@ from burg_drake.apps import (
     station,
 )
 from burg_drake.apps.arguments import Parser, examples
-from burg_drake.core.errors import BurgError
+from burg_drake.core.errors import BurgError, shown
 
 INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
+LONGEST_WORD = 300
+"""Of a message, paths included; what is longer was not written by people."""
 
 VERBS = (
     library,
@@ -83,6 +87,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: arguments without the program's name; those of the process if None.
     """
+    if argv is None:
+        _print_any_name()
     arguments = build_parser().parse_args(argv)
     try:
         return _run(arguments)
@@ -93,20 +99,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BurgError as error:
         if os.environ.get(DEBUG_VARIABLE):
             raise
-        return _end(f"error: {' '.join(str(error).split())}", INPUT_ERROR)
+        return _end(f"error: {error}", INPUT_ERROR)
+    except MemoryError as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        return _end(f"error: there is not enough memory for this input. {error}", INPUT_ERROR)
     except ImportError as error:
         if os.environ.get(DEBUG_VARIABLE) or "cannot open shared object file" not in str(error):
             raise
         return _end(f"error: {_missing_library(error)}", INPUT_ERROR)
-    except BrokenPipeError:  # the reader of our output is gone: `burg-drake ... | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:
+        if not _reader_is_gone():
+            raise
         return 0
 
 
 def _run(arguments: argparse.Namespace) -> int:
     """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again."""
     try:
-        return int(arguments.run(arguments))
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()
+        return code
     except Exception as error:
         behind: BaseException | None = error
         while behind is not None:  # modules in C++ end an interrupted import by an ImportError
@@ -117,9 +130,36 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def _end(message: str, code: int) -> int:
+    """Says in one line of printable text how it ended."""
+    _reader_is_gone()
     sys.stdout.flush()
-    print(f"burg-drake: {message}", file=sys.stderr)
+    words = " ".join(shown(word, LONGEST_WORD) for word in message.split())
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
+    print(f"burg-drake: {line}", file=sys.stderr)
     return code
+
+
+def _reader_is_gone() -> bool:
+    """Whether nobody reads our output any more, as of `burg-drake ... | head`; it is then dropped.
+
+    What is left of it would otherwise raise an error when Python ends.
+    """
+    try:
+        output = sys.stdout.fileno()
+    except OSError:  # no file, as in tests
+        return False
+    poll = select.poll()
+    poll.register(output, 0)
+    if not any(events & (select.POLLERR | select.POLLHUP) for _, events in poll.poll(0)):
+        return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return True
+
+
+def _print_any_name() -> None:
+    """Names of files need not be text, and not every terminal knows all characters."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _missing_library(error: ImportError) -> str:

@@ -17,6 +17,7 @@ from burg_drake.apps.arguments import (
     approach_angle,
     positive_int,
     seed,
+    workers,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
@@ -80,7 +81,7 @@ def add_to(verbs: Any) -> None:
         "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
     parser.add_argument(
         "--table",

@@ -14,7 +14,7 @@ from burg_drake.apps.arguments import (
     friction,
     named_positive,
     positive,
-    positive_int,
+    workers,
 )
 from burg_drake.apps.library_build import run_add, run_build, run_import_burg, run_import_ycb
 from burg_drake.apps.library_view import run_check, run_list, run_show
@@ -221,6 +221,6 @@ def _add_effort(parser: Parser) -> None:
         "--no-confirm", action="store_true", help="do not simulate the stable poses"
     )
     parser.add_argument(
-        "--workers", type=positive_int, metavar="N", help="processes (default: one a processor)"
+        "--workers", type=workers, metavar="N", help="processes (default: one a processor)"
     )
     add_quiet(parser)

@@ -18,6 +18,7 @@ from burg_drake.apps.arguments import (
     approach_angle,
     positive_int,
     seed,
+    workers,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
@@ -104,7 +105,7 @@ def add_to(verbs: Any) -> None:
         "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
     add_quiet(parser)
 

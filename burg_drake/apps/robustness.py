@@ -7,7 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_quiet, add_verb, not_negative, positive_int, seed
+from burg_drake.apps.arguments import add_quiet, add_verb, not_negative, positive_int, seed, workers
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def add_to(verbs: Any) -> None:
         help="table, .csv or .parquet (default: robustness.csv in the run's folder)",
     )
     parser.add_argument(
-        "--workers", metavar="N", type=positive_int, help="processes (default: one a processor)"
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
     add_retry_failed(parser, "tests")
     add_quiet(parser)

@@ -10,6 +10,7 @@ import numpy as np
 
 from burg_drake.cameras.frame_source import Image
 from burg_drake.cameras.opencv_log import quiet
+from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 
@@ -35,9 +36,9 @@ def read_image(path: str | Path) -> Image:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InvalidInputError(f"cannot read image {path}: {error.strerror or error}") from error
+        data = read_bytes(path, IMAGE_SIZE)
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error).replace("read", "read image", 1)) from error
     if not data:
         raise InvalidInputError(f"image {path} is empty (0 bytes)")
     image = decode_image(data)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.opencv_log import quiet
+from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
 from burg_drake.core.errors import InvalidInputError
 
 MILLIMETRE = 1e-3
@@ -51,7 +52,7 @@ def _array(path: Path) -> NDArray:
 
 def _image(path: Path) -> NDArray:
     with quiet():
-        data = np.frombuffer(path.read_bytes(), np.uint8)
+        data = np.frombuffer(read_bytes(path, IMAGE_SIZE), np.uint8)
         depth = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if depth is None:
         raise InvalidInputError(f"{path} is not an image that can be read; give .png or .npy")

@@ -16,7 +16,8 @@ from typing import Literal
 
 from burg_drake import __version__
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
+from burg_drake.core.errors import BurgError
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document, save_document
 
@@ -179,10 +180,7 @@ def image_of_file(path: str | Path) -> CheckedImage:
         InvalidInputError: it cannot be read.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    data = read_bytes(path, IMAGE_SIZE)
     return CheckedImage(file=path.name, content=hashlib.sha256(data).hexdigest())
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.core.document_text import read_rows
 from burg_drake.core.errors import DocumentError
 from burg_drake.core.frames import Array, make_pose, quaternion_from_rotation
 from burg_drake.core.frames import rotation_from_quaternion as from_quaternion
@@ -64,13 +64,15 @@ def read_poses(path: str | Path) -> RecordedPoses:
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
+        (_, header), *lines = read_rows(path)
+        rows = [dict(zip(header, cells, strict=True)) for _, cells in lines]
         poses = [_pose(row) for row in rows]
         numbers = [(int(row["frame"]), float(row["time"])) for row in rows]
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except DocumentError:
+        raise
+    except (KeyError, ValueError) as error:
         raise DocumentError(
-            f"{path} is not the table of a recording: {type(error).__name__} {error}"
+            f"{path} is not the table of a recording; expected rows of {', '.join(COLUMNS)}"
         ) from error
     return RecordedPoses(
         np.array([frame for frame, _ in numbers], dtype=np.int64),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.board_estimate import BoardEstimate
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement_document import CheckedScene, PlacementCheck, software_versions
+from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.files import require_writable
 from burg_drake.core.frames import Array
@@ -232,7 +233,9 @@ def _write_image(path: Path, image: NDArray[np.uint8]) -> None:
 
 
 def _read_image(path: Path) -> NDArray[np.uint8]:
-    data: Any = np.frombuffer(path.read_bytes(), np.uint8) if path.is_file() else np.empty(0)
+    data: Any = (
+        np.frombuffer(read_bytes(path, IMAGE_SIZE), np.uint8) if path.is_file() else np.empty(0)
+    )
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
     if image is None:
         raise InvalidInputError(f"{path} is missing or no image; take the snapshot again")

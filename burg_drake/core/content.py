@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from burg_drake.core.files import open_regular
+
 
 def content_hash(*parts: Any) -> str:
     """SHA-256 over a sequence of parts, each with its type and length, so that parts cannot run
@@ -33,7 +35,8 @@ def rng_from(*parts: Any) -> np.random.Generator:
 
 def _update(digest: Any, part: Any) -> None:
     if isinstance(part, Path):
-        tag, data = "file", part.read_bytes()
+        with open_regular(part) as stream:
+            tag, data = "file", stream.read()
     elif isinstance(part, np.ndarray) and not part.dtype.hasobject:
         array = np.ascontiguousarray(part)
         tag, data = f"array{array.dtype.str}{array.shape}", array.tobytes()

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Reading nothing but files, and writing them whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import errno
 import os
 import re
 import secrets
+import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-from burg_drake.core.document_text import require_regular
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, shown
 
 UNFINISHED = re.compile(r"\..+\.[0-9a-f]{16}")
 """Names of what `atomic_write` has not renamed yet."""
@@ -24,11 +24,19 @@ def open_regular(path: str | Path) -> BinaryIO:
     Raises:
         InvalidInputError: it is not there, cannot be read, or is no file.
     """
-    require_regular(path)
     try:
-        return open(path, "rb")
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+        mode = os.stat(path).st_mode
+        if stat.S_ISREG(mode):
+            return open(path, "rb", opener=_open_at_once)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is no path"  # with NUL
+        raise InvalidInputError(f"cannot read {shown(str(path), 500)}: {why}") from error
+    kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+    raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # should it have become a pipe meanwhile
 
 
 def atomic_write(path: str | Path, content: str | bytes) -> None:

@@ -61,8 +61,11 @@ def parse_json(text: str, name: str, limits: Limits = DOCUMENT) -> Any:
 
 def _check_extent(text: str, name: str, limits: Limits) -> None:
     """Counts values and levels before anything is built."""
-    if sum(map(text.count, ",[{")) > limits.values:
+    opened = text.count("[") + text.count("{")
+    if opened + text.count(",") > limits.values:
         raise DocumentError(f"{name}: more than {limits.values:,} values")
+    if opened <= limits.depth:
+        return
     structure = np.frombuffer(_STRING.sub(b"", text.encode()), dtype=np.uint8)
     steps = _STEPS[structure]
     depth = np.cumsum(steps[steps != 0], dtype=np.int64)

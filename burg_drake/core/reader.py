@@ -21,8 +21,10 @@ from burg_drake.core.errors import (
     shown,
 )
 
-LARGEST = 1 << 64
-"""Above all whole numbers that a document may have; seeds may have 64 bits."""
+LARGEST = 1e30
+"""Above all numbers that a document has a use for, in any unit."""
+LARGEST_WHOLE = 1 << 64
+"""The same of whole numbers; seeds may have 64 bits."""
 
 
 class Reader:
@@ -163,12 +165,13 @@ class Reader:
         if kind is bool and node.value.lower() in ("true", "false"):
             return node.value.lower() == "true"
         try:
-            if kind is not bool:
-                value = kind(node.value)
-                if math.isfinite(value) and (kind is float or abs(value) < LARGEST):
-                    return value
-        except (ValueError, OverflowError):
-            pass
+            value = math.nan if kind is bool else kind(node.value)
+        except ValueError:  # also of whole numbers of 4,300 digits
+            value = math.nan
+        if abs(value) < (LARGEST_WHOLE if kind is int else LARGEST):
+            return value
+        if abs(value) < math.inf:
+            raise self.fail(node, where, f"{quoted(node.value)} is too large a number")
         raise self.fail(node, where, f"{quoted(node.value)} is not {expected[kind]}")
 
 

@@ -10,16 +10,20 @@ import fcntl
 import json
 import math
 import os
+import stat
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, quoted
+from burg_drake.core.files import open_regular
 from burg_drake.core.json_text import parse_json
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.judge import Verdict
 
 JOURNAL_FILE = "journal.jsonl"
+LONGEST_LINE = 1 << 20
+"""Bytes; what is longer was not written by `encode`, whose lines have some hundred."""
 
 
 class Journal:
@@ -44,6 +48,9 @@ class Journal:
                 f"{path.parent} is being written by another process; wait for it,"
                 " or choose another folder"
             ) from error
+        if not stat.S_ISREG(os.fstat(self._file).st_mode):
+            os.close(self._file)
+            raise InvalidInputError(f"cannot write {path}: it is no file; choose another folder")
         content = path.read_bytes()
         whole = content.rfind(b"\n") + 1
         if whole != len(content):  # otherwise the file keeps its date: table and report are newer
@@ -83,15 +90,20 @@ class Journal:
 
 
 def read_journal(path: Path) -> dict[str, Verdict]:
-    """The last verdict about each grasp by id; lines that cannot be read count as not judged."""
+    """The last verdict about each grasp by id; lines that cannot be read count as not judged.
+
+    Raises:
+        InvalidInputError: it is a folder, for example.
+    """
     verdicts: dict[str, Verdict] = {}
     if path.exists():
-        for line in path.read_bytes().splitlines():
-            try:
-                id, verdict = decode(line)
-            except (ValueError, KeyError, TypeError, AttributeError):
-                continue
-            verdicts[id] = verdict
+        with open_regular(path) as stream:
+            for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
+                try:
+                    id, verdict = decode(line)
+                except (ValueError, KeyError, TypeError, AttributeError):
+                    continue
+                verdicts[id] = verdict
     return verdicts
 
 
@@ -126,21 +138,33 @@ def decode(line: bytes) -> tuple[str, Verdict]:
     return str(record["id"]), Verdict(
         outcome=Outcome(record["outcome"]),
         stage=Stage(record["stage"]),
-        blocker=record["blocker"],
-        reason=record["reason"],
+        blocker=_text(record["blocker"]),
+        reason=_text(record["reason"]),
         margins=_numbers(record["margins"]),
         displacements=_numbers(record.get("displacements", {})),  # older journals have none
         pushed=_numbers(record.get("pushed", {})),
-        touched=record.get("touched", ""),
-        q_grasp=tuple(record["q_grasp"]),
-        q_pregrasp=tuple(record["q_pregrasp"]),
-        cpu={Stage(stage): seconds for stage, seconds in record["cpu"].items()},
+        touched=_text(record.get("touched", "")),
+        q_grasp=tuple(map(_number, record["q_grasp"])),
+        q_pregrasp=tuple(map(_number, record["q_pregrasp"])),
+        cpu={Stage(stage): _number(seconds) for stage, seconds in record["cpu"].items()},
         interrupted=record.get("interrupted", False) is True,
     )
 
 
 def _numbers(values: dict[str, float | None]) -> dict[str, float]:
-    return {name: math.nan if value is None else value for name, value in values.items()}
+    return {name: math.nan if value is None else _number(value) for name, value in values.items()}
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError(f"{quoted(value)} is no number")
+    return float(value)
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{quoted(value)} is no text")
+    return value
 
 
 def _finite(value: float) -> float | None:

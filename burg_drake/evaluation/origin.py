@@ -63,15 +63,18 @@ class Origin:
     seed: int = 0
     run: str = ""
 
-    def settings(self) -> TrialSettings:
+    def settings(self, where: str = "trial settings") -> TrialSettings:
         """The trial's settings; those that were not recorded have their defaults.
+
+        Args:
+            where: names them in messages.
 
         Raises:
             InvalidInputError: one of them is unknown or cannot be used.
         """
         from burg_drake.simulation.trial_settings import TrialSettings
 
-        return _typed(self.trial, TrialSettings, "trial settings")
+        return _typed(self.trial, TrialSettings, where)
 
     def cells(self) -> dict[str, str]:
         """The texts `ORIGIN_TEXT` by column."""
@@ -99,7 +102,7 @@ def read_origin(row: Mapping[str, Any], where: str) -> Origin:
         InvalidInputError: a cell cannot be read, or tells a setting that this release lacks.
     """
     trial = _pairs(row["trial_settings"], where)
-    return Origin(
+    origin = Origin(
         scene=row["scene"],
         scene_content=row["scene_content"],
         station=row["station"],
@@ -111,6 +114,8 @@ def read_origin(row: Mapping[str, Any], where: str) -> Origin:
         seed=row.get("seed", 0),
         run=row.get("run", ""),
     )
+    origin.settings(f"{where}, trial_settings")
+    return origin
 
 
 def engine_label(engine: Engine) -> str:

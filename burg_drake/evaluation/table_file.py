@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.columns import describe
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.core.files import atomic_write, atomic_write_all
+from burg_drake.core.document_text import read_rows
+from burg_drake.core.errors import InvalidInputError, MissingDependencyError, quoted
+from burg_drake.core.files import atomic_write, atomic_write_all, open_regular
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
 from burg_drake.evaluation.trial import MOVED, PUSHED
@@ -116,17 +117,16 @@ def read_table(path: Path) -> Columns:
     try:
         if path.suffix == ".parquet":
             _, parquet = _pyarrow()
-            with path.open("rb") as binary:
+            with open_regular(path) as binary:
                 table = parquet.read_table(binary)
             cells = {name: table.column(name).to_pylist() for name in table.column_names}
         else:
-            with path.open(newline="", encoding="utf-8-sig") as file:
-                cells = _csv_cells([row for row in csv.reader(file) if row])
+            cells = _csv_cells([row for _, row in read_rows(path)])
         return {name: _typed(name, values) for name, values in cells.items()}
     except OSError as error:
         raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InvalidInputError(f"{path} is not a results table (it is not a text file)") from error
+    except InvalidInputError:
+        raise
     except ValueError as error:
         raise InvalidInputError(f"{path} is not a results table ({error})") from error
 
@@ -136,9 +136,10 @@ def is_table(path: Path) -> bool:
     if path.suffix == ".parquet":
         return path.is_file()
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return {"id", "outcome", "X_OG"} <= set(next(csv.reader([file.readline(HEAD)]), []))
-    except (OSError, UnicodeDecodeError, csv.Error):
+        with open_regular(path) as file:
+            line = file.readline(HEAD).decode("utf-8-sig")
+        return {"id", "outcome", "X_OG"} <= set(next(csv.reader([line]), []))
+    except (InvalidInputError, UnicodeDecodeError, csv.Error):
         return False
 
 
@@ -232,4 +233,4 @@ def _read(kind: type[T], name: str, row: int, text: str, expected: str) -> T:
     try:
         return kind(text)
     except ValueError as error:
-        raise ValueError(f"row {row}: {name} is {text!r}; it has to be {expected}") from error
+        raise ValueError(f"row {row}: {name} is {quoted(text)}; it has to be {expected}") from error

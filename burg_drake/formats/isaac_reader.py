@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.errors import DocumentError, listing
+from burg_drake.core.errors import DocumentError, listing, quoted
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_from_quaternion
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
 from burg_drake.core.yaml_texts import load_texts
@@ -204,7 +204,7 @@ def _numbers(
         values = np.array(list(given.values()) or np.empty(expected), dtype=float)
         if values.shape == expected and np.isfinite(values).all():
             return values
-    except ValueError:
+    except (TypeError, ValueError):
         pass
     for name, value in given.items():
         where = f"grasps.{name}.{key}" if key else name
@@ -231,5 +231,5 @@ def _number(path: Path, where: str, text: Any) -> float:
 def _fail(path: Path, where: str, given: Any, expected: str) -> DocumentError:
     if given is None:
         return DocumentError(f"{path}: {where}: missing; expected {expected}")
-    shown = repr(given) if isinstance(given, str) else f"a {type(given).__name__}"
+    shown = quoted(given) if isinstance(given, str) else f"a {type(given).__name__}"
     return DocumentError(f"{path}: {where}: {shown} instead of {expected}")

@@ -28,8 +28,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.document_text import read_rows
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write
+from burg_drake.core.files import atomic_write, open_regular
 from burg_drake.core.frames import (
     Array,
     inverse,
@@ -63,9 +64,9 @@ def _X_GF(gripper: Gripper) -> Array:
 
 def _recognises(path: Path) -> bool:
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            header = next(csv.reader([stream.readline(HEAD)]), [])
-    except (OSError, UnicodeDecodeError, csv.Error):
+        with open_regular(path) as stream:
+            header = next(csv.reader([stream.readline(HEAD).decode("utf-8-sig")]), [])
+    except (InvalidInputError, UnicodeDecodeError, csv.Error):
         return False
     names = {name.strip() for name in header}
     return set(NEEDED) <= names and RESULTS_POSE not in names
@@ -119,14 +120,7 @@ def _of_contacts(width: Array, label: NDArray[Any] | None) -> tuple[Array, tuple
 
 def _cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     """The texts of a CSV file by column, and the lines that they end on."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            numbered = [(reader.line_num, row) for row in reader if row]
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InvalidInputError(f"{path} is not a CSV file: {error}") from error
+    numbered = read_rows(path)
     if not numbered:
         raise InvalidInputError(f"{path} is empty; grasps of VGN have {','.join(COLUMNS)}")
     (first, names), *rows = numbered

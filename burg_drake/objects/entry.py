@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
+from burg_drake.core.ranges import require_ranges
 from burg_drake.core.schema import Pose, Vector3
 
 DEFAULT_FRICTION = 0.24
@@ -107,10 +108,7 @@ class Decomposition:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, allowed in DECOMPOSITION_RANGES.items():
-            value, (low, high) = getattr(self, name), allowed
-            if not low <= value <= high:
-                raise InvalidInputError(f"{name} is {value:g}; it must be {low:g} to {high:g}")
+        require_ranges(self, DECOMPOSITION_RANGES)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,9 @@ from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.markers import MarkerLayout, Markers, marker_layout
 
+LARGEST = 100.0
+"""Side of a board [m]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Instance:
@@ -48,8 +51,10 @@ class Board:
     markers: Markers = Markers()
 
     def __post_init__(self) -> None:
-        if min(self.size) <= 0.0:
-            raise InvalidInputError(f"board size {list(self.size)} must be positive [m]")
+        if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
+            raise InvalidInputError(
+                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m"
+            )
 
     @cached_property
     def layout(self) -> MarkerLayout:

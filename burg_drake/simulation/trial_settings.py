@@ -2,10 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.ranges import require_ranges
+
+LONGEST = 30.0
+"""Of a phase [s]: 60 times what the phases take by default."""
+
+RANGES = {
+    "lift_height": (1e-3, 10.0),
+    "lift_time": (1e-2, LONGEST),
+    "hold_time": (0.0, LONGEST),
+    "creep_speed": (0.0, 10.0),
+    "creep_distance": (0.0, 10.0),
+    "steady_time": (0.0, LONGEST),
+    "poll": (1e-4, 1.0),
+    "settled_speed": (0.0, 10.0),
+    "settled_time": (0.0, LONGEST),
+    "close_timeout": (0.0, LONGEST),
+    "disturbance": (0.0, 10.0),
+}
+"""Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +59,7 @@ class TrialSettings:
     disturbance: float = 0.01
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if name in ("lift_height", "lift_time", "poll") and not 0.0 < value < math.inf:
-                raise InvalidInputError(f"{name} of a trial is {value:g}; give more than 0")
-            if not 0.0 <= value < math.inf:
-                raise InvalidInputError(f"{name} of a trial is {value:g}; give 0 or more")
+        require_ranges(self, RANGES, "a trial")
 
     @property
     def steady_polls(self) -> int:

@@ -14,6 +14,9 @@ from burg_drake.core.names import require_name
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document
 
+LONGEST_CLOSING = 60.0
+"""Time in which an open hand has to close [s]; the slowest on sale take half of it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Finger:
@@ -76,6 +79,13 @@ class Hand:
         for name, unit in (("force", "N"), ("closing_speed", "m/s")):
             if not (value := getattr(self, name)) > 0.0:
                 raise FieldError(f"{name} is {value:g} {unit}; it has to be above 0", name)
+        if self.closing_time > LONGEST_CLOSING:
+            raise FieldError(
+                f"closing_speed is {self.closing_speed:g} m/s, with which the open hand takes"
+                f" {self.closing_time:.3g} s to close; at most {LONGEST_CLOSING:g} s can be"
+                " simulated",
+                "closing_speed",
+            )
         for i, finger in enumerate(self.fingers):
             if finger.closed == finger.open:
                 raise FieldError(

@@ -16,6 +16,8 @@ from xml.sax.saxutils import escape
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
+from burg_drake.core.document_text import DOCUMENT, read_bytes
+
 PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
 """A file that is named by its path, from the folder of the model on if it is not absolute."""
 
@@ -24,11 +26,12 @@ def add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     """As `parser.AddModels(path)`, sooner.
 
     Raises:
+        InvalidInputError: it cannot be read, or is too large.
         RuntimeError, ValueError: those of `AddModels`.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
+        text = read_bytes(path, DOCUMENT.size).decode()
+    except UnicodeDecodeError:
         text = ""
     if path.suffix != ".sdf" or not text or "<include" in text:
         return list(parser.AddModels(str(path)))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
+from burg_drake.core.document_text import DOCUMENT, read_bytes
 from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.names import require_name, require_names
 from burg_drake.core.resources import resolve
@@ -20,6 +21,10 @@ FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)[
 HALF_PIXEL = 0.5
 """From OpenCV's image coordinates, with pixel centres at integers, to those of Drake's cameras,
 which have pixel edges there [pixels]."""
+SLOWEST = 1e-3
+"""Least limit of a joint [rad/s, rad/s^2, rad/s^3]; a motion with slower ones takes hours."""
+MAX_SIDE = 16_384
+"""Of a camera's image [pixels]."""
 MAX_SAMPLES = 8
 """Of a camera; 64 rays a pixel bring nothing more, and take seconds an image."""
 
@@ -51,8 +56,8 @@ class Arm:
 
     def __post_init__(self) -> None:
         for name in ("velocity", "acceleration", "jerk"):
-            if min(getattr(self, name) or (1.0,)) <= 0.0:
-                raise FieldError(f"arm {name} limits must be above 0", name)
+            if min(getattr(self, name) or (1.0,)) < SLOWEST:
+                raise FieldError(f"arm {name} limits must be {SLOWEST:g} or more", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +103,11 @@ class Camera:
     def __post_init__(self) -> None:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("camera width, height and focal must be positive")
+        if max(self.width, self.height) > MAX_SIDE:
+            raise FieldError(
+                f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",
+                "width" if self.width > MAX_SIDE else "height",
+            )
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
         if not 1 <= self.samples <= MAX_SAMPLES:
@@ -220,7 +230,7 @@ class Station:
 
 def _named_files(model: Path) -> list[Path]:
     """The files that an SDF or URDF file names, as far as they are beside it or installed."""
-    text = model.read_text(encoding="utf-8", errors="replace")
+    text = read_bytes(model, DOCUMENT.size).decode(errors="replace")
     named = dict.fromkeys(uri or name for uri, name in FILE_REFERENCE.findall(text))
     files = []
     for reference in named:

@@ -139,6 +139,14 @@ def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
         (InvalidInputError("two\nlines"), 2, "burg-drake: error: two lines"),
         (UnknownNameError("no 'x' here"), 2, "burg-drake: error: no 'x' here"),
         (KeyboardInterrupt(), 130, "burg-drake: interrupted"),
+        (InvalidInputError("a\x1b[2Jb\0 \udcff"), 2, r"burg-drake: error: a\x1b[2Jb\x00 \udcff"),
+        (InvalidInputError("9" * 5000), 2, f"burg-drake: error: {'9' * 297}..."),
+        (
+            MemoryError("Unable to allocate 9 TiB"),
+            2,
+            "burg-drake: error: there is not enough memory for this input. Unable to allocate 9"
+            " TiB",
+        ),
     ],
 )
 def test_how_it_ends(
@@ -185,9 +193,10 @@ def test_debug_shows_where_an_error_came_from(monkeypatch: pytest.MonkeyPatch) -
         run_with(monkeypatch, InvalidInputError("x"))
 
 
-def test_bugs_are_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ZeroDivisionError):
-        run_with(monkeypatch, ZeroDivisionError())
+@pytest.mark.parametrize("bug", [ZeroDivisionError, RecursionError, BrokenPipeError])
+def test_bugs_are_not_hidden(monkeypatch: pytest.MonkeyPatch, bug: type[Exception]) -> None:
+    with pytest.raises(bug):
+        run_with(monkeypatch, bug())
 
 
 def test_a_missing_system_library_is_one_line(
@@ -209,7 +218,17 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
         capture_output=True,
         text=True,
     )
-    assert "Traceback" not in done.stderr
+    assert done.stderr == ""
+
+
+def test_names_that_are_no_text_are_printed() -> None:
+    code = (
+        "import sys\nfrom burg_drake.apps import cli, report\n"
+        "report.run_report = lambda _: print('\\udcff') or 0\nsys.argv[1:] = ['report', 'x']\n"
+        "sys.exit(cli.main())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "\\udcff\n", "")
 
 
 def test_defaults_are_those_of_the_library() -> None:

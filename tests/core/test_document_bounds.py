@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.document_text import DOCUMENT, read_bytes, read_text
+from burg_drake.core.document_text import DOCUMENT, read_bytes, read_rows, read_text
 from burg_drake.core.errors import DocumentError, quoted
 from burg_drake.core.json_text import parse_json
 from burg_drake.core.yaml_nodes import parse_nodes
@@ -99,7 +99,24 @@ def test_only_regular_files_of_some_size_are_read(tmp_path: Path) -> None:
         with pytest.raises(DocumentError, match=f"^cannot read .*: {said}"):
             read_text(place)
     (tmp_path / "link").symlink_to(tmp_path / "binary")
-    assert read_bytes(tmp_path / "link") == b"\xff\xfe"
+    assert read_bytes(tmp_path / "link", 2) == b"\xff\xfe"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a,b\n1," + "x" * 140_000, "t.csv:2: not valid CSV: field larger than field limit"),
+        ('a,b\n1,"2\n3,4\n', "t.csv:3: not valid CSV: unexpected end of data"),
+        ('a,b\n1,"2"3\n', "t.csv:2: not valid CSV"),
+    ],
+)
+def test_csv_that_is_none(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    with pytest.raises(DocumentError, match=said):
+        read_rows(path)
+    path.write_text('\ufeffa,b\n\n1,"x\ny"\n')
+    assert read_rows(path) == [(1, ["a", "b"]), (4, ["1", "x\ny"])]
 
 
 def test_messages_repeat_little_of_what_is_given() -> None:

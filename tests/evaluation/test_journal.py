@@ -77,6 +77,18 @@ def test_a_damaged_line_counts_as_not_judged(tmp_path) -> None:
     path = tmp_path / "journal.jsonl"
     path.write_bytes(encode("a", LIFTED) + b'{"id": "b"}\n\x00\xff\n[]\n' + encode("c", BLOCKED))
     assert list(read_journal(path)) == ["a", "c"]
+    good = encode("b", LIFTED)
+    damaged = [
+        good.replace(b'"tilt":1e-300', b'"tilt":"steep"'),
+        good.replace(b'"cpu":{"clear":0.0002', b'"cpu":{"clear":null'),
+        good.replace(b'"q_pregrasp":[1.0', b'"q_pregrasp":[[]'),
+        good.replace(b'"blocker":""', b'"blocker":["mug"]'),
+        good.replace(b"0.25", b"[" * 100_000),
+        good.replace(b"0.25", b"9" * 5000),
+    ]
+    assert good not in damaged
+    path.write_bytes(b"".join(damaged))
+    assert read_journal(path) == {}
 
 
 def test_two_cannot_write_at_once(tmp_path) -> None:
@@ -89,6 +101,8 @@ def test_no_journal_means_nothing_judged(tmp_path) -> None:
     assert read_journal(tmp_path / "none") == {}
     with pytest.raises(InvalidInputError, match=r"cannot write .*: Is a directory"):
         Journal(tmp_path)
+    with pytest.raises(InvalidInputError, match=r"cannot read .*: it is a folder"):
+        read_journal(tmp_path)
 
 
 def test_a_full_disk_is_said_in_one_line() -> None:

@@ -70,7 +70,7 @@ def test_an_engine_that_only_shares_the_name_of_a_preset_is_marked() -> None:
         ("engine_settings", "time_step=0.002 warp=9", "here.*'warp' is no setting of this release"),
         ("engine_settings", "time_step=fast", "here, engine_settings: time_step: 'fast' is not a"),
         ("engine_settings", "time_step=0.002 contact_model=soft", "'soft' is not valid"),
-        ("engine_settings", "time_step=0.5", "give 0 to 0.02 s"),
+        ("engine_settings", "time_step=0.5", "it must be 0.0001 to 0.02"),
         ("engine_settings", "", "key 'time_step' is missing"),
         ("trial_settings", "lift_height", "'lift_height' is not name=value"),
         (

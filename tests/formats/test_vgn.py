@@ -181,7 +181,7 @@ def test_other_files(tmp_path: Path) -> None:
     (tmp_path / "binary.csv").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     for name, message in {
         "empty.csv": "is empty",
-        "binary.csv": "is not a CSV file",
+        "binary.csv": "is not a text file",
         "missing.csv": "cannot read",
     }.items():
         assert not FORMAT.recognises(tmp_path / name)

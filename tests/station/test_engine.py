@@ -26,5 +26,5 @@ def test_unknown_preset() -> None:
 
 @pytest.mark.parametrize("step", [0.0, -0.001, 0.05, float("nan")])
 def test_bad_step(step: float) -> None:
-    with pytest.raises(InvalidInputError, match=r"engine 'mine': time_step .* give 0 to 0.02 s"):
+    with pytest.raises(InvalidInputError, match=r"time_step of engine 'mine' is .* 0.0001 to 0.02"):
         Engine(name="mine", time_step=step)
