@@ -133,7 +133,7 @@ def _execute(source: Source, meshcat: Any) -> tuple[Verdict, TrialResult, str]:
 def _from_run(path: Path, arguments: argparse.Namespace) -> Source:
     from burg_drake.evaluation.inputs import Inputs, find_inputs
     from burg_drake.evaluation.run_document import origin_of
-    from burg_drake.evaluation.run_store import load_run
+    from burg_drake.evaluation.run_store import RUN_FILE, load_run
 
     run = load_run(path)
     if arguments.grasp is not None:
@@ -141,6 +141,7 @@ def _from_run(path: Path, arguments: argparse.Namespace) -> Source:
     else:
         id = str(run.results["id"][_choose(run.results, path, arguments)])
     trial, origin = run.trial(id), origin_of(run.document)
+    origin.settings(f"{path / RUN_FILE}: trial")
     if arguments.scene is None and arguments.station is None and not arguments.force:
         return Source(trial, origin, Inputs(run.scene(), run.station()))
     options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from burg_drake.core.errors import InvalidInputError, nearest
+from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.reader import Reader
 from burg_drake.core.yaml_nodes import parse_nodes
 from burg_drake.evaluation.mode import MODES, Mode
@@ -134,7 +134,7 @@ def _mode(text: str, where: str) -> Mode:
         if mode == text:
             return mode
     raise InvalidInputError(
-        f"{where}: mode {text!r} is not known to this release; {nearest(text, MODES)}"
+        f"{where}: mode {quoted(text)} is not known to this release; {nearest(text, MODES)}"
     )
 
 
@@ -167,7 +167,7 @@ def _number(name: str, text: str, where: str) -> float:
         return float(text)
     except ValueError as error:
         raise InvalidInputError(
-            f"{where}: trial_settings: {name} is {text!r}; it has to be a number"
+            f"{where}: trial_settings: {name} is {quoted(text)}; it has to be a number"
         ) from error
 
 

@@ -30,7 +30,7 @@ from burg_drake.evaluation.probes import (
 )
 from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_columns
 from burg_drake.evaluation.run_document import origin_of, software_versions
-from burg_drake.evaluation.run_store import JOURNAL_FILE, Run, load_run
+from burg_drake.evaluation.run_store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.table_file import require_writer, write_table
 
 TABLE_FILE = "robustness.csv"
@@ -99,7 +99,7 @@ def assess_robustness(
         run.scene(),
         run.station(),
         run.document.engine,
-        origin_of(run.document).settings(),
+        origin_of(run.document).settings(f"{run.path / RUN_FILE}: trial"),
         settings,
     )
     versions = software_versions()

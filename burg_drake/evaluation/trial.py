@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError, nearest
+from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.frames import Array, check_pose
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
@@ -78,7 +78,9 @@ def pose_from_text(text: str, where: str) -> Array:
         try:
             numbers.append(float(word))
         except ValueError as error:
-            raise InvalidInputError(f"{where}: X_OG has {word!r} in it; {expected}") from error
+            raise InvalidInputError(
+                f"{where}: X_OG has {quoted(word)} in it; {expected}"
+            ) from error
     if len(words) != 12:
         raise InvalidInputError(f"{where}: X_OG has {len(words)} numbers; {expected}")
     upper = np.array(numbers).reshape(3, 4)
@@ -135,7 +137,7 @@ def _member(kind: type[Name], text: str, where: str) -> Name:
     known = [member.value for member in kind]
     if text not in known:
         raise InvalidInputError(
-            f"{where} {text!r} is not known to this release; {nearest(text, known)}"
+            f"{where} {quoted(text)} is not known to this release; {nearest(text, known)}"
         )
     return kind(text)
 

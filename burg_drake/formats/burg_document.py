@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from burg_drake.core.errors import nearest
+from burg_drake.core.errors import nearest, quoted
 from burg_drake.core.reader import Reader
 
 Row = tuple[float, float, float, float]
@@ -94,7 +94,7 @@ class BurgReader(Reader):
             if given != expected:
                 hint = f"; {hints[given]}" if given in hints else ""
                 raise self.fail(
-                    value, key, f"{given!r} cannot be read; expected {expected!r}{hint}"
+                    value, key, f"{quoted(given)} cannot be read; expected {expected!r}{hint}"
                 )
 
 

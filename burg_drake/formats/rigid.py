@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from burg_drake.core.damaged import reason
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
 
@@ -33,7 +34,8 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     try:
         poses = np.asarray(X, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{where} does not hold (N, 4, 4) numbers: {error}") from error
+        what = f"does not hold (N, 4, 4) numbers: {reason(error)}"
+        raise InvalidInputError(f"{where} {what}") from error
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise InvalidInputError(f"{where} has shape {poses.shape}; expected (N, 4, 4)")
     _refuse(~np.isfinite(poses).all(axis=(1, 2)), where, "has NaN or infinite numbers")

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.document_text import read_rows
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, quoted
 from burg_drake.core.files import atomic_write, open_regular
 from burg_drake.core.frames import (
     Array,
@@ -145,7 +145,7 @@ def _numbers(path: Path, name: str, texts: Sequence[str], lines: Sequence[int]) 
             values[i] = float(text) if text or name != "width" else np.nan
         except ValueError as error:
             where = f"{path}:{lines[i]}: {name}"
-            raise InvalidInputError(f"{where} is {text!r}, not a number") from error
+            raise InvalidInputError(f"{where} is {quoted(text)}, not a number") from error
     bad = np.isinf(values) | (np.isnan(values) & (name != "width"))
     if bad.any():
         i = int(np.argmax(bad))

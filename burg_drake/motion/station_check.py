@@ -69,7 +69,7 @@ class StationReport:
 
 def empty_scene(board: Board | None = None) -> Scene:
     """A scene with a board, A2 if none is given, and nothing on it."""
-    document = SceneDocument(name="empty board", library="household", board=board or Board())
+    document = SceneDocument(name="empty_board", library="household", board=board or Board())
     return Scene(document, load_library("household"), data_root() / "scenes")
 
 

@@ -56,6 +56,9 @@ class Cutting:
     timeout: float | None = None
     seed: int | None = None
 
+    def __post_init__(self) -> None:
+        self.parameters()  # checks the ranges
+
     def parameters(self) -> Decomposition:
         """With the pipeline's values where there are none."""
         return Decomposition(**_given(self))

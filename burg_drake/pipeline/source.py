@@ -10,7 +10,7 @@ from typing import Any, Literal
 import trimesh
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, quoted
 from burg_drake.core.schema import Vector3
 from burg_drake.objects.entry import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
 from burg_drake.objects.obj_file import Rgba
@@ -90,7 +90,9 @@ def object_name(text: str) -> str:
     """
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     if not name:
-        raise InvalidInputError(f"{text!r} makes no object name; use letters or digits a-z, 0-9")
+        raise InvalidInputError(
+            f"{quoted(text)} makes no object name; use letters or digits a-z, 0-9"
+        )
     return name
 
 

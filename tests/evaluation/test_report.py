@@ -97,8 +97,8 @@ def test_failures_are_listed_and_escaped(
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     name = "<script>alert(1)</script> & co"
-    named = dataclasses.replace(scene, document=dataclasses.replace(scene.document, name=name))
-    failed = evaluate(named, station, tmp_path / "f", grasps_per_object=30, progress=False)
+    moved = dataclasses.replace(scene, path=tmp_path / f"{name}.yaml")
+    failed = evaluate(moved, station, tmp_path / "f", grasps_per_object=30, progress=False)
     text = " ".join(check(failed.report_path.read_text()).text)
     assert name in text
     assert "RuntimeError: the solver did not converge" in text

@@ -48,7 +48,7 @@ def test_what_collides_at_home_is_named() -> None:
     with pytest.raises(InvalidInputError) as error:
         require_free_home(diagram, ArmCollision(diagram))
     text = str(error.value)
-    assert text.startswith(f"{diagram.station.path}: arm.home collides in scene 'empty board': ")
+    assert text.startswith(f"{diagram.station.path}: arm.home collides in scene 'empty_board': ")
     assert "panda_hand with crate" in text
     assert text.endswith("; change the posture or move what is in the way")
 
