@@ -2,8 +2,8 @@
 
 `station` renders those of stations and the built-in objects by Drake, `board` what a camera over
 the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
-of grasps by a column, of frames and of a reachability map from the pages that the commands write
-with --html, by a Chromium that runs without a display. The others of Meshcat and of the report are
+of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
+pages that the commands write with --html, by a Chromium that runs without a display. The others are
 screenshots by hand.
 """
 
@@ -29,6 +29,7 @@ from burg_drake.cameras.overlay import Overlay
 from burg_drake.cameras.placement import check_placement
 from burg_drake.core.frames import rot_z
 from burg_drake.core.schema import Pose
+from burg_drake.evaluation.run_store import load_run
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.station.station import Camera, Station
 
@@ -112,11 +113,18 @@ def photograph(page: Path, file: str, size: tuple[int, int]) -> None:
 
 
 def pages() -> None:
-    """Writes the pictures of grasps by a column and of frames."""
+    """Writes the pictures of grasps, of a replay, of frames and of a reachability map."""
     with tempfile.TemporaryDirectory() as folder:
         grasps, page = f"{folder}/grasps.h5", Path(folder) / "page.html"
+        burg_drake(f"grasps sample tabletop_six -n 30 --clear --diverse 8 -o {grasps}".split())
+        run = f"{folder}/run"
+        burg_drake(f"evaluate tabletop_six --grasps {grasps} --quiet -o {run}".split())
+        best = load_run(run).best()[0]
+        burg_drake(f"grasps show {run} --most 30 --select {best} --html {page}".split())
+        photograph(page, "grasps.png", (1200, 760))
+        burg_drake(f"replay {run} --best --html {page}".split())
+        photograph(page, "replay.png", (1000, 700))
         for command in (
-            f"grasps sample tabletop_six -n 30 --clear --diverse 8 -o {grasps}",
             f"grasps score {grasps} --friction 0.6 -o {grasps}",
             f"grasps show {grasps} --color epsilon --html {page}",
         ):

@@ -89,7 +89,8 @@ class ColorBar:
         for place, text in self.ticks:
             at = f"{MARGIN + place * BAR_WIDTH:.1f}"
             shapes.append(element("line", x1=at, x2=at, y1=foot, y2=foot + 4))
-            shapes.append(element("text", text, x=at, y=foot + 15))
+            anchor = {0.0: "text-anchor: start", 1.0: "text-anchor: end"}.get(place)
+            shapes.append(element("text", text, x=at, y=foot + 15, style=anchor))
         size = f"0 0 {BAR_WIDTH + 2 * MARGIN} {foot + 19}"
         return element(
             "svg", *shapes, viewBox=size, width=BAR_WIDTH + 2 * MARGIN, shape_rendering="crispEdges"

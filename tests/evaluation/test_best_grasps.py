@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,11 @@ def test_by_score_with_unknown_ones_last() -> None:
     assert best_of_each(HOLDER, ALL, ranking, None) == [2, 5, 0, 3, 4, 1]
     assert best_of_each(HOLDER, ALL, ranking, 1) == [2, 4]
     assert best_of_each(HOLDER, np.arange(6) != 2, ranking, 1) == [5, 4]
+
+
+def test_what_the_score_is_made_of() -> None:
+    scored = replace(grasps([1.0] * 6), provenance={"quality": {"by": "load_margin"}})
+    assert ranked_set(scored).by == "score (load_margin)"
 
 
 def test_evenly_without_scores() -> None:
