@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from burg_drake.scene.scene import Scene
 
 SIMULATED = "sim:"
+IDLE_AFTER = 3.0
+"""The camera is not looked at when no browser has asked for a picture for so long [s]."""
 RULER_MM = 100.0
 """Length of the rulers on printouts."""
 
@@ -150,7 +152,7 @@ def run_ar(arguments: argparse.Namespace) -> int:
 def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions) -> int:
     from burg_drake.apps.ar_script import finish, verdict
 
-    scripted = arguments.no_browser or arguments.frames or arguments.seconds
+    scripted = _is_scripted(arguments)
     interrupted = False
     with contextlib.ExitStack() as closing:
         closing.callback(actions.stop_recording)
@@ -173,6 +175,11 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
     if interrupted and (arguments.frames or arguments.seconds):
         raise KeyboardInterrupt
     return verdict(live) if scripted else 0
+
+
+def _is_scripted(arguments: argparse.Namespace) -> bool:
+    """Frames are counted or timed, or looked at without a page."""
+    return bool(arguments.no_browser or arguments.frames or arguments.seconds)
 
 
 def _serve(
@@ -217,12 +224,14 @@ def _session(
         settings = replace(settings, opacity=arguments.opacity)
     x_mm, y_mm = arguments.measured_mm
     print_scale = (x_mm / RULER_MM, y_mm / RULER_MM)
+    always = _is_scripted(arguments) or arguments.check or arguments.snapshot
     live = LiveSession(
         Session(scene, intrinsics, print_scale=print_scale, style=style),
         source,
         events=EventLog(_print_event),
         settings=settings,
         paced=not arguments.no_browser,
+        idle_after=math.inf if always else IDLE_AFTER,
     )
     return live, ViewActions(live, arguments.output, plain=arguments.plain)
 

@@ -27,6 +27,7 @@ class FrameReader:
         paced: play files as fast as they were taken, not as fast as frames are asked for.
         on_change: called, in the reader's thread, when a frame has come or the state has changed.
         events: are told when the camera is lost, is back, or a frame cannot be read.
+        wanted: whether anybody wants frames; as long as nobody does, none is read, until `wake`.
     """
 
     def __init__(
@@ -36,6 +37,7 @@ class FrameReader:
         paced: bool,
         on_change: Callable[[], None],
         events: EventLog,
+        wanted: Callable[[], bool] = lambda: True,
     ) -> None:
         self.source = source
         self.state: SourceState = "waiting"
@@ -44,7 +46,7 @@ class FrameReader:
         self.failure: BaseException | None = None
         """What ended the thread, if that was no end of the source."""
         self._paced = paced and not source.live
-        self._on_change, self._events = on_change, events
+        self._on_change, self._events, self._wanted = on_change, events, wanted
         self._changed = threading.Condition()
         self._next: Frame | None = None
         self._shown: tuple[float, float] | None = None
@@ -62,6 +64,11 @@ class FrameReader:
             self._changed.notify_all()
         return frame
 
+    def wake(self) -> None:
+        """Tells that frames may be wanted again; the next one is read now."""
+        with self._changed:
+            self._changed.notify_all()
+
     @property
     def is_empty(self) -> bool:
         """There is no next frame now."""
@@ -70,8 +77,7 @@ class FrameReader:
     def close(self) -> None:
         """Ends the thread and closes the source."""
         self._closed.set()
-        with self._changed:
-            self._changed.notify_all()
+        self.wake()
         if self.source.live:  # a file is closed by its reader only: OpenCV's must not be disturbed
             self.source.close()
         if self._thread.ident is not None:
@@ -81,7 +87,8 @@ class FrameReader:
     def _run(self) -> None:
         try:
             while not self._closed.is_set() and self._read_one():
-                pass
+                with self._changed:
+                    self._changed.wait_for(lambda: self._closed.is_set() or self._wanted())
         except BaseException as error:  # ends the thread; who waits for frames raises it
             self.failure = error
         self.state = "ended"

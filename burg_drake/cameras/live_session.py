@@ -7,6 +7,7 @@ is public may be called from any thread.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
@@ -60,6 +61,8 @@ class LiveSession:
         events: are told what happens to camera and pose, never once a frame.
         settings: to begin with.
         paced: play files as fast as they were taken; else as fast as they can be looked at.
+        idle_after: frames of a camera are neither read nor looked at when nobody has asked for a
+            picture, or kept it `awake`, for so long [s]. Whoever asks gets a new one.
 
     Attributes:
         picture: the newest; None before the first.
@@ -78,13 +81,23 @@ class LiveSession:
         events: EventLog,
         settings: ViewSettings = ViewSettings(),  # noqa: B008 (frozen)
         paced: bool = True,
+        idle_after: float = math.inf,
     ) -> None:
         session.intrinsics.require_size(*source.size, source.name)
         self.session, self.source, self.events = session, source, events
         self.picture: Picture | None = None
         self.counts = Counts()
         self.last_sight: Sight | None = None
-        self.reader = FrameReader(source, paced=paced, on_change=self._wake, events=events)
+        self.reader = FrameReader(
+            source,
+            paced=paced,
+            on_change=self._wake,
+            events=events,
+            wanted=lambda: not self.is_idle,
+        )
+        self._idle_after = idle_after if source.live else math.inf
+        self._asked, self._waiting = math.inf, 0
+        self._awake: list[Callable[[], bool]] = []
         self._settings = checked_settings(session.scene, settings)
         self._placement: PlacementCheck | None = None
         self._on_frame: list[Callable[[Picture], None]] = []
@@ -99,7 +112,7 @@ class LiveSession:
 
     def start(self, frames: int | None = None) -> None:
         """Begins to look at frames, no more than `frames` of them if given."""
-        self._limit = frames
+        self._limit, self._asked = frames, time.monotonic()
         self.reader.start()
         self._worker.start()
 
@@ -115,6 +128,29 @@ class LiveSession:
     def on_frame(self, listener: Callable[[Picture], None]) -> None:
         """Calls `listener` with the first picture of each frame, in the thread that draws."""
         self._on_frame.append(listener)
+
+    def keep_awake(self, reason: Callable[[], bool]) -> None:
+        """Does not idle as long as `reason` says so, such as while something is recorded."""
+        self._awake.append(reason)
+
+    @property
+    def is_idle(self) -> bool:
+        """Nobody wants pictures."""
+        unasked = not self._waiting and time.monotonic() - self._asked > self._idle_after
+        return unasked and not any(reason() for reason in self._awake)
+
+    def attend(self) -> int:
+        """Somebody wants pictures from now on; wakes the session where it idles.
+
+        Returns:
+            The number of the newest picture, if it is from before an idle time, and stale; else 0.
+        """
+        with self._changed:
+            waits = self.picture is not None and self.is_idle and not self._settings.frozen
+            stale = self.picture.number if self.picture is not None and waits else 0
+            self._asked = time.monotonic()
+        self.reader.wake()
+        return stale
 
     @property
     def settings(self) -> ViewSettings:
@@ -150,11 +186,20 @@ class LiveSession:
         return sum(now - moment <= RATE_OVER for moment in tuple(self._moments)) / RATE_OVER
 
     def next_picture(self, after: int, seconds: float) -> Picture | None:
-        """The newest picture, as soon as its number is above `after`; None if that takes longer."""
+        """The newest picture, as soon as its number is above `after`; None if that takes longer.
+
+        Of a session that idles it is the next one.
+        """
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._closed or (self.picture and self.picture.number > after), seconds
-            )
+            after = max(after, self.attend())
+            self._waiting += 1
+            try:
+                self.reader.wake()
+                self._changed.wait_for(
+                    lambda: self._closed or (self.picture and self.picture.number > after), seconds
+                )
+            finally:
+                self._waiting -= 1
             picture = self.picture
         return picture if picture is not None and picture.number > after else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -21,6 +22,8 @@ from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station
 
 DEFAULT_FPS = 10.0
+LONGEST_DELAY = 2.0
+"""By so much simulated time may lag before frames are left out [s]."""
 
 
 class SimulatedSource(FrameSource):
@@ -75,7 +78,11 @@ class SimulatedSource(FrameSource):
         """See `FrameSource.read`; depth as Drake's sensor gives it, without noise."""
         moment = self._number / (self.fps or DEFAULT_FPS)
         if self.live:
-            self._closed.wait(self._start + moment - time.monotonic())
+            ahead = self._start + moment - time.monotonic()
+            if ahead < -LONGEST_DELAY:  # nobody has read for a while: time has gone on
+                self._number = math.ceil((moment - ahead) * (self.fps or DEFAULT_FPS))
+                return self.read()
+            self._closed.wait(ahead)
         if self._closed.is_set():
             return None
         self._number += 1

@@ -23,6 +23,8 @@ from burg_drake.core.errors import BurgError, InvalidInputError
 
 DEFAULT_RATE = 30.0
 """Of recordings from sources that do not tell theirs [frames a second]."""
+FRESH = 5.0
+"""How long an action waits for the first picture of a session that idled [s]."""
 LOWEST_RATE, HIGHEST_RATE = 1.0, 240.0
 """Of recordings, whatever a source says of itself: files that count time in ticks of 1/90000 s may
 give that as their rate, which no codec takes [frames a second]."""
@@ -47,6 +49,7 @@ class ViewActions:
         self._lock = threading.RLock()
         self._check: threading.Thread | None = None
         live.on_frame(self._record)
+        live.keep_awake(lambda: self.recording is not None)
 
     @property
     def session(self) -> Session:
@@ -63,7 +66,7 @@ class ViewActions:
         Raises:
             InvalidInputError: there is no picture yet, or the folder cannot be written.
         """
-        picture = picture or self.live.picture
+        picture = picture or self._newest()
         if picture is None:
             raise InvalidInputError("there is no picture yet")
         sight = picture.sight
@@ -114,6 +117,7 @@ class ViewActions:
                 frames_per_second=min(max(rate, LOWEST_RATE), HIGHEST_RATE),
                 plain=self._plain,
             )
+            self.live.attend()
             self.live.events.tell(f"recording {path}")
             return self.recording.path
 
@@ -141,7 +145,7 @@ class ViewActions:
         Raises:
             InvalidInputError: there is no picture with a pose, or a check is at work.
         """
-        picture = self.live.picture
+        picture = self._newest()
         if picture is None or not picture.sight.estimate.valid:
             raise InvalidInputError(
                 "a placement check needs a picture that shows where the board is"
@@ -159,6 +163,11 @@ class ViewActions:
         """Until the placement check that is at work, if any, is done."""
         if self._check is not None:
             self._check.join(seconds)
+
+    def _newest(self) -> Picture | None:
+        """The newest picture; of a session that idled, the next one."""
+        stale = self.live.attend()
+        return self.live.next_picture(stale, FRESH) if stale else self.live.picture
 
     def _measure(self, picture: Picture) -> None:
         try:

@@ -96,6 +96,45 @@ def test_every_frame_of_a_video_is_looked_at(
     assert np.allclose(poses.X_SC[there, 0, 3], 0.28 + 0.005 * np.array(there), atol=2e-3)
 
 
+def test_a_camera_that_nobody_looks_at_is_left_alone(
+    live: Callable[..., LiveSession], image: np.ndarray, tmp_path: Path
+) -> None:
+    """No frame is read until somebody asks, who gets one that was taken since."""
+
+    class Camera(Pictures):
+        def read(self) -> Frame | None:
+            time.sleep(0.002)
+            return super().read()
+
+    source = Camera(*[image] * 10_000, live=True)
+    running = live(source, idle_after=0.0)
+    actions = ViewActions(running, tmp_path)
+    running.start()
+    until(lambda: running.picture is not None and running.reader.is_empty)
+
+    def given_at_rest() -> int:
+        until(lambda: running.is_idle and not running._busy)
+        before = source.given
+        time.sleep(0.05)
+        assert source.given <= before + 1  # one may have been on its way
+        return source.given
+
+    given_at_rest()
+    old = running.picture
+    assert old is not None
+    seen = running.next_picture(0, TIMEOUT)
+    assert seen is not None and seen.number > old.number
+    given_at_rest()
+    newest = running.picture
+    actions.snapshot()
+    assert running.picture is not newest
+    at_rest = given_at_rest()
+    actions.start_recording()
+    until(lambda: source.given > at_rest + 5)  # all frames are looked at
+    actions.stop_recording()
+    given_at_rest()
+
+
 def test_so_many_frames(live: Callable[..., LiveSession], video: Path) -> None:
     running = live(open_source(video), paced=False)
     running.start(frames=2)
