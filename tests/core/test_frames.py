@@ -113,6 +113,17 @@ def test_pregrasp_lies_behind_the_grasp_and_approaches_along_z():
     np.testing.assert_allclose(way, 0.1 * X_AG[:, :3, 2], atol=1e-14)
 
 
+def test_a_grasp_and_the_one_with_swapped_fingers_have_one_name():
+    """Also in a batch of other ones: the largest component of each closing axis is positive."""
+    X = random_poses(50, 15)
+    named = frames.canonical_fingers(X)
+    np.testing.assert_allclose(frames.canonical_fingers(frames.swap_fingers(X)), named, atol=1e-15)
+    for before, after in zip(X, named, strict=True):
+        closing = after[:3, 0].tolist()
+        assert max(closing, key=abs) > 0.0
+        assert any(np.allclose(after, same) for same in (before, frames.swap_fingers(before)))
+
+
 def test_swapping_fingers_exchanges_the_pads_and_nothing_else():
     X_AG = random_poses(20, 11)
     swapped = frames.swap_fingers(X_AG)

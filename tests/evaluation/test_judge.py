@@ -122,10 +122,12 @@ def test_a_motion_reaches_the_stages_after_the_one_that_found_it() -> None:
 
 
 def test_a_later_stage_does_not_unsay_a_margin() -> None:
-    trial = Decision(Outcome.LIFTED, margins={"overlap": np.nan, "slip": np.nan})
-    judge = Scripted([Decision(margins={"overlap": 0.0}), Decision(), Decision(), trial])
+    trial = Decision(Outcome.LIFTED, margins={"overlap": np.nan, "slip": np.nan, "clearance": 0.02})
+    first = Decision(margins={"overlap": 0.0, "clearance": 0.01})
+    judge = Scripted([first, Decision(), Decision(), trial])
     margins = judge_grasp(judge, GRASP).margins
     assert margins["overlap"] == 0.0 and np.isnan(margins["slip"])
+    assert margins["clearance"] == 0.02  # measured again
 
 
 @dataclass

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
+from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.rows import best_rows
+from burg_drake.evaluation.rows import best_rows, rows_of
 from burg_drake.evaluation.table import Columns
 
 MILLIMETRE = 1e-3
@@ -36,6 +38,13 @@ def test_the_least_moved_come_first_and_only_lifted_ones_count() -> None:
     columns["outcome"][3] = Outcome.LIFTED_DISTURBED.value
     assert best_rows(columns, 10) == [2, 1, 0]
     assert best_rows(table({}, outcome=Outcome.DROPPED)) == []
+
+
+def test_rows_of_a_grasp_are_all_of_its_rows() -> None:
+    columns = {"id": np.array(["mug-a", "mug-b", "mug-a"])}
+    assert rows_of(columns, "mug-a", "a.csv") == [0, 2] and rows_of(columns, "mug-b", "") == [1]
+    with pytest.raises(UnknownNameError, match=r"^a.csv has no judged grasp 'mug-c'; did you mean"):
+        rows_of(columns, "mug-c", "a.csv")
 
 
 def test_noise_ranks_nothing() -> None:

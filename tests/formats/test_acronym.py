@@ -164,6 +164,10 @@ def test_outcomes_of_trials_become_success(
     grasps = random_grasps(3, 8).with_columns(outcome=["lifted", "slipped", "no_ik"])
     acronym.write(grasps, tmp_path / "a.h5", PANDA)
     np.testing.assert_array_equal(load_grasps(tmp_path / "a.h5")[1], [1, 0, 0])
+    untried = random_grasps(3, 8).with_columns(outcome=["lifted", "", "slipped"])
+    notes = acronym.write(untried, tmp_path / "b.h5", PANDA)
+    assert any("NaN for 1 grasps" in note for note in notes)
+    np.testing.assert_array_equal(load_grasps(tmp_path / "b.h5")[1], [1.0, np.nan, 0.0])
 
 
 def test_qualities_of_other_simulators_keep_their_names(

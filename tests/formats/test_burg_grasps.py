@@ -69,6 +69,7 @@ def test_rows_of_the_internal_array(tmp_path: Path) -> None:
     np.testing.assert_allclose(grasps.width, [0.04, 0.05], rtol=1e-7)
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.3], rtol=1e-7)
     np.testing.assert_array_equal(grasps.X_OG[:, :3, 2], [[0, 0, -1], [0, 0, -1]])
+    np.testing.assert_array_equal(grasps.X_OG[:, :3, 0], [[0, 1, 0], [0, 1, 0]])  # closes along y
 
 
 @pytest.mark.parametrize("seed", range(3))

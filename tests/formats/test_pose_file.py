@@ -51,6 +51,7 @@ def test_a_colon_may_be_part_of_a_name(folder: Path) -> None:
         ("cam0_wrt_table.npy:1", "has poses 0 to 0; there is no 1"),
         ("camera.yaml:0", "holds one pose; leave out ':0'"),
         ("flat.npy", r"has shape \(16,\); expected \(4, 4\) or"),
+        ("stacked.npy", r"has shape \(1, 2, 4, 4\); expected \(4, 4\) or"),
         ("skew.npy", r"pose 0\[0\] is no rotation"),
         ("missing.npy", "cannot read"),
         ("missing.yaml", "cannot read"),
@@ -59,6 +60,7 @@ def test_a_colon_may_be_part_of_a_name(folder: Path) -> None:
 )
 def test_malformed(reference: str, message: str, folder: Path) -> None:
     np.save(folder / "flat.npy", np.zeros(16))
+    np.save(folder / "stacked.npy", np.zeros((1, 2, 4, 4)))
     np.save(folder / "skew.npy", make_pose(2 * np.eye(3)))
     (folder / "bad.yaml").write_text("position: [1, 2, 3]\n")
     with pytest.raises(InvalidInputError, match=message):

@@ -94,6 +94,24 @@ def test_the_open_finger_and_a_post_by_a_millimetre(
         assert overlap.carried
 
 
+@pytest.mark.parametrize("width", [0.0, 0.03, 0.08, np.nan])
+def test_fingers_are_as_far_apart_as_the_grasp_is_wide(station: Station, width: float) -> None:
+    """A post under the middle of a pad, where that is at this distance of the pads alone.
+
+    The pads' faces are half of the width from the middle; NaN is the open hand, 0.08 m.
+    """
+    x, _, z = HAND
+    apart = 0.08 if np.isnan(width) else width
+    y = apart / 2 + 0.0076
+    post = Obstacle(X_WB=Pose((x, y, z - FINGERTIP + 1e-3 - 0.05)), size=(0.004, 0.004, 0.1))
+    checked = collision(station, post=post)
+    touching = {asked: checked.overlaps(HOME, width=asked) for asked in (0.0, 0.03, 0.08, np.nan)}
+    for asked, overlaps in touching.items():
+        same = apart == (0.08 if np.isnan(asked) else asked)
+        assert [o.other for o in overlaps] == (["post"] if same else [])
+        assert checked.is_free(HOME, width=asked) is not same
+
+
 def test_the_arm_itself(station: Station) -> None:
     folded = np.array((0.0, 0.0, 0.0, -3.0, 0.0, 0.1, 0.0))
     checked = collision(station)

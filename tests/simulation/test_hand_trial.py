@@ -6,16 +6,17 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from trial_world import BOX, CENTRE, FORCE, PAD, from_above, make_station
+from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, from_above, make_station
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import swap_fingers
+from burg_drake.core.frames import grasp_from_axes, swap_fingers
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance
 from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import TrialResult
+from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import Obstacle
 
@@ -72,6 +73,48 @@ def test_dropped_while_holding(make_scene, monkeypatch: pytest.MonkeyPatch) -> N
     assert result.outcome is Outcome.DROPPED
     # sixty millimetres from the box's top to the pads' lower edge fall free in a tenth of a second
     assert 0.05 < result.margins.end_time - greased[0] < 0.4
+
+
+@pytest.mark.parametrize(("share", "outcome"), [(0.3, "slipped"), (0.7, "lifted")])
+def test_half_of_the_lift_is_lifted(make_scene, share: float, outcome: str) -> None:
+    """A post slides through the fingers, which lift it by a known share of their own way.
+
+    Friction that gives it an acceleration a, less than the A of the hand, has it at the hand's
+    speed after T A / (a + A), and at rest with the hand after a share 2 a / (a + A) of the lift.
+    """
+    height, time, mass = 0.1, 0.35, 0.3
+    A = 4 * height / time**2
+    a = share * A / (2 - share)
+    settings = TrialSettings(lift_height=height, lift_time=time)
+    trial = HandTrial(make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings)
+    sideways = grasp_from_axes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.2))
+    result = trial.run("post", sideways, friction=mass * (GRAVITY + a) / (2 * FORCE))
+    assert result.outcome == outcome
+    assert result.margins.lift == pytest.approx(share * height, abs=0.01)
+
+
+def test_what_lies_on_one_finger_in_the_end_is_not_held(
+    make_scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Gripped from above and below; then the hand opens slowly, and the block stays on a finger."""
+    engine = replace(ENGINES["standard"], whole_trial=True)
+    block = Instance(object="block", X_SO=Pose((0.3, 0.2, 0.3)))
+    trial = HandTrial(make_scene(block), make_station(), engine=engine)
+    lift = Execution.lift
+    after: list[Execution] = []
+
+    def lift_and_open(execution: Execution) -> Outcome | None:
+        outcome = lift(execution)
+        trial.command("hand", -0.02 * trial.hand.closing_command())
+        after.append(execution)
+        return outcome
+
+    monkeypatch.setattr(Execution, "lift", lift_and_open)
+    sideways = grasp_from_axes((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.025))
+    result = trial.run("block", sideways)
+    (execution,) = after
+    assert sorted(execution.contact.touching) == [False, True]
+    assert result.outcome is Outcome.DROPPED
 
 
 def test_thin_air(box_trial: HandTrial) -> None:
