@@ -188,30 +188,32 @@ def _take(
 def _print(calibration: Calibration) -> None:
     """Prints views, what was left out, parameters and where the image was covered."""
     from burg_drake.apps.camera import print_intrinsics
-    from burg_drake.apps.number_tables import new_table, print_table
     from burg_drake.cameras.calibration_check import coverage
     from burg_drake.cameras.lens_uncertainty import image_grid, uncertainty
+    from burg_drake.core.figures import figure
+    from burg_drake.core.text_table import TextTable
 
-    table = new_table(
-        "views", "image", "corners", "rms (px)", "worst (px)", "tilt (deg)", "blur (px)"
-    )
+    table = TextTable("views").names("image")
+    table.numbers("corners", "rms [px]", "worst [px]", "tilt [deg]", "blur [px]")
     for used in calibration.views:
         worst = float(max((used.residuals**2).sum(axis=1)) ** 0.5)
-        table.add_row(
+        table.row(
             used.view.name,
             str(len(used.view.ids)),
-            f"{used.rms:.3f}",
-            f"{worst:.2f}",
-            f"{math.degrees(used.tilt):.0f}",
-            f"{used.view.blur:.2f}",
+            figure(used.rms, 3),
+            figure(worst, 2),
+            figure(math.degrees(used.tilt), 0),
+            figure(used.view.blur, 2),
         )
-    print_table(table)
+    table.show()
     for name, reason in calibration.rejected:
         print(f"left out: {name} {reason}".replace(":  ", ": "))
-    table = new_table(f"lens model {calibration.model}", "parameter", "value", "standard deviation")
+    table = TextTable(f"lens model {calibration.model}").texts("parameter")
+    table.numbers("value", "standard deviation")
     for name, (value, deviation) in calibration.parameters.items():
-        table.add_row(name, f"{value:.6g}", f"{deviation:.2g}")
-    print_table(table)
+        table.row(name, f"{value:.6g}", f"{deviation:.2g}")
+    table.caption = "f and c in pixels, others without a unit"
+    table.show()
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     print("corners seen in each part of the image")
     for row in coverage([used.view for used in calibration.views], size):

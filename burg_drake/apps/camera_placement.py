@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
@@ -14,6 +15,8 @@ from burg_drake.apps.arguments import (
     positive,
     print_scale,
 )
+from burg_drake.core.figures import figure
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.cameras.board_estimate import BoardEstimate
@@ -101,8 +104,7 @@ def run_placement(arguments: argparse.Namespace) -> int:
         raise InvalidInputError(f"{arguments.photo}: {check.reason}")
     for warning in _doubts(estimate, len(scene.board.layout.ids)):
         print(f"burg-drake: warning: {arguments.photo}: {warning}", file=sys.stderr)
-    for line in table(check):
-        print(line)
+    placement_table(check.instances).show()
     if arguments.output:
         save_placement(check, arguments.output)
         print(f"wrote {arguments.output}")
@@ -120,25 +122,27 @@ def _doubts(estimate: BoardEstimate, markers: int) -> list[str]:
     return doubts
 
 
-def table(check: PlacementCheck) -> list[str]:
-    """A line an object."""
-    wide = max((len(name) for name in check.instances), default=0)
-    return [f"{name:<{wide}}  {_words(p)}" for name, p in check.instances.items()]
+def placement_table(placements: Mapping[str, Placement]) -> TextTable:
+    """How far each object is off, a row an object."""
+    table = TextTable().names("object")
+    table.numbers("off by\n[mm]", "x\n[mm]", "y\n[mm]", "±\n[mm]", "turned\n[deg]", "±\n[deg]")
+    table.texts("remark")
+    table.caption = "x, y: along the board's edges (scene frame S); ±: standard deviation"
+    for name, placement in placements.items():
+        table.row(name, *_cells(placement))
+    return table
 
 
-def _words(placement: Placement) -> str:
+def _cells(placement: Placement) -> list[str]:
     """What a placement says, in millimetres and degrees."""
     if placement.displacement is None or placement.displacement_sd is None:
-        return f"not seen: {placement.reason}"
-    (x, y), deviation = placement.displacement, placement.displacement_sd
-    words = (
-        f"off by {1e3 * math.hypot(x, y):5.1f} mm"
-        f" (x {1e3 * x:+6.1f}, y {1e3 * y:+6.1f}, ± {1e3 * max(deviation):.1f})"
-    )
-    if placement.angle is not None and placement.angle_sd is not None:
-        words += f", turned {math.degrees(placement.angle):+7.1f} ± "
-        words += f"{math.degrees(placement.angle_sd):.1f} deg"
-    return words + (f"; uncertain: {placement.reason}" if placement.reason else "")
+        return ["-"] * 6 + [f"not seen: {placement.reason}"]
+    x, y = (1e3 * way for way in placement.displacement)
+    way = [figure(value, 1) for value in (math.hypot(x, y), x, y)]
+    turn = [None if a is None else math.degrees(a) for a in (placement.angle, placement.angle_sd)]
+    deviation = figure(1e3 * max(placement.displacement_sd), 1)
+    remark = f"uncertain: {placement.reason}" if placement.reason else ""
+    return [*way, deviation, *(figure(value, 1) for value in turn), remark]
 
 
 def _write_overlay(path: str, check: PlacementCheck, scene: Any, photo: Any) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.arguments import add_verb, add_view
 from burg_drake.apps.grasp_file import add_hand, named_gripper
 from burg_drake.core.errors import UnknownNameError, nearest
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.formats.grasp_format import GraspFormat, Gripper
@@ -100,13 +101,7 @@ def _print_tables(formats: Mapping[str, GraspFormat], gripper: Gripper) -> None:
 
 
 def _print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", padding=(0, 1, 0, 0))
-    for column in columns:
-        table.add_column(column, no_wrap=column in ("frame", "format", "of", "approach"))
+    table = TextTable(title).texts(*columns)
     for row in rows:
-        table.add_row(*row)
-    Console().print(table)
+        table.row(*row)
+    table.show()

@@ -6,19 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import TypeVar
 
-from burg_drake.apps.number_tables import (
-    QUANTILES as SHOWN_QUANTILES,
-)
-from burg_drake.apps.number_tables import new_table, print_numbers, print_table
+from burg_drake.apps.number_tables import QUANTILES as SHOWN_QUANTILES
+from burg_drake.apps.number_tables import print_numbers
+from burg_drake.core.figures import count, figure, percent
+from burg_drake.core.text_table import TextTable
 from burg_drake.grasping.comparison import (
     QUANTILES,
     Comparison,
     Distribution,
-    ObjectComparison,
-    ObjectSummary,
     SetSummary,
 )
-from burg_drake.grasping.coverage import Share
 from burg_drake.grasping.pose_search import Tolerance
 from burg_drake.grasping.ranking import FRICTION_NEEDED, Ranking
 
@@ -30,24 +27,22 @@ ALL = "all"
 Row = TypeVar("Row")
 
 
-def print_summary(title: str, summary: SetSummary, notes: Sequence[str] = ()) -> None:
+def print_summary(
+    title: str, summary: SetSummary, notes: Sequence[str] = (), frame: str = "object"
+) -> None:
     """Prints the figures of one set: by object, then by column.
 
     Args:
         title: names the set.
         summary: its figures.
         notes: what was left behind as it was read.
+        frame: what its poses are measured in.
     """
-    table = new_table(title, "object", "grasps", "inst.", "equal", "width\n[mm]", "score")
-    table.add_column("nearest\n[mm]", justify="right", no_wrap=True)
-    for name, one in _with_all(summary.objects, summary.overall):
-        table.add_row(name or "-", *_object_cells(one))
-    print_table(table)
-    print("Means of width, score, and combined distance to the nearest other grasp.")
+    summary_table(title, summary).show()
     numbers = {name: values for name, values in summary.numbers.items() if values.count}
-    print_numbers("", {name: (of.count, _figures(of)) for name, of in numbers.items()})
+    print_numbers("", {name: (of.count, _figures(of)) for name, of in numbers.items()}, frame)
     for name, share in summary.truths.items():
-        print(f"{name}: {share.count:,} of {share.total:,} ({_share(share)})")
+        print(f"{name}: {share.count:,} of {share.total:,} ({percent(share.value)})")
     for name, counts in summary.texts.items():
         if 1 < len(counts) < summary.overall.grasps or name == "outcome":
             print(f"{name}: {_occurrences(counts)}")
@@ -55,37 +50,77 @@ def print_summary(title: str, summary: SetSummary, notes: Sequence[str] = ()) ->
         print(note)
 
 
-def print_comparison(comparison: Comparison) -> None:
-    """Prints how two sets compare, by object."""
-    table = new_table("A and B", "object", "A", "B", "A has\nB near", "B has\nA near")
-    for head in ("A to B\n[mm]", "95 %\n[mm]", "shift\n[mm]", "turn\n[deg]", "B to A\n[mm]"):
-        table.add_column(head, justify="right", no_wrap=True)
-    for name, one in _with_all(comparison.objects, comparison.overall):
-        table.add_row(name or "-", *_comparison_cells(one))
-    print_table(table)
-    overall = comparison.overall
-    print(
+def summary_table(title: str, summary: SetSummary) -> TextTable:
+    """Figures of one set by object."""
+    table = TextTable(title).names("object").numbers("grasps", "inst.", "equal")
+    table.numbers("width\n[mm]", "score", "nearest\n[mm]")
+    table.caption = "Means of width, score, and combined distance to the nearest other grasp."
+    for name, one in _with_all(summary.objects, summary.overall):
+        table.row(
+            name or "-",
+            count(one.grasps),
+            count(one.instances or None),
+            count(one.duplicates),
+            figure(1e3 * one.width.mean, 1),
+            figure(one.score.mean, 3),
+            figure(1e3 * one.neighbour.mean, 1),
+        )
+    return table
+
+
+def comparison_table(comparison: Comparison) -> TextTable:
+    """How two sets compare, by object."""
+    table = TextTable("A and B").names("object").numbers("A", "B", "A has\nB near", "B has\nA near")
+    table.numbers("A to B\n[mm]", "95 %\n[mm]", "shift\n[mm]", "turn\n[deg]", "B to A\n[mm]")
+    table.caption = (
         f"Near is {_bounds(comparison.tolerance)}. Medians of distances to the nearest grasp, where"
         " a degree counts"
         f" {1e3 * comparison.tolerance.lever * math.radians(1.0):g} mm."
     )
-    print(f"coverage: B has {_share(overall.coverage)} of A")
-    print(f"precision: A has {_share(overall.precision)} of B")
+    for name, one in _with_all(comparison.objects, comparison.overall):
+        table.row(
+            name or "-",
+            count(one.coverage.total),
+            count(one.precision.total),
+            percent(one.coverage.value),
+            percent(one.precision.value),
+            figure(1e3 * one.to_grasps.median, 1),
+            figure(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)], 1),
+            figure(1e3 * one.translation.median, 1),
+            figure(math.degrees(one.angle.median), 1),
+            figure(1e3 * one.to_reference.median, 1),
+        )
+    return table
+
+
+def ranking_table(ranking: Ranking) -> TextTable:
+    """Average precision, by criterion."""
+    top = ranking.top
+    table = TextTable(f"scores judged by {ranking.column}").names("good if")
+    table.numbers("good", "AP", f"AP of the top {len(top.precision)}")
+    rows = zip(
+        ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
+    )
+    for name, good, ap, ap_top in rows:
+        of = f"{count(good)} of {count(ranking.grasps)}"
+        table.row(name, of, figure(ap, 3), figure(ap_top, 3))
+    return table
+
+
+def print_comparison(comparison: Comparison) -> None:
+    """Prints how two sets compare, by object."""
+    comparison_table(comparison).show()
+    overall = comparison.overall
+    print(f"coverage: B has {percent(overall.coverage.value)} of A")
+    print(f"precision: A has {percent(overall.precision.value)} of B")
     print(f"ids in both: {comparison.shared_ids:,}")
 
 
 def print_ranking(ranking: Ranking) -> None:
     """Prints average precision, by criterion."""
+    ranking_table(ranking).show()
     top = ranking.top
     length = len(top.precision)
-    heads = ("good if", "good", "AP", f"AP of the top {length}")
-    table = new_table(f"scores judged by {ranking.column}", *heads)
-    rows = zip(
-        ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
-    )
-    for name, good, ap, ap_top in rows:
-        table.add_row(name, f"{good:,} of {ranking.grasps:,}", _figure(ap, 3), _figure(ap_top, 3))
-    print_table(table)
     print(
         f"AP is precision over recall. GraspNet-1Billion's AP of the top {length} is {top.ap:.3f};"
         f" it would be {top.attainable:.3f} if all {len(top.kept)} grasps that suppression leaves"
@@ -109,31 +144,6 @@ def _figures(values: Distribution) -> dict[str, float]:
     return {"mean": values.mean, **shown}
 
 
-def _object_cells(one: ObjectSummary) -> list[str]:
-    return [
-        f"{one.grasps:,}",
-        str(one.instances or "-"),
-        f"{one.duplicates:,}",
-        _figure(1e3 * one.width.mean),
-        _figure(one.score.mean, 3),
-        _figure(1e3 * one.neighbour.mean),
-    ]
-
-
-def _comparison_cells(one: ObjectComparison) -> list[str]:
-    return [
-        f"{one.coverage.total:,}",
-        f"{one.precision.total:,}",
-        _share(one.coverage),
-        _share(one.precision),
-        _figure(1e3 * one.to_grasps.median),
-        _figure(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)]),
-        _figure(1e3 * one.translation.median),
-        _figure(math.degrees(one.angle.median)),
-        _figure(1e3 * one.to_reference.median),
-    ]
-
-
 def _bounds(tolerance: Tolerance) -> str:
     bounds = []
     if math.isfinite(tolerance.translation):
@@ -149,11 +159,3 @@ def _occurrences(counts: dict[str, int]) -> str:
     shown = [f"{name or '(none)'} {count:,}" for name, count in list(counts.items())[:MOST_VALUES]]
     more = len(counts) - len(shown)
     return ", ".join(shown) + (f" and {more:,} more" if more else "")
-
-
-def _share(share: Share) -> str:
-    return "-" if math.isnan(share.value) else f"{share.value:.1%}"
-
-
-def _figure(value: float, decimals: int = 1) -> str:
-    return "-" if math.isnan(value) else f"{value:.{decimals}f}"

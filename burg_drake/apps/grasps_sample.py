@@ -21,6 +21,7 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.apps.grasp_source import Source
@@ -174,7 +175,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
     grasps = sampled_set(
         sampled, source.library, source.scene, station, arguments.n, arguments.seed, settings
     )
-    _print_table(sampled, seconds, arguments.n)
+    sampled_table(sampled, seconds, arguments.n).show()
     output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
     few = [name for name, found in sampled.items() if len(found) < arguments.n]
     if few:
@@ -257,19 +258,17 @@ def _load_weights(path: str) -> Array:
     return weights
 
 
-def _print_table(sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def sampled_table(
+    sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int
+) -> TextTable:
+    """What sampling came to, by instance or object."""
+    from burg_drake.core.figures import count, figure
 
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("on", no_wrap=True)
-    for column in ("asked", "found", "rays", "tried", "seconds"):
-        table.add_column(column, justify="right", no_wrap=True)
+    table = TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
     for name, grasps in sampled.items():
         counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
-        table.add_row(name, *(f"{count:,}" for count in counts), f"{seconds[name]:.2f}")
-    Console().print(table)
+        table.row(name, *map(count, counts), figure(seconds[name], 2))
+    return table
 
 
 def _named_file(text: str) -> tuple[str, str]:

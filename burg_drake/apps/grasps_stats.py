@@ -92,7 +92,7 @@ def run_stats(arguments: argparse.Namespace) -> int:
     rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
     comparison = compare(sets[0].grasps, sets[1].grasps, tolerance) if len(sets) == 2 else None
     for k, path in enumerate(paths):
-        print_summary(path, summaries[k], sets[k].notes)
+        print_summary(path, summaries[k], sets[k].notes, sets[k].frame)
         if rankings:
             print_ranking(rankings[k])
     if comparison is not None:

@@ -28,12 +28,14 @@ def add_to(verbs: Any) -> None:
 def run_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in hand."""
     from burg_drake.core.resources import builtin_names
+    from burg_drake.core.text_table import TextTable
     from burg_drake.station.hand import load_hand
 
     hands = [load_hand(name) for name in builtin_names("models/hands")]
-    width = max(len(hand.name) for hand in hands)
+    table = TextTable().texts("hand", "description")
     for hand in hands:
-        print(f"{hand.name:{width}}  {hand.description}")
+        table.row(hand.name, hand.description)
+    table.show()
     return 0
 
 

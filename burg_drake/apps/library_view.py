@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+from burg_drake.core.figures import count, figure
+from burg_drake.core.text_table import TextTable
+
 if TYPE_CHECKING:
+    from burg_drake.objects.entry import ObjectEntry
     from burg_drake.objects.library import ObjectLibrary
 
 
@@ -69,27 +73,26 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> None:
     """Prints objects as a table."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+    chosen = set(library.objects if only is None else only)
+    shown = {name: entry for name, entry in library.objects.items() if name in chosen}
+    library_table(shown).show()
+    if any(entry.mass_properties.source == "density" for entry in shown.values()):
+        print("~ mass from volume and density; give the true one with --mass NAME=KG")
 
-    shown = library.objects if only is None else [n for n in library.objects if n in set(only)]
-    table = Table(box=box.SIMPLE_HEAD, title_justify="left")
-    table.add_column("object", no_wrap=True)
-    for column in ("mass [g]", "size [mm]", "mu", "pieces", "poses"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for name in shown:
-        entry = library.objects[name]
+
+def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:
+    """Objects by name."""
+    table = TextTable().names("object")
+    table.numbers("mass [g]", "size [mm]", "mu", "pieces", "poses")
+    for name, entry in objects.items():
         size = [1e3 * (b - a) for a, b in zip(entry.lower, entry.upper, strict=True)]
-        mass = f"{1e3 * entry.mass:.1f}"
-        table.add_row(
+        mass = figure(1e3 * entry.mass, 1)
+        table.row(
             name,
             mass if entry.mass_properties.source == "given" else f"~{mass}",
-            " x ".join(f"{s:.0f}" for s in size),
-            f"{entry.friction:g}",
-            str(len(entry.pieces)),
-            str(len(entry.stable_poses)),
+            " x ".join(figure(s, 0) for s in size),
+            figure(entry.friction),
+            count(len(entry.pieces)),
+            count(len(entry.stable_poses)),
         )
-    Console().print(table)
-    if any(library.objects[n].mass_properties.source == "density" for n in shown):
-        print("~ mass from volume and density; give the true one with --mass NAME=KG")
+    return table

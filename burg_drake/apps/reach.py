@@ -24,9 +24,11 @@ from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import require_writable
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
+    from burg_drake.core.outcome import Outcome
     from burg_drake.scene.scene import Scene
     from burg_drake.station.station import Station
 
@@ -216,7 +218,7 @@ def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
 
 def _print_tables(grasps: GraspSet) -> None:
     """Counts by object and by outcome, what was in the way, and how fast that was found out."""
-    from burg_drake.apps.number_tables import new_table, print_table
+    from burg_drake.core.figures import figure
     from burg_drake.core.outcome import Outcome, Stage
 
     outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
@@ -224,43 +226,53 @@ def _print_tables(grasps: GraspSet) -> None:
     for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
         by_object.setdefault(name, Counter())[outcome] += 1
     total = Counter(outcomes)
-    table = new_table("Grasps that the arm can execute", "object", "grasps", "clear", "reachable")
-    table.add_column("of clear", justify="right", no_wrap=True)
-    rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
-    for name, counts in rows.items():
-        if name == "all":
-            table.add_section()
-        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
-        good = counts[Outcome.REACHABLE]
-        share = f"{100 * good / clear:.1f} %" if clear else "-"
-        table.add_row(name, f"{counts.total():,}", f"{clear:,}", f"{good:,}", share)
-    print_table(table)
-    print_table(_outcome_table(grasps, by_object, total))
+    reach_table(by_object, total).show()
+    outcome_table(grasps, by_object, total).show()
     asked = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())
     if asked and seconds > 0.0:
-        rate = f"{asked / seconds:.3g} clear grasps per CPU second"
-        print(f"{rate}; {seconds:.3g} CPU seconds without set-up")
+        rate = f"{figure(asked / seconds)} clear grasps per CPU second"
+        print(f"{rate}; {figure(seconds)} CPU seconds without set-up")
 
 
-def _outcome_table(grasps: GraspSet, by_object: Mapping[str, Counter[Any]], total: Any) -> Any:
+def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
+    """How many grasps of each object the arm can execute."""
+    from burg_drake.core.figures import count, percent
+    from burg_drake.core.outcome import Outcome, Stage
+
+    table = TextTable("Grasps that the arm can execute").names("object")
+    table.numbers("grasps", "clear", "reachable", "of clear")
+    rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
+    for name, counts in rows.items():
+        if name == "all":
+            table.gap()
+        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
+        good = counts[Outcome.REACHABLE]
+        share = percent(good / clear) if clear else "-"
+        table.row(name, count(counts.total()), count(clear), count(good), share)
+    return table
+
+
+def outcome_table(
+    grasps: GraspSet, by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]
+) -> TextTable:
     """Outcomes by object where they fit, with what was mostly in the way."""
     from rich.console import Console
 
-    from burg_drake.apps.number_tables import new_table
+    from burg_drake.core.figures import count, percent
     from burg_drake.core.outcome import Outcome
 
     room = Console().width - 70
     names = [name for name in by_object if len(by_object) > 1]
     names = names if sum(len(name) + 2 for name in names) <= room else []
-    table = new_table("What became of them", "outcome", *names, "all", "share")
-    table.add_column("mostly in the way")
+    table = TextTable("What became of them").texts("outcome")
+    table.numbers(*names, "all", "share").texts("mostly in the way")
     order = [Outcome.REACHABLE, *Outcome]
     for outcome in sorted(total, key=order.index):
         mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(BLOCKERS)
-        counts = [f"{by_object[name][outcome] or '·'}" for name in names]
-        share = f"{100 * total[outcome] / len(grasps):.1f} %"
-        way = ", ".join(f"{name} ({count})" for name, count in blockers)
-        table.add_row(outcome.value, *counts, f"{total[outcome]:,}", share, way)
+        counts = [count(n) if (n := by_object[name][outcome]) else "·" for name in names]
+        share = percent(total[outcome] / len(grasps))
+        way = ", ".join(f"{name} ({count(n)})" for name, n in blockers)
+        table.row(outcome.value, *counts, count(total[outcome]), share, way)
     return table

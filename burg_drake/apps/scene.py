@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps import scene_import
@@ -19,9 +20,11 @@ from burg_drake.apps.arguments import (
     add_view,
     positive,
 )
+from burg_drake.core.figures import figure
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.settle_scene import SettledScene
+    from burg_drake.simulation.settle_scene import Displacement, SettledScene
 
 DEFAULT_TIME_LIMIT = 10.0
 """In step with simulation.settle_scene, which imports too much for a help text."""
@@ -164,7 +167,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     written = arguments.keep or not faults
     if written:
         _write_settled(settled, arguments.output)
-    _print_displacements(settled)
+    displacement_table(settled.displacements).show()
     if settled.at_rest:
         print(f"at rest after {settled.duration:.2f} s")
     if written:
@@ -187,11 +190,12 @@ def _write_settled(settled: SettledScene, output: str) -> None:
     save_scene(dataclasses.replace(scene.document, library=library), path)
 
 
-def _print_displacements(settled: SettledScene) -> None:
-    wide = max((len(name) for name in settled.displacements), default=0)
-    for name, moved in settled.displacements.items():
-        angle = math.degrees(moved.angle)
-        print(f"{name:<{wide}}  moved {moved.distance * 1e3:7.1f} mm, turned {angle:5.1f} deg")
+def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:
+    """How far each object has come."""
+    table = TextTable().names("object").numbers("moved [mm]", "turned [deg]")
+    for name, moved in displacements.items():
+        table.row(name, figure(1e3 * moved.distance, 1), figure(math.degrees(moved.angle), 1))
+    return table
 
 
 def _faults(settled: SettledScene, *, kept: bool) -> list[str]:

@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import Parser, add_group, add_verb, add_view
+from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.motion.reachability import ReachabilityMap
@@ -60,9 +61,10 @@ def run_list(arguments: argparse.Namespace) -> int:
     from burg_drake.station.station import load_station
 
     stations = [load_station(name) for name in builtin_names("stations")]
-    width = max(len(station.name) for station in stations)
+    table = TextTable().texts("station", "description")
     for station in stations:
-        print(f"{station.name:{width}}  {station.document.description}")
+        table.row(station.name, station.document.description)
+    table.show()
     return 0
 
 
@@ -70,10 +72,10 @@ def run_check(arguments: argparse.Namespace) -> int:
     """Prints what a station can do; what makes it useless is an error."""
     station, scene, report = _inspect(arguments)
     print(f"{station.name}: {station.path} can be used")
-    lines = _lines(station, scene, report)
-    width = max(len(name) for name, _ in lines)
-    for name, text in lines:
-        print(f"  {name:{width}}  {text}")
+    table = TextTable().texts("", "")
+    for name, text in _lines(station, scene, report):
+        table.row(name, text)
+    table.show()
     for warning in report.warnings:
         print(f"burg-drake: warning: {station.path}: {warning}", file=sys.stderr)
     return 0
@@ -144,12 +146,16 @@ def _arm_lines(station: Station, arm: ArmFigures) -> list[tuple[str, str]]:
     pair = f" ({near.link} to {near.other})" if near.link else ""
     lines = [
         ("arm", f"{station.arm_model.stem}, {len(arm.joints)} joints"),
-        ("base", f"at ({x:g}, {y:g}, {z:g}) m, turned by ({roll:g}, {pitch:g}, {yaw:g}) degrees"),
+        (
+            "base",
+            f"at ({x:g}, {y:g}, {z:g}) m in the world, turned by"
+            f" ({roll:g}, {pitch:g}, {yaw:g}) degrees",
+        ),
         ("reach", f"{arm.span.radius:.2f} m at most, from the shoulder to between the pads"),
         ("home clearance", f"{1e3 * near.distance:.0f} mm{pair}"),
     ]
     for name, low, q, high in zip(arm.joints, arm.lower, arm.home, arm.upper, strict=True):
-        lines.append((name, f"{low:6.3f} to {high:6.3f}, at home {q:6.3f}"))
+        lines.append((name, f"{low:.3f} to {high:.3f} rad, at home {q:.3f}"))
     return lines
 
 

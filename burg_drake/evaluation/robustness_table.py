@@ -24,11 +24,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from operator import itemgetter
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from burg_drake.core.figures import figure
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.text_table import TextTable
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.origin import engine_label, pairs_text
 from burg_drake.evaluation.probes import RobustnessSettings
@@ -36,9 +38,6 @@ from burg_drake.evaluation.table import Columns
 from burg_drake.simulation.hold_force import AXES, DIRECTIONS, HoldForces
 from burg_drake.simulation.perturbation import SuccessRate
 from burg_drake.station.engine import Engine
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 T = TypeVar("T")
 
@@ -152,24 +151,13 @@ def _settings_text(settings: RobustnessSettings) -> str:
     )
 
 
-def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSettings) -> Table:
+def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSettings) -> TextTable:
     """The table for a terminal: weakest directions, friction and success."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(
-        title="Robustness of lifted grasps",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    table.add_column("grasp", overflow="fold")
+    table = TextTable("Robustness of lifted grasps", caption=_caption(settings)).texts("grasp")
     heads = {"tug": "tug", "shake": "shake", "friction": "least mu", "noise": "success"}
-    for test in settings.tests:
-        table.add_column(heads[test], justify="right", no_wrap=True)
+    table.numbers(*(heads[test] for test in settings.tests))
     if "noise" in settings.tests:
-        table.add_column("95 % CI", justify="right", no_wrap=True)
+        table.numbers("95 % CI")
     largest = settings.loads.largest
     for g in grasps:
         cells = {
@@ -182,9 +170,7 @@ def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSetti
         if "noise" in settings.tests:
             low, high = (0.0, 1.0) if g.success is None else g.success.interval
             row.append(f"{100 * low:.0f}-{100 * high:.0f} %")
-        table.add_row(g.id, *row)
-    table.caption = _caption(settings)
-    table.caption_justify = "left"
+        table.row(g.id, *row)
     return table
 
 
@@ -192,7 +178,7 @@ def _weakest(forces: HoldForces | None, largest: float) -> str:
     if forces is None:
         return "-"
     name, value = forces.weakest
-    return f"> {largest:g} g   " if math.isinf(value) else f"{value:.1f} g {name:>2}"
+    return f"> {largest:g} g   " if math.isinf(value) else f"{figure(value, 1)} g {name:>2}"
 
 
 def _friction(grasp: GraspRobustness, settings: RobustnessSettings) -> str:
@@ -202,7 +188,7 @@ def _friction(grasp: GraspRobustness, settings: RobustnessSettings) -> str:
         return f"< {settings.friction.smallest:g}"
     if math.isinf(grasp.friction_min):
         return f"> {settings.friction.largest:g}"
-    return f"{grasp.friction_min:.3f} of {grasp.friction:g}"
+    return f"{figure(grasp.friction_min, 3)} of {figure(grasp.friction)}"
 
 
 def _caption(settings: RobustnessSettings) -> str:

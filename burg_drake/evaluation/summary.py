@@ -207,26 +207,6 @@ def pushes(columns: Columns) -> Pushes | None:
     )
 
 
-def percent(value: float) -> str:
-    """A share for people."""
-    return f"{100 * value:.0f} %" if value in (0.0, 1.0) else f"{100 * value:.1f} %"
-
-
-def rounded(value: float) -> str:
-    """A positive number for people, with three digits and no exponent."""
-    return f"{value:.3g}" if value < 1000 else f"{float(f'{value:.3g}'):.0f}"
-
-
-def duration(seconds: float) -> str:
-    """A duration for people, with three digits."""
-    if math.isnan(seconds):
-        return "-"
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}" if seconds < 1000 else f"{seconds:.0f} s"
-    return f"{seconds * 1e6:.3g} µs"
-
-
 def _group(columns: Columns, name: str, mask: np.ndarray) -> Group:
     outcomes = Counter(Outcome(o) for o in columns["outcome"][mask])
     decided = Counter(Stage(s) for s in columns["stage"][mask])

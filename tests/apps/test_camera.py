@@ -70,7 +70,7 @@ def test_photos_of_the_target_give_the_intrinsics(
     assert found.residual is not None and found.residual < 0.1
     assert "left out: photo90.png does not show the target" in out
     assert "left out: " + str(photos / "photo91.png") + " is not an image" in out
-    assert out.count("\n photo") == 14
+    assert out.count("\nphoto") == 14
     page = report.read_text()
     assert "photo13.png" in page and "photo91.png" in page and "http" not in page
     assert page.count("<svg") == 4 + 14

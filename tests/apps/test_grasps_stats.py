@@ -69,8 +69,8 @@ def test_two_sets(
     assert figures["sets"][1] == {"file": files[1], "frame": "object"}
     assert figures["summaries"][0]["overall"]["grasps"] == 3
     printed = capsys.readouterr().out
-    assert "coverage: B has 66.7% of A" in printed
-    assert "precision: A has 100.0% of B" in printed
+    assert "coverage: B has 66.7 % of A" in printed
+    assert "precision: A has 100 % of B" in printed
 
 
 def test_bounds(files: tuple[str, str], tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ from collections import Counter
 
 import numpy as np
 
+from burg_drake.core.figures import percent
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.report.markup import Child, Html, element, section, table
-from burg_drake.evaluation.summary import Summary, percent
+from burg_drake.evaluation.summary import Summary
 from burg_drake.evaluation.table import Columns
 
 MEANING = {

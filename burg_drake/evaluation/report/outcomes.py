@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
+from burg_drake.core.figures import duration, figure, percent
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.report.charts import Part, funnel, interval_mark, legend, stacked_bar
 from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
 from burg_drake.evaluation.report.style import STYLES
-from burg_drake.evaluation.summary import Group, Summary, duration, percent, rounded
+from burg_drake.evaluation.summary import Group, Summary
 from burg_drake.visualization.palette import GROUPS
 
 FAILED = Outcome.SIMULATION_FAILED
@@ -104,7 +103,7 @@ def cost_section(summary: Summary) -> Html:
     head = ["stage", "grasps", "CPU time", "median", "grasps per CPU second"]
     rows = []
     for cost in summary.costs:
-        rate = "-" if math.isnan(cost.rate) else rounded(cost.rate)
+        rate = figure(cost.rate)
         cells: list[Child] = [cost.grasps, duration(cost.seconds), duration(cost.median), rate]
         numbers = [element("td", cell, class_="number") for cell in cells]
         rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))

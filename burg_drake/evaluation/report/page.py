@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from burg_drake.core.figures import duration, percent
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.arm import arm_section, execution_section
@@ -20,7 +21,7 @@ from burg_drake.evaluation.report.provenance import provenance
 from burg_drake.evaluation.report.reachability import reachability_section
 from burg_drake.evaluation.report.style import style_sheet
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import Summary, duration, percent, summarize
+from burg_drake.evaluation.summary import Summary, summarize
 
 
 def write_report(run: Run) -> None:

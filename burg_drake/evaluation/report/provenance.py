@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shlex
 
+from burg_drake.core.figures import duration
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.markup import Html, command, element, join
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
 from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
-from burg_drake.evaluation.summary import duration
 from burg_drake.station.engine import ENGINES, Engine
 
 
