@@ -92,8 +92,16 @@ def smallest_support(basis: Array, rows: int, direction: Array | None = None) ->
     def supports(u: Array) -> Array:
         return np.array([c[k] @ u + np.linalg.norm(A[k].T @ u) for k in (0, 1)])
 
+    def supports_gradient(u: Array) -> Array:
+        turned = np.array([A[k] @ (A[k].T @ u) / np.linalg.norm(A[k].T @ u) for k in (0, 1)])
+        return np.column_stack([-(c + turned), np.ones(2)])
+
     def size(u: Array) -> float:
         return float(u[:rows] @ u[:rows] if direction is None else u[:3] @ direction)
+
+    def size_gradient(u: Array) -> Array:
+        slope = 2.0 * u[:rows] if direction is None else direction
+        return np.pad(slope, (0, 7 - len(slope)))
 
     rng, best = np.random.default_rng(0), np.inf
     for _ in range(15):
@@ -105,8 +113,16 @@ def smallest_support(basis: Array, rows: int, direction: Array | None = None) ->
             method="SLSQP",
             options={"maxiter": 300, "ftol": 1e-13},
             constraints=[
-                {"type": "eq", "fun": lambda x: size(x) - 1.0},
-                {"type": "ineq", "fun": lambda x: x[6] - supports(x[:6])},
+                {
+                    "type": "eq",
+                    "fun": lambda x: size(x[:6]) - 1.0,
+                    "jac": lambda x: size_gradient(x[:6]),
+                },
+                {
+                    "type": "ineq",
+                    "fun": lambda x: x[6] - supports(x[:6]),
+                    "jac": lambda x: supports_gradient(x[:6]),
+                },
             ],
         ).x[:6]
         if abs(size(found) - 1.0) < 1e-6:

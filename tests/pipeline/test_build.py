@@ -267,15 +267,15 @@ def test_closed_meshes_become_hollow(tmp_path: Path) -> None:
     assert properties.mass == 0.1
 
 
-def test_fifty_unchanged_objects_take_less_than_a_second(tmp_path: Path) -> None:
+def test_ten_unchanged_objects_take_less_than_a_fifth_of_a_second(tmp_path: Path) -> None:
     mesh = _box()
     sources = [
-        ObjectSource(name=f"box_{i}", mesh=mesh, mass=0.1, contact="pieces") for i in range(50)
+        ObjectSource(name=f"box_{i}", mesh=mesh, mass=0.1, contact="pieces") for i in range(10)
     ]
     build(sources, tmp_path / "lib")
     start = time.process_time()
-    assert len(build(sources, tmp_path / "lib").cached) == 50
-    assert time.process_time() - start < 1.0
+    assert len(build(sources, tmp_path / "lib").cached) == 10
+    assert time.process_time() - start < 0.2
 
 
 def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> None:

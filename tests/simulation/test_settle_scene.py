@@ -69,8 +69,7 @@ def test_a_heap_of_household_objects(tmp_path) -> None:
     instances = (
         placed("bowl", "bowl", 0.3, 0.2, 0.0),
         placed("banana", "banana", 0.3, 0.2, 0.12),
-        placed("can", "can", 0.31, 0.2, 0.25, rpy_deg=(30.0, 10.0, 0.0)),
-        placed("screwdriver", "screwdriver", 0.3, 0.2, 0.42),
+        placed("screwdriver", "screwdriver", 0.3, 0.2, 0.3),
     )
     document = SceneDocument(name="heap", library="household", instances=instances)
     heap = Scene(document, library, tmp_path / "heap.yaml")
