@@ -23,6 +23,8 @@ MOVED = "moved_"
 """Columns of displacements begin with this; the instance's name follows."""
 PUSHED = "pushed_"
 """Likewise of those before the arm's hand closes."""
+LARGEST = 1e6
+"""Of mass [kg] and friction; what is beyond cannot be simulated."""
 NEEDED = ("id", "instance", "outcome", "stage", "X_OG", "engine", *ORIGIN_TEXT)
 """Columns without which a row cannot be executed again."""
 
@@ -126,9 +128,9 @@ def read_trial(row: Mapping[str, Any], where: str) -> Trial:
         instance=row["instance"],
         object=row.get("object", ""),
         X_OG=pose_from_text(row["X_OG"], where),
-        width=float(row.get("width", math.nan)),
-        friction=_given(row, "friction"),
-        mass=_given(row, "mass"),
+        width=_number(row, "width", where),
+        friction=_given(row, "friction", where),
+        mass=_given(row, "mass", where),
         verdict=verdict,
     )
 
@@ -148,6 +150,20 @@ def _by_instance(row: Mapping[str, Any], prefix: str) -> dict[str, float]:
     return {name: value for name, value in cells.items() if math.isfinite(value)}
 
 
-def _given(row: Mapping[str, Any], name: str) -> float | None:
-    value = float(row.get(name, math.nan))
-    return None if math.isnan(value) else value
+def _given(row: Mapping[str, Any], name: str, where: str) -> float | None:
+    """A property of the object in place of the library's; None if the row tells none."""
+    value = _number(row, name, where)
+    if math.isnan(value):
+        return None
+    if value < 0.0 or value > LARGEST or (name == "mass" and value == 0.0):
+        raise InvalidInputError(f"{where}: {name} is {value:g}; it must be above 0, to {LARGEST:g}")
+    return value
+
+
+def _number(row: Mapping[str, Any], name: str, where: str) -> float:
+    """NaN where there is none."""
+    value = row.get(name, math.nan)
+    try:
+        return float(value)
+    except ValueError as error:
+        raise InvalidInputError(f"{where}: {name} is {quoted(value)}, not a number") from error

@@ -88,7 +88,9 @@ def test_what_cannot_be_read_is_said(column: str, text: str, message: str) -> No
         read_origin({**row(origin(ENGINES["standard"])), column: text}, "here")
 
 
-@pytest.mark.parametrize("trial", [{"poll": 0.0}, {"lift_time": -1.0}, {"hold_time": -0.5}])
+@pytest.mark.parametrize(
+    "trial", [{"poll": 0.0}, {"lift_time": -1.0}, {"hold_time": -0.5}, {"hold_time": 1e9}]
+)
 def test_settings_that_no_trial_can_have(trial: dict[str, float]) -> None:
     with pytest.raises(InvalidInputError, match=f"{next(iter(trial))} of a trial is"):
         dataclasses.replace(origin(CUSTOM), trial=trial).settings()

@@ -162,6 +162,16 @@ def test_a_row_of_an_arm_trial_gives_back_all_that_it_was(tmp_path: Path) -> Non
     write_table(tmp_path / "arm.csv", table)
     row = table_row(read_table(tmp_path / "arm.csv"), 0)
     back = read_trial(row, "here")
+    for name, bad, said in (
+        ("width", "wide", "here: width is 'wide', not a number"),
+        ("mass", -1.0, "here: mass is -1; it must be above 0"),
+        ("friction", 1e300, "here: friction is 1e\\+300; it must be"),
+        ("X_OG", "9" * 5000, "here: X_OG has 1 numbers"),
+        ("stage", "x" * 5000, "here: stage 'xxx"),
+    ):
+        with pytest.raises(InvalidInputError, match=said) as raised:
+            read_trial({**row, name: bad}, "here")
+        assert len(str(raised.value)) < 300
     assert read_origin(row, "here") == origin
     assert back.width == back.candidate.width == 0.1 / 3
     assert back.verdict is not None and back.verdict.touched == "panda_link5 vs box"
