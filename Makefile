@@ -3,8 +3,8 @@
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
-N ?= 200
-DEMO := runs/demo$(if $(filter-out 200,$(N)),_$(N))
+N ?= 100
+DEMO := runs/demo$(if $(filter-out 100,$(N)),_$(N))
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 .DEFAULT_GOAL := help
@@ -13,7 +13,7 @@ EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
-	@echo "  variables: PYTHON=python3.12 (interpreter of the set-up), N=200 (grasps per object of the demo)"
+	@echo "  variables: PYTHON=python3.12 (interpreter of the set-up), N=100 (grasps per object of the demo)"
 
 setup: $(STAMP)  ## create .venv with everything in it; system libraries too, where allowed
 

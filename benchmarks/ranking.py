@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     scene, station = burg.load_scene(arguments.scene), burg.load_station(arguments.station)
-    settings = SamplingSettings(clear=True)
+    settings = SamplingSettings()
     grasps = sample_grasps(scene, station, arguments.n, seed=arguments.seed, settings=settings)
     scored = scored_set(grasps, scene.library, station, scene)
     scores = {SAMPLER: grasps.score}

@@ -18,5 +18,5 @@ with tempfile.TemporaryDirectory() as folder:
         print(f"{(run.results['outcome'] == outcome).sum():4d} {outcome}")
     for id in run.best(3):
         row = run.row(id)
-        print(f"{id}: slip {1e3 * row['slip']:.2f} mm, held with {row['pad_force']:.1f} N")
+        print(f"{id}: {1e3 * row['clearance']:.1f} mm of room, held with {row['pad_force']:.1f} N")
     print(f"table: {run.table_path.name}, report: {run.report_path.name}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import burg_drake as burg
 
 scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
-settings = burg.SamplingSettings(clear=True, from_arm_side=True)
+settings = burg.SamplingSettings(from_arm_side=True)
 grasps = burg.sample_grasps(scene, station, 200, settings=settings, only=["mug", "box"])
 print(f"{len(grasps)} grasps at which the open hand is clear")
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
-from burg_drake import Plan, SamplingSettings, load_scene, load_station, plan, reach, sample_grasps
+from burg_drake import Plan, load_scene, load_station, plan, reach, sample_grasps
 
 scene, station = load_scene("tabletop_six"), load_station("panda_bin")
-settings = SamplingSettings(clear=True)
-grasps = sample_grasps(scene, station, 8, settings=settings, only=["bowl", "banana"])
+grasps = sample_grasps(scene, station, 8, only=["bowl", "banana"])
 
 judged = reach(scene, station, grasps)
 for outcome, count in Counter(judged.column("outcome").tolist()).most_common():

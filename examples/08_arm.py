@@ -12,7 +12,7 @@ from pydrake.trajectories import PiecewisePolynomial
 import burg_drake as burg
 
 scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
-settings = burg.SamplingSettings(clear=True, from_arm_side=True)
+settings = burg.SamplingSettings(from_arm_side=True)
 grasps = burg.sample_grasps(scene, station, 20, settings=settings, only=["box"])
 
 # Planned one after the other until the arm can execute one; Planner is for many.

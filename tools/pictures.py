@@ -116,7 +116,7 @@ def pages() -> None:
     """Writes the pictures of grasps, of a replay, of frames and of a reachability map."""
     with tempfile.TemporaryDirectory() as folder:
         grasps, page = f"{folder}/grasps.h5", Path(folder) / "page.html"
-        burg_drake(f"grasps sample tabletop_six -n 30 --clear --diverse 8 -o {grasps}".split())
+        burg_drake(f"grasps sample tabletop_six -n 30 --diverse 8 -o {grasps}".split())
         run = f"{folder}/run"
         burg_drake(f"evaluate tabletop_six --grasps {grasps} --quiet -o {run}".split())
         best = load_run(run).best()[0]

@@ -14,13 +14,11 @@ from burg_drake.apps.arguments import (
     add_scene,
     add_station,
     add_verb,
-    approach_angle,
-    positive_int,
-    seed,
     workers,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
+from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, require_sampled
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
@@ -41,6 +39,7 @@ def add_to(verbs: Any) -> None:
         "judge grasps of a scene on a station: clear, reachable, planned, executed",
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
+        "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
@@ -57,28 +56,13 @@ def add_to(verbs: Any) -> None:
         help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE)",
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--grasps-per-object",
-        metavar="N",
-        type=positive_int,
-        help=f"grasps sampled for each object (default: {DEFAULT_GRASPS})",
-    )
+    add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
-    parser.add_argument(
-        "--approach-angle",
-        metavar="DEG",
-        type=approach_angle,
-        default=DEFAULT_APPROACH_ANGLE,
-        help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
-    )
     parser.add_argument(
         "--engine",
         choices=ENGINE_NAMES,
         default=DEFAULT_ENGINE,
         help="how time is stepped: for truth, for results, for a first look (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
     )
     parser.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
@@ -111,6 +95,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     from burg_drake.station.station import load_station
 
     require_file(arguments)
+    require_sampled(arguments)
     scene = load_scene(arguments.scene)
     station = load_station(arguments.station)
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
@@ -124,8 +109,10 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         scene,
         station,
         arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-        grasps_per_object=arguments.grasps_per_object or DEFAULT_GRASPS,
-        approach_angle_deg=arguments.approach_angle,
+        grasps_per_object=grasps_per_object(arguments),
+        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+        blind=arguments.blind,
+        only=arguments.only,
         grasps=given.by_instance if given else None,
         engine=arguments.engine,
         seed=arguments.seed,

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
-    DEFAULT_APPROACH_ANGLE,
     add_station,
     add_verb,
-    approach_angle,
     not_negative,
     number,
     positive,
     positive_int,
-    seed,
 )
 from burg_drake.apps.grasp_output import add_format, output_of
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.apps.sampling_options import (
+    add_replaced,
+    add_sampling,
+    grasps_per_object,
+    print_shortfalls,
+)
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
     from burg_drake.core.frames import Array
     from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.sampling_settings import SamplingSettings
-    from burg_drake.scene.scene import Scene
     from burg_drake.station.station import Station
 
 DEFAULT_GRASPS = 1000
@@ -42,23 +43,17 @@ def add_to(group: Any) -> None:
         run_sample,
         "sample antipodal grasps on the objects of a scene or a library",
         "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
-        "burg-drake grasps sample tabletop_six --instance mug --clear --from-arm-side -o mug.h5",
-        "burg-drake grasps sample household --object mug -n 500 --diverse 4 -o mug.npz",
+        "burg-drake grasps sample tabletop_six --only mug --from-arm-side -o mug.h5",
+        "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
         "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
         "",
         "The grasps of an object follow from --seed and the object, whatever else there is;",
-        "`evaluate` samples the same ones with the same settings.",
+        "`evaluate` and `reach` sample the same ones with the same settings.",
     )
     parser.add_argument(
         "source", metavar="SCENE|LIB", help="scene file or library folder, or a built-in name"
     )
-    parser.add_argument(
-        "-n",
-        metavar="N",
-        type=positive_int,
-        default=DEFAULT_GRASPS,
-        help="grasps for each instance, or object of a library (default: %(default)s)",
-    )
+    add_sampling(parser, DEFAULT_GRASPS)
     parser.add_argument(
         "-o",
         "--output",
@@ -67,18 +62,11 @@ def add_to(group: Any) -> None:
         help="grasp file to write, such as .h5, or folder for one file an object",
     )
     add_format(parser)
-    for name, what in (("object", "this object"), ("instance", "this instance of the scene")):
-        parser.add_argument(
-            f"--{name}",
-            metavar="NAME",
-            action="append",
-            help=f"only {what}; may be given several times",
-        )
     add_station(parser)
     _add_settings(parser)
-    parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
-    )
+    add_replaced(parser, "--clear", "grasps are clear of the scene unless you say --blind")
+    for option in ("--object", "--instance"):
+        add_replaced(parser, option, "choose objects and instances with --only")
 
 
 def _add_settings(parser: argparse.ArgumentParser) -> None:
@@ -91,13 +79,6 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
         type=positive_int,
         default=1,
         help="approach angles for each pair of contacts (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--approach-angle",
-        metavar="DEG",
-        type=approach_angle,
-        help="in a scene, largest angle between approach and straight down"
-        f" (default: {DEFAULT_APPROACH_ANGLE:g}; 180: any)",
     )
     parser.add_argument(
         "--from-arm-side",
@@ -121,21 +102,16 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
         help="density of contacts on each face of an object's surface; may be given several times",
     )
     parser.add_argument(
-        "--clear",
-        action="store_true",
-        help="only grasps at which the open hand overlaps neither the object nor the scene",
-    )
-    parser.add_argument(
         "--margin-mm",
         metavar="MM",
         type=not_negative,
         default=0.0,
-        help="with --clear, only grasps that have this clearance (default: %(default)g)",
+        help="only grasps with this clearance of the open hand (default: %(default)g)",
     )
     parser.add_argument(
         "--conservative",
         action="store_true",
-        help="with --clear, test faster, which leaves out a tenth of the clear grasps, too",
+        help="test clearance faster, which leaves out a tenth of the clear grasps, too",
     )
     parser.add_argument(
         "--diverse",
@@ -156,8 +132,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
 
     output = output_of(arguments.output, arguments.target, frame="object")
     source = open_source(arguments.source)
-    names = _chosen(arguments, source)
-    output.require_fits(_objects(source, names))
+    output.require_fits(_objects(arguments.only, source))
     station = load_station(arguments.station)
     settings = SamplingSettings(
         friction=arguments.friction,
@@ -166,60 +141,46 @@ def run_sample(arguments: argparse.Namespace) -> int:
         from_arm_side=arguments.from_arm_side,
         standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
         weights={name: _load_weights(path) for name, path in arguments.weights},
-        clear=arguments.clear,
+        blind=arguments.blind,
         margin=1e-3 * arguments.margin_mm,
         conservative=arguments.conservative,
         diverse=arguments.diverse,
     )
-    sampled, seconds = _sample(arguments, source, names, station, settings)
+    asked = grasps_per_object(arguments)
+    sampled, seconds = _sample(arguments, source, asked, station, settings)
     grasps = sampled_set(
-        sampled, source.library, source.scene, station, arguments.n, arguments.seed, settings
+        sampled, source.library, source.scene, station, asked, arguments.seed, settings
     )
-    sampled_table(sampled, seconds, arguments.n).show()
+    sampled_table(sampled, seconds, asked).show()
+    print_shortfalls(sampled, asked)
     output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
-    few = [name for name, found in sampled.items() if len(found) < arguments.n]
-    if few:
-        print(
-            f"burg-drake: fewer than asked, as there are hardly any more: {', '.join(few)}",
-            file=sys.stderr,
-        )
     return 0 if len(grasps) else 1
 
 
-def _chosen(arguments: argparse.Namespace, source: Source) -> list[str]:
-    """Names of the instances, or of the objects of a library, that are to be sampled on."""
-    if source.scene is not None:
-        return _instances(source.scene, arguments.instance, arguments.object)
-    if arguments.instance:
-        raise InvalidInputError(
-            f"{arguments.source} is a library, which has no instances; choose with --object"
-        )
-    return arguments.object or list(source.library.objects)
+def _objects(only: list[str] | None, source: Source) -> list[str]:
+    """The objects that are to be sampled on, as far as there are such."""
+    from burg_drake.evaluation.instance_names import chosen_instances
 
-
-def _objects(source: Source, names: list[str]) -> list[str]:
-    """The objects behind the names, as far as there are such names."""
     if source.scene is None:
-        return names
-    instances = source.scene.instances
-    return [instances[name].object for name in names if name in instances]
+        return only or list(source.library.objects)
+    return [source.scene.instance(name).object for name in chosen_instances(source.scene, only)]
 
 
 def _sample(
     arguments: argparse.Namespace,
     source: Source,
-    names: list[str],
+    n: int,
     station: Station,
     settings: SamplingSettings,
 ) -> tuple[dict[str, GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
     from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
 
-    n, seed = arguments.n, arguments.seed
+    seed, only = arguments.seed, arguments.only
     if source.scene is None:
-        stream = sample_library(source.library, station, n, seed, settings, names)
+        stream = sample_library(source.library, station, n, seed, settings, only)
     else:
-        stream = sample_scene(source.scene, station, n, seed, settings, names)
+        stream = sample_scene(source.scene, station, n, seed, settings, only)
     sampled, seconds = {}, {}
     start = time.perf_counter()
     for name, grasps in stream:
@@ -228,20 +189,6 @@ def _sample(
     if not sampled:
         raise InvalidInputError(f"{arguments.source} has no free objects; nothing to sample on")
     return sampled, seconds
-
-
-def _instances(scene: Scene, instances: list[str] | None, objects: list[str] | None) -> list[str]:
-    """Names of the free instances that are chosen by their own names or by those of objects."""
-    known = {name: instance.object for name, instance in scene.instances.items()}
-    for object in objects or ():
-        if object not in known.values():
-            raise UnknownNameError(
-                f"scene {scene.name!r} has no free object {object!r};"
-                f" {nearest(object, set(known.values()))}"
-            )
-    if instances is None and objects is None:
-        return list(known)
-    return [*(instances or ()), *(name for name in known if known[name] in (objects or ()))]
 
 
 def _load_weights(path: str) -> Array:

@@ -205,6 +205,7 @@ def _content(arguments: argparse.Namespace) -> Content:
 def _content_of_run(arguments: argparse.Namespace) -> Content:
     from burg_drake.evaluation.best_grasps import ranked_run
     from burg_drake.evaluation.run_grasps import run_grasps
+    from burg_drake.evaluation.run_notes import run_notes
     from burg_drake.evaluation.run_store import load_run
 
     run = load_run(arguments.file)
@@ -213,6 +214,8 @@ def _content_of_run(arguments: argparse.Namespace) -> Content:
             raise InvalidInputError(
                 f"--{option} is for grasp files; {run.path} is a run, which has its own"
             )
+    for note in run_notes(run):
+        print(f"note: {note}")
     scene = run.scene()
     source = Source(scene.library, scene)
     grasps = run_grasps(run)

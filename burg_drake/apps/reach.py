@@ -10,18 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
-    DEFAULT_APPROACH_ANGLE,
     add_quiet,
     add_scene,
     add_station,
     add_verb,
-    approach_angle,
-    positive_int,
-    seed,
     workers,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
+from burg_drake.apps.sampling_options import (
+    add_sampling,
+    grasps_per_object,
+    print_shortfalls,
+    require_sampled,
+)
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import require_writable
 from burg_drake.core.text_table import TextTable
@@ -59,13 +61,7 @@ def add_to(verbs: Any) -> None:
     )
     add_scene(parser)
     which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--grasps-per-object",
-        metavar="N",
-        type=positive_int,
-        help="grasps sampled for each object at which the open hand is clear"
-        f" (default: {DEFAULT_GRASPS})",
-    )
+    add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
     add_station(parser)
     parser.add_argument(
@@ -97,16 +93,6 @@ def add_to(verbs: Any) -> None:
         " about one or two grasps in a hundred, either way",
     )
     parser.add_argument(
-        "--approach-angle",
-        metavar="DEG",
-        type=approach_angle,
-        default=DEFAULT_APPROACH_ANGLE,
-        help="grasps sampled within this angle of straight down (default: %(default)g; 180: any)",
-    )
-    parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
-    )
-    parser.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
     add_quiet(parser)
@@ -122,6 +108,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.station.station import load_station
 
     require_file(arguments)
+    require_sampled(arguments)
     if arguments.plan_format and not arguments.plans:
         raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
     if arguments.only_reachable and arguments.output is None:
@@ -174,17 +161,29 @@ def _grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> Mapping[str, GraspSet]:
     """The grasps of the file, or sampled ones, by instance."""
+    from burg_drake.evaluation.instance_names import chosen_instances
+
     if arguments.grasps is not None:
         given = read_given(arguments, scene, station)
         for note in given.notes:
             print(f"note: {note}")
-        return given.by_instance
+        chosen = chosen_instances(scene, arguments.only)
+        return {name: grasps for name, grasps in given.by_instance.items() if name in chosen}
+    return sampled_grasps(arguments, scene, station)
+
+
+def sampled_grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> dict[str, GraspSet]:
+    """Grasps by instance as the options ask for them; says what is missing."""
     from burg_drake.evaluation.candidate_sampling import sample_scene
     from burg_drake.evaluation.sampling_settings import SamplingSettings
 
-    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, clear=True)
-    count = arguments.grasps_per_object or DEFAULT_GRASPS
-    return dict(sample_scene(scene, station, count, arguments.seed, settings))
+    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
+    count, seed = grasps_per_object(arguments), arguments.seed
+    sampled = dict(sample_scene(scene, station, count, seed, settings, arguments.only))
+    print_shortfalls(sampled, count)
+    return sampled
 
 
 def _output(arguments: argparse.Namespace) -> Path | Output | None:

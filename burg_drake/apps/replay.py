@@ -56,8 +56,15 @@ def add_to(verbs: Any) -> None:
     which.add_argument(
         "--best",
         action="store_true",
-        help="the lifted grasp that slipped, tilted and pushed others least, to 0.1 mm and 0.1 deg;"
-        " of equal ones that with the largest contact patch",
+        help="the lifted grasp with the most room around the open hand, which most likely lifts"
+        " again when things are not quite where they should be; of equal ones (to 0.5 mm) that"
+        " which slipped, tilted and pushed others least",
+    )
+    parser.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help="with --best, of this object or instance; may be given several times",
     )
     parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
     parser.add_argument("--station", metavar="FILE", help="where its station is now")
@@ -75,6 +82,8 @@ def run_replay(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation.rerun import arm_figures, as_result, comparison, differences
     from burg_drake.visualization.replay import describe
 
+    if arguments.only and not arguments.best:
+        raise InvalidInputError("--only is about the best grasp; add --best")
     path = Path(arguments.results)
     is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
     if path.is_file() and not is_table:
@@ -185,7 +194,7 @@ def _choose(columns: Columns, path: Path, arguments: argparse.Namespace) -> int:
             )
         return rows[0]
     if arguments.best:
-        best = best_rows(columns)
+        best = best_rows(columns, only=arguments.only)
         if not best:
             raise InvalidInputError(
                 f"{path}: no grasp was lifted; choose one with --grasp ID or --row N"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_quiet, add_verb, not_negative, positive_int, seed, workers
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
+from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.probes import RobustnessSettings
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 # Kept in step with evaluation.probes and evaluation.robustness, which import too much for a help
 # text; a test compares them.
 TESTS = ("tug", "shake", "friction", "noise")
-DEFAULT_BEST = 20
+DEFAULT_BEST = 3
 
 
 def add_to(verbs: Any) -> None:
@@ -27,7 +28,7 @@ def add_to(verbs: Any) -> None:
         run_robustness,
         "test how robust the lifted grasps of a run are: tug, shake, friction, noise",
         "burg-drake robustness runs/first",
-        "burg-drake robustness runs/first --best 5 --tests tug,noise --repeats 50",
+        "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
         "",
         "The same command goes on where an interrupted one stopped. The table keeps what earlier",
@@ -47,7 +48,14 @@ def add_to(verbs: Any) -> None:
         metavar="N",
         type=positive_int,
         default=DEFAULT_BEST,
-        help="the N best lifted grasps, as `replay --best` ranks them (default: %(default)s)",
+        help="the N best lifted grasps of each object: those with the most room around the open"
+        " hand, as `replay --best` ranks them (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help="the best ones of this object or instance alone; may be given several times",
     )
     parser.add_argument(
         "--tests",
@@ -100,12 +108,15 @@ def run_robustness(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation.robustness_table import robustness_view
     from burg_drake.evaluation.run_store import load_run
 
+    if arguments.only and arguments.grasp:
+        raise InvalidInputError("--only is about the best grasps; leave it or --grasp away")
     run = load_run(arguments.run_folder)
     settings = _settings(arguments, run.document.seed)
     found = assess_robustness(
         run,
         grasps=arguments.grasp,
         best=arguments.best,
+        only=arguments.only,
         settings=settings,
         out=arguments.output,
         workers=arguments.workers,

@@ -7,11 +7,11 @@ settings.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.core.content import rng_from
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
@@ -19,6 +19,7 @@ from burg_drake.core.frames import Array, transform_points
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.approach_limits import from_above, from_arm_side
 from burg_drake.evaluation.candidates import Candidates, distinct, join_candidates
+from burg_drake.evaluation.instance_names import chosen_instances
 from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
 from burg_drake.grasping.approach import ApproachCone
 from burg_drake.objects.library import ObjectLibrary
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from burg_drake.grasping.antipodal import Accept
-    from burg_drake.grasping.clearance import HandClearance, Mode
+    from burg_drake.grasping.clearance import HandClearance
 
 
 def sample_candidates(
@@ -37,23 +38,12 @@ def sample_candidates(
     station: Station,
     n: int,
     seed: int,
-    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
+    settings: SamplingSettings | None = None,
+    only: Iterable[str] | None = None,
 ) -> Candidates:
-    """Samples antipodal grasps on every free instance.
-
-    Args:
-        scene: the scene; its background objects get no grasps.
-        station: gives the opening of the hand.
-        n: grasps for each instance; there are fewer where the object has no more.
-        seed: of the run.
-        approach_angle_deg: see `SamplingSettings`.
-
-    Raises:
-        InvalidInputError: n is below 1, or the angle out of its range.
-        UnknownNameError: the mesh file of an object is missing.
-    """
-    settings = SamplingSettings(approach_angle_deg=approach_angle_deg)
-    return join_candidates(dict(sample_scene(scene, station, n, seed, settings)))
+    """Samples antipodal grasps as candidates of a run; see `sample_scene`."""
+    stream = sample_scene(scene, station, n, seed, settings or SamplingSettings(), only)
+    return join_candidates(dict(stream))
 
 
 def sample_scene(
@@ -62,20 +52,21 @@ def sample_scene(
     n: int,
     seed: int,
     settings: SamplingSettings,
-    instances: Iterable[str] | None = None,
+    only: Iterable[str] | None = None,
 ) -> Iterator[tuple[str, GraspSet]]:
     """Samples grasps on the instances of a scene, one after the other.
 
     All instances of an object get the same grasps that lie on the same side and have the same
-    limits, unless grasps have to be clear.
+    limits, if they are sampled blind.
 
     Args:
         scene: the scene.
         station: gives the opening of the hand, its body, and the place of the arm.
-        n: grasps for each instance; there are fewer where there are no more.
+        n: grasps for each instance; there are fewer where there are (almost) no more, and
+            `shortfall.shortfall` says why.
         seed: of the random numbers.
         settings: how.
-        instances: names of free instances; all if None.
+        only: names of free instances, or of objects for all their instances; all if None.
 
     Returns:
         Names and grasps, in the frames of the objects.
@@ -85,7 +76,7 @@ def sample_scene(
         UnknownNameError: no such instance or object, or a mesh file is missing.
     """
     _check_count(n)
-    names = _known(instances, scene.instances, f"scene {scene.name!r} has no free instance")
+    names = chosen_instances(scene, only)
     objects = {instance.object for instance in scene.instances.values()}
     _known(settings.weights, objects, "weights: the scene has no object")
     return _sampled_scene(scene, station, n, seed, settings, names)
@@ -100,13 +91,13 @@ def _sampled_scene(
     names: tuple[str, ...],
 ) -> Iterator[tuple[str, GraspSet]]:
     draw = _Sampler(scene.library, station, n, seed, settings)
-    screen = _scene_screen(scene, station) if settings.clear else None
+    screen = None if settings.blind else _scene_screen(scene, station)
     found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
     for name in names:
         object, X_WO = scene.instance(name).object, _X_WO(scene, station, name)
         cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
         if screen is not None:
-            yield name, draw(object, cones, _clear(screen, name, X_WO, settings))
+            yield name, draw.clear(object, cones, screen, name, X_WO)
         else:
             if (object, cones) not in found:
                 found[object, cones] = draw(object, cones)
@@ -161,11 +152,11 @@ def _sampled_library(
 
     draw = _Sampler(library, station, n, seed, settings)
     for name in names:
-        accept = None
-        if settings.clear:
+        if settings.blind:
+            yield name, draw(name, ())
+        else:
             screen = hand_clearance_alone(library, name, station)
-            accept = _clear(screen, name, np.eye(4), settings)
-        yield name, draw(name, (), accept)
+            yield name, draw.clear(name, (), screen, name, np.eye(4))
 
 
 class _Sampler:
@@ -179,7 +170,7 @@ class _Sampler:
         seed: int,
         settings: SamplingSettings,
     ) -> None:
-        self._library, self._opening = library, station.hand.opening
+        self._library, self._station = library, station
         self._n, self._seed, self._settings = n, seed, settings
         self._pad = _pad(station)
         self._surfaces: dict[str, trimesh.Trimesh] = {}
@@ -202,8 +193,8 @@ class _Sampler:
                 self.surface(object),
                 self._n,
                 rng_from("antipodal", self._seed, entry.build),
-                friction=entry.friction if settings.friction is None else settings.friction,
-                opening=self._opening,
+                friction=self._friction(object),
+                opening=self._station.hand.opening,
                 approaches=settings.approaches,
                 approach_cone=cones,
                 standoffs=settings.standoffs,
@@ -214,6 +205,31 @@ class _Sampler:
                 object=object,
             )
         )
+
+    def clear(
+        self,
+        object: str,
+        cones: tuple[ApproachCone, ...],
+        screen: HandClearance,
+        name: str,
+        X_WO: Array,
+    ) -> GraspSet:
+        """Grasps of an object, by this name and at this place (4, 4) in the screen, that the hand
+        can take; their provenance counts what `blocked` the others."""
+        from burg_drake.evaluation.clear_test import ClearTest
+        from burg_drake.grasping.jaws import jaws_of
+        from burg_drake.grasping.surface import Surface
+
+        surface, friction = Surface.of(self.surface(object)), self._friction(object)
+        jaws = jaws_of(self._station.hand, self._station.hand_model)
+        test = ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
+        grasps = self(object, cones, test)
+        provenance = {**grasps.provenance, "target": name, "blocked": dict(test.blocked)}
+        return dataclasses.replace(grasps, provenance=provenance)
+
+    def _friction(self, object: str) -> float:
+        given = self._settings.friction
+        return self._library.entry(object).friction if given is None else given
 
 
 def _check_count(n: int) -> None:
@@ -264,13 +280,3 @@ def _scene_screen(scene: Scene, station: Station) -> HandClearance:
     from burg_drake.station.diagram import build_station_diagram
 
     return HandClearance(build_station_diagram(scene, station, robot="hand"))
-
-
-def _clear(screen: HandClearance, instance: str, X_WO: Array, settings: SamplingSettings) -> Accept:
-    """Keeps the grasps at which the open hand is clear."""
-    mode: Mode = "conservative" if settings.conservative else "exact"
-
-    def accept(X_OG: Array) -> NDArray[np.bool_]:
-        return screen.measure(instance, X_WO @ X_OG, mode=mode, margin=settings.margin).clear
-
-    return accept

@@ -11,7 +11,7 @@ import shlex
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -25,9 +25,10 @@ from burg_drake.core.progress import Listener, Pace, Progress, Reporter
 from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
-from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG, sample_candidates
+from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
+from burg_drake.evaluation.instance_names import chosen_instances
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.report import write_report
@@ -53,6 +54,7 @@ from burg_drake.evaluation.run_store import (
     save_run,
     write_copies,
 )
+from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
 from burg_drake.evaluation.screens import arm_settings
 from burg_drake.evaluation.station_judge import StationJudgeFactory
 from burg_drake.evaluation.table_file import require_writer, write_table
@@ -68,6 +70,8 @@ def evaluate(
     *,
     grasps_per_object: int = 100,
     approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
+    blind: bool = False,
+    only: Iterable[str] | None = None,
     grasps: GraspSet | Mapping[str, GraspSet] | None = None,
     engine: Engine | str = ENGINES["standard"],
     seed: int = 0,
@@ -88,9 +92,15 @@ def evaluate(
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
         out: folder of the run; made if need be.
-        grasps_per_object: antipodal grasps to sample for each free instance.
+        grasps_per_object: antipodal grasps to sample for each free instance; the same ones as
+            those of `sample_grasps` with these settings. Of an object that has fewer,
+            `Summary.notes` says why.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
             above 0; 90 is as far as from the side, 180 from anywhere.
+        blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
+            see `SamplingSettings`.
+        only: names of free instances, or of objects for all their instances, to judge grasps of;
+            all if None.
         grasps: the user's own grasps in the object frame; nothing is sampled then. A set goes to
             the instances that its column `instance` names, or else to all instances of its objects;
             a mapping has sets by instance, such as those of `read_grasps`.
@@ -121,6 +131,10 @@ def evaluate(
     station = station if isinstance(station, Station) else load_station(station)
     mode = mode_for(station, mode)
     engine = engine if isinstance(engine, Engine) else engine_preset(engine)
+    chosen = chosen_instances(scene, only)
+    if grasps is not None:
+        grasps = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+        grasps = grasps if only is None else {k: v for k, v in grasps.items() if k in chosen}
     workers = default_workers() if workers is None else workers
     if workers < 1:
         raise InvalidInputError(f"workers is {workers}; give 1 or more")
@@ -134,7 +148,12 @@ def evaluate(
     if grasps is None:
         angle = float(approach_angle_deg)
         asked = replace(
-            asked, origin="sampled", per_object=grasps_per_object, approach_angle_deg=angle
+            asked,
+            origin="sampled",
+            per_object=grasps_per_object,
+            approach_angle_deg=angle,
+            blind=blind,
+            only=() if chosen == tuple(scene.instances) else chosen,
         )
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = _open(
@@ -192,15 +211,14 @@ def _open(
     folder: Path,
     scene: Scene,
     station: Station,
-    grasps: GraspSet | Mapping[str, GraspSet] | None,
+    grasps: Mapping[str, GraspSet] | None,
     document: RunDocument,
     reporter: Reporter,
 ) -> Run:
     """Goes on with the run in the folder, or begins a new one there."""
     candidates: Candidates | None = None
     if grasps is not None:
-        given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
-        candidates = given_candidates(scene, given)
+        candidates = given_candidates(scene, grasps)
         document = _with_grasps(document, scene, candidates, 0.0)
     if (folder / RUN_FILE).exists():
         run = load_run(folder)
@@ -210,9 +228,12 @@ def _open(
     if candidates is None:
         reporter.show(Progress("sampling"))
         start = time.process_time()
-        n, angle = document.grasps.per_object, document.grasps.approach_angle_deg
-        assert n is not None and angle is not None
-        candidates = sample_candidates(scene, station, n, document.seed, angle)
+        asked = document.grasps
+        assert asked.per_object is not None
+        settings = SamplingSettings(approach_angle_deg=asked.approach_angle_deg, blind=asked.blind)
+        candidates = sample_candidates(
+            scene, station, asked.per_object, document.seed, settings, asked.only or None
+        )
         cpu = time.process_time() - start
         document = _with_grasps(document, scene, candidates, cpu)
     document = replace(document, hash=run_hash(document))
@@ -222,7 +243,8 @@ def _open(
 def _with_grasps(
     document: RunDocument, scene: Scene, candidates: Candidates, cpu: float
 ) -> RunDocument:
-    counts = Counter({scene.instance(name).object: 0 for name in scene.instances})
+    names = document.grasps.only or scene.instances
+    counts = Counter({scene.instance(name).object: 0 for name in names})
     counts.update(scene.instance(name).object for name in candidates.instance.tolist())
     return replace(
         document,

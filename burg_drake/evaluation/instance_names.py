@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
@@ -78,12 +78,33 @@ class InstanceNames:
         Raises:
             UnknownNameError: there are none.
         """
-        instances = self.scene.instances
-        found = [key for key, instance in instances.items() if instance.object == name]
-        found = found or [key for key in instances if key == name]
-        if not found:
-            known = {*instances, *(instance.object for instance in instances.values())}
-            raise UnknownNameError(
-                f"scene {self.scene.name!r} has no free object {name!r}; {nearest(name, known)}"
-            )
-        return found
+        return instances_called(self.scene, name)
+
+
+def instances_called(scene: Scene, name: str) -> list[str]:
+    """All free instances of an object, or else the one of that name.
+
+    Raises:
+        UnknownNameError: there are none.
+    """
+    instances = scene.instances
+    found = [key for key, instance in instances.items() if instance.object == name]
+    found = found or [key for key in instances if key == name]
+    if not found:
+        known = {*instances, *(instance.object for instance in instances.values())}
+        raise UnknownNameError(
+            f"scene {scene.name!r} has no free object {name!r}; {nearest(name, known)}"
+        )
+    return found
+
+
+def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...]:
+    """The free instances that some names stand for, in the order of the scene; all if there are no
+    names.
+
+    Raises:
+        UnknownNameError: a name stands for none.
+    """
+    names = list(only or scene.instances)
+    chosen = {key for name in names for key in instances_called(scene, name)}
+    return tuple(key for key in scene.instances if key in chosen)

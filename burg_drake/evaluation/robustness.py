@@ -7,7 +7,7 @@ answers known about the grasps of the last call, those of earlier calls with equ
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,8 +34,8 @@ from burg_drake.evaluation.run_store import JOURNAL_FILE, RUN_FILE, Run, load_ru
 from burg_drake.evaluation.table_file import require_writer, write_table
 
 TABLE_FILE = "robustness.csv"
-DEFAULT_BEST = 20
-"""So many of the best grasps are asked about if none are named."""
+DEFAULT_BEST = 3
+"""So many of the best grasps of each object are asked about if none are named."""
 COST = {"tug": 40.0, "shake": 50.0, "friction": 30.0, "noise": 2.0}
 """CPU time of tests in units of the grasp's own trial, measured on the built-in scene."""
 
@@ -62,6 +62,7 @@ def assess_robustness(
     *,
     grasps: Sequence[str] | None = None,
     best: int = DEFAULT_BEST,
+    only: Iterable[str] | None = None,
     settings: RobustnessSettings | None = None,
     out: str | Path | None = None,
     workers: int | None = None,
@@ -73,7 +74,8 @@ def assess_robustness(
     Args:
         run: the run, or its folder.
         grasps: ids; the best ones of the run if None.
-        best: how many of those at most.
+        best: how many of those of each object at most; see `best_rows`.
+        only: names of the objects or instances whose best grasps are meant; all if None.
         settings: what is asked; all tests with their defaults if None.
         out: the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The journal
             is the file of the same name with the suffix .jsonl.
@@ -83,7 +85,7 @@ def assess_robustness(
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Raises:
-        UnknownNameError: a grasp is not in the run.
+        UnknownNameError: a grasp, object or instance is not in the run.
         InvalidInputError: a grasp was not lifted, the scene has changed since the run, or the table
             cannot be written.
         SimulationError: the simulation of the scene cannot be built.
@@ -94,7 +96,7 @@ def assess_robustness(
     require_writer(table.suffix.removeprefix("."))
     journal_path = table.with_suffix(".jsonl")
     _require_other_files(run, table, journal_path)
-    chosen = _choose(run, grasps, best)
+    chosen = _choose(run, grasps, best, only)
     factory = ProbeJudgeFactory(
         run.scene(),
         run.station(),
@@ -133,9 +135,11 @@ def _require_other_files(run: Run, *written: Path) -> None:
             raise InvalidInputError(f"{path} belongs to the run itself; choose another -o")
 
 
-def _choose(run: Run, ids: Sequence[str] | None, best: int) -> list[Candidate]:
+def _choose(
+    run: Run, ids: Sequence[str] | None, best: int, only: Iterable[str] | None
+) -> list[Candidate]:
     if ids is None:
-        ids = run.best(best)
+        ids = run.best(best, each=True, only=only)
         if not ids:
             raise InvalidInputError(f"{run.path}: no grasp was lifted; there is nothing to test")
     chosen = {id: run.candidate(id) for id in ids}

@@ -62,6 +62,9 @@ class Grasps:
         origin: sampled here, or given by the user.
         per_object: how many were asked for, if sampled.
         approach_angle_deg: largest angle between their approach and straight down, if sampled.
+        blind: whether they were sampled without regard to the hand, as they were in runs that do
+            not say.
+        only: instances that grasps were sampled on; all if empty.
         count: how many there are.
         objects: how many there are by object; 0 where an object has none.
         content: hash of them all.
@@ -71,6 +74,8 @@ class Grasps:
     origin: Literal["sampled", "given"]
     per_object: int | None = None
     approach_angle_deg: float | None = None
+    blind: bool = True
+    only: tuple[str, ...] = ()
     count: int
     objects: dict[str, int]
     content: str
@@ -156,15 +161,19 @@ def identity(document: RunDocument) -> dict[str, str]:
         "settings of engine, trial and arm": settings,
         "mode": document.mode,
         "grasps": (
-            f"{grasps.per_object} an object"
-            if sampled
-            else f"given, content {grasps.content[:HASH_DIGITS]}"
+            _sampled(grasps) if sampled else f"given, content {grasps.content[:HASH_DIGITS]}"
         ),
         **approach,
         "seed": str(document.seed),
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),
     }
+
+
+def _sampled(grasps: Grasps) -> str:
+    how = "sampled blind" if grasps.blind else "clear of the scene"
+    where = f", on {', '.join(grasps.only)}" if grasps.only else ""
+    return f"{grasps.per_object} an object, {how}{where}"
 
 
 def run_hash(document: RunDocument) -> str:

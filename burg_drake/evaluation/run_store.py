@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -146,9 +147,21 @@ class Run:
             verdict=verdict,
         )
 
-    def best(self, count: int = 1) -> list[str]:
-        """Ids of the lifted grasps that disturbed least, best first; see `best_rows`."""
-        return [str(self.results["id"][row]) for row in best_rows(self.results, count)]
+    def best(
+        self, count: int = 1, *, each: bool = False, only: Iterable[str] | None = None
+    ) -> list[str]:
+        """Ids of the lifted grasps that can be trusted most, best first; see `best_rows`.
+
+        Args:
+            count: how many.
+            each: so many of each object.
+            only: names of objects or instances; others are left out.
+
+        Raises:
+            UnknownNameError: there are no grasps of such an object or instance.
+        """
+        rows = best_rows(self.results, count, each=each, only=only)
+        return [str(self.results["id"][row]) for row in rows]
 
     def scene(self) -> Scene:
         """The scene as it was judged.

@@ -37,7 +37,7 @@ def sample_grasps(
         seed: of the random numbers. The grasps of an object follow from it and the object,
             whatever else there is.
         settings: how; the defaults if None.
-        only: names of instances of the scene, or of objects of the library; all if None.
+        only: names of objects, or of instances of the scene; all if None.
 
     Returns:
         The grasps in the frames of their objects, in a scene with the column `instance`.

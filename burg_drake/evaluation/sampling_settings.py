@@ -28,10 +28,12 @@ class SamplingSettings:
             is not negative.
         standoffs: distances between G and the contacts that every pose is given with [m].
         weights: density of contacts on the faces (F,) of `ObjectLibrary.surface`, by object.
-        clear: only grasps at which the open hand overlaps nothing: in a scene neither the object
-            nor anything else, in a library not the object.
-        margin: with `clear`, least signed clearance that a grasp has to have [m].
-        conservative: with `clear`, the screen's mode of that name: faster, but it leaves out a
+        blind: know only points of contact, not the hand, as published samplers do. Otherwise the
+            open hand overlaps nothing at the grasps, in a scene neither the object nor anything
+            else, in a library not the object; and its pads, all that they meet of the object,
+            touch it within the friction cones.
+        margin: unless `blind`, least signed clearance that a grasp has to have [m].
+        conservative: unless `blind`, the screen's mode of that name: faster, but it leaves out a
             tenth of the clear grasps.
         diverse: of this many times n grasps the most diverse n are kept.
     """
@@ -42,7 +44,7 @@ class SamplingSettings:
     from_arm_side: bool = False
     standoffs: tuple[float, ...] = (0.0,)
     weights: Mapping[str, Array] = field(default_factory=dict)
-    clear: bool = False
+    blind: bool = False
     margin: float = 0.0
     conservative: bool = False
     diverse: int = 1
@@ -55,7 +57,7 @@ class SamplingSettings:
             )
         if not 0.0 <= self.margin < math.inf:
             raise InvalidInputError(f"margin is {self.margin} m; give a clearance of 0 or more")
-        if (self.margin or self.conservative) and not self.clear:
+        if (self.margin or self.conservative) and self.blind:
             raise InvalidInputError(
-                "margin and conservative are about clear grasps; ask for these, too (--clear)"
+                "margin and conservative are about the hand, which blind sampling does not know"
             )

@@ -11,6 +11,7 @@ import numpy as np
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.mode import Mode
+from burg_drake.evaluation.run_notes import run_notes
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 from burg_drake.evaluation.trial import PUSHED
@@ -155,6 +156,7 @@ class Summary:
         costs: by stage, sampling first.
         mode: what was asked about each grasp.
         pushes: what the arm's approaches pushed; None where no arm executed anything.
+        notes: what is missing, and why, one sentence each; see `run_notes`.
     """
 
     objects: tuple[Group, ...]
@@ -162,6 +164,7 @@ class Summary:
     costs: tuple[StageCost, ...]
     mode: Mode
     pushes: Pushes | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def steps(self) -> list[str]:
@@ -183,6 +186,7 @@ def summarize(run: Run) -> Summary:
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(columns),
+        notes=run_notes(run),
     )
 
 

@@ -24,10 +24,14 @@ class SummaryView:
     summary: Summary
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.text import Text
+
         matrix = _outcome_matrix(self.summary)
         fits = matrix.width <= options.max_width
         yield _stage_table(self.summary)
         yield ""
+        if self.summary.notes:
+            yield Text("\n".join(f"note: {note}" for note in self.summary.notes) + "\n")
         yield matrix if fits else _outcome_list(self.summary)
         yield ""
         if self.summary.pushes is not None:

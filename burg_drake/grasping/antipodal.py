@@ -8,8 +8,9 @@ cones leave. The hand's own body is looked at only if the caller brings a test f
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,9 +35,9 @@ from burg_drake.objects.entry import DEFAULT_FRICTION
 if TYPE_CHECKING:
     import trimesh
 
-SAMPLER_VERSION = 2
+SAMPLER_VERSION = 3
 """Raised when the same arguments begin to give other grasps; 2 differs from 1 by rounding, where
-there is an approach cone."""
+there is an approach cone, and 3 gives up earlier where a test passes very little."""
 
 PANDA_OPENING = (0.0, 0.08)
 """Smallest and largest distance between the Franka Hand's fingers [m] (its datasheet)."""
@@ -52,8 +53,14 @@ a grasp, or less than one ray in 20,000 does, the object counts as having no (mo
 
 TEST_PATIENCE = 20_000
 TEST_RARITY = 5_000
-"""It ends, too, after `TEST_PATIENCE + TEST_RARITY * accepted` grasps that `accept` was asked for:
-where it takes none of the first 20,000, or less than one in 5,000."""
+TEST_EFFORT = 1_000
+"""It ends, too, after `TEST_PATIENCE + min(TEST_RARITY * accepted, TEST_EFFORT * n)` grasps that
+`accept` was asked for: where it takes none of the first 20,000, or less than one in 5,000, and in
+any case after a thousand for each grasp that is wanted, which is a minute for a thousand grasps."""
+
+NO_APPROACH = "no approach"
+"""Why a pair gives no grasp, next to what `contact_pairs` leaves out: no approach direction about
+its closing line lies in the cones."""
 
 Accept = Callable[[Array], NDArray[np.bool_]]
 """Which of the grasps (N, 4, 4) in the object frame to keep, (N,); the answer for a grasp must not
@@ -119,7 +126,8 @@ def sample_antipodal(
         n grasps, or fewer where the object has (almost) no more; see `PATIENCE` and
         `TEST_PATIENCE`. `width` is the distance of the contacts; `score` is the share of the
         friction that is left over, from 0 to 1 for a line along both normals. The provenance has
-        the parameters, the state of rng, and how many `rays` and grasps `tried` it took.
+        the parameters, the state of rng, how many `rays` and grasps `tried` it took, and why the
+        others were `left_out`.
 
     Raises:
         InvalidInputError: a parameter is out of range, or the weights do not fit the mesh.
@@ -155,6 +163,7 @@ def sample_antipodal(
         "rng": state,
         "rays": found.rays,
         "tried": found.tried,
+        "left_out": dict(found.left_out),
     }
     grasps = GraspSet.create(
         found.X_OG, object=object, width=found.width, score=found.score, provenance=provenance
@@ -213,6 +222,7 @@ class _Grasps:
     score: Array
     rays: int = 0
     tried: int = 0
+    left_out: Counter[str] = field(default_factory=Counter)
 
 
 def _collect(
@@ -225,9 +235,11 @@ def _collect(
     """The first n grasps of a stream that depends on the random numbers alone."""
     parts = [_Grasps(np.empty((0, 4, 4)), np.empty(0), np.empty(0))]
     kept = tried = rays = 0
+    left_out: Counter[str] = Counter()
 
     def worth_testing() -> bool:
-        return kept < n and tried < TEST_PATIENCE + TEST_RARITY * kept
+        bound = TEST_PATIENCE + min(TEST_RARITY * kept, TEST_EFFORT * n)
+        return kept < n and tried < bound
 
     while worth_testing() and rays < PATIENCE + RARITY * tried:
         for pairs in draw_pairs(surface, rng, settings.friction, settings.opening):
@@ -236,6 +248,7 @@ def _collect(
             parts.append(block if accept is None else _accepted(block, accept))
             kept += len(parts[-1].X_OG)
             rays += BLOCK
+            left_out += pairs.left_out + block.left_out
             if not worth_testing():
                 break
     return _Grasps(
@@ -244,6 +257,7 @@ def _collect(
         np.concatenate([part.score for part in parts])[:n],
         rays,
         tried,
+        left_out,
     )
 
 
@@ -265,7 +279,8 @@ def _grasps_on(
         X_OG = np.stack(moved, axis=1).reshape(-1, 4, 4)
         pair = np.repeat(pair, len(settings.standoffs))
     score = 1.0 - pairs.friction_needed / settings.friction
-    return _Grasps(X_OG, width[pair], score[pair])
+    left_out = Counter({NO_APPROACH: len(width) - len(allowed)})
+    return _Grasps(X_OG, width[pair], score[pair], left_out=left_out)
 
 
 def _accepted(grasps: _Grasps, accept: Accept) -> _Grasps:

@@ -7,8 +7,9 @@ two points are an antipodal pair (Nguyen, "Constructing force-closure grasps", I
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,10 @@ CHUNK = 8192
 BLOCK = 1024
 """Rays cast at a time; for few grasps the rest of a chunk is never cast. Divides `CHUNK`."""
 
+TOO_LONG, SLANTED, NO_ROOM = "too long", "slanted", "no room"
+"""Why lines give no pairs: they leave the material nowhere within the hand's opening; a normal is
+outside of the friction cone about the line; the object is in the way of a finger."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactPairs:
@@ -39,11 +44,13 @@ class ContactPairs:
             component of largest magnitude is positive.
         friction_needed: (N,) tangent of the larger of the two angles between the closing line and
             the surface normals: the smallest friction coefficient that holds the pair.
+        left_out: how many lines gave no pair, or pairs did not count, and why.
     """
 
     p_OC1: Array
     p_OC2: Array
     friction_needed: Array
+    left_out: Counter[str] = field(default_factory=Counter)
 
 
 def draw_pairs(
@@ -80,20 +87,26 @@ def _pairs_along(
     """The pairs on lines (N, 3) into the material from points (N, 3) on faces (N,)."""
     widest = opening[1] - 2.0 * FINGER_CLEARANCE
     ray, face2, width = surface.rays.all_hits(p1, line, widest)
+    left_out = Counter({TOO_LONG: len(p1) - len(np.unique(ray))})
     p1, face1, line = p1[ray], face1[ray], line[ray]
     cosine = np.minimum(_dot(-surface.normals[face1], line), _dot(surface.normals[face2], line))
     held = cosine >= 1.0 / np.hypot(1.0, friction)
     held &= (width >= max(opening[0], MIN_WIDTH)) & (width <= widest)
+    left_out[SLANTED] = int((~held).sum())
     p1, line, width, cosine = p1[held], line[held], width[held], cosine[held]
     p2 = p1 + width[:, None] * line
     travel = 0.5 * (opening[1] - width)
     free = _finger_path_free(surface, p1, -line, travel)
     free &= _finger_path_free(surface, p2, line, travel)
+    left_out[NO_ROOM] = int((~free).sum())
     p1, p2, line, cosine = p1[free], p2[free], line[free], np.minimum(cosine[free], 1.0)
     largest = np.abs(line).argmax(axis=1)[:, None]
     turned = np.take_along_axis(line, largest, axis=1) < 0.0
     return ContactPairs(
-        np.where(turned, p2, p1), np.where(turned, p1, p2), np.sqrt(1.0 - cosine**2) / cosine
+        np.where(turned, p2, p1),
+        np.where(turned, p1, p2),
+        np.sqrt(1.0 - cosine**2) / cosine,
+        left_out,
     )
 
 

@@ -91,6 +91,19 @@ def friction_needed(contacts: Contacts) -> Array:
     return np.asarray(np.where(angle < 0.5 * np.pi, np.tan(angle), np.inf) + 0.0 * angle)
 
 
+def antipodal_angle(contacts: Contacts, X_OG: Array) -> Array:
+    """(N,) larger of the angles between the closing directions of grasps (N, 4, 4), before the
+    object turns, and the inward normals [rad]; NaN where not both pads touch."""
+    return largest_angle(contacts.normal, -X_OG[:, :3, 0])
+
+
+def are_antipodal(contacts: Contacts, X_OG: Array, friction: float) -> NDArray[np.bool_]:
+    """(N,) whether both pads of grasps (N, 4, 4) touch, and the closing direction and the line
+    through the contacts lie in the friction cones of both."""
+    in_cones = antipodal_angle(contacts, X_OG) <= np.arctan(friction)
+    return np.asarray(in_cones & (friction_needed(contacts) <= friction))
+
+
 def largest_angle(normal: Array, line: Array) -> Array:
     """(N,) larger of the angles between normals (N, 2, 3) and the line (N, 3) that leads from the
     first contact to the second, turned round for the second [rad]."""

@@ -21,9 +21,9 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.grasping.ball import ball
 from burg_drake.grasping.contacts import (
     Contacts,
+    antipodal_angle,
     friction_needed,
     grasp_contacts,
-    largest_angle,
 )
 from burg_drake.grasping.jaws import PANDA_JAWS, Jaws
 from burg_drake.grasping.sliding import slide_to_rest
@@ -231,7 +231,7 @@ def grasp_quality(
     return Quality(
         force_closure=slide == 0.0,
         friction_needed=friction_needed(given),
-        antipodal_angle=largest_angle(given.normal, -X_OG[:, :3, 0]),
+        antipodal_angle=antipodal_angle(given, X_OG),
         slide=slide,
         epsilon=spread(reach[0]),
         volume=spread(hull_volume(space, ball(1, of_volume=True))),

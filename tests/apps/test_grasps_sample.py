@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
+from burg_drake.apps import reach
+from burg_drake.apps.cli import build_parser, main
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.candidate_sampling import sample_candidates
@@ -50,19 +52,33 @@ def test_a_scene(scene_file: Path, tmp_path: Path, capsys: Capture, suffix: str)
     assert words[-1] == ["wrote", "60", "grasps", "to", str(out)]
 
 
-def test_evaluate_judges_the_same_grasps(scene_file: Path, tmp_path: Path) -> None:
+def test_evaluate_and_reach_judge_the_same_grasps(scene_file: Path, tmp_path: Path) -> None:
     assert sample(scene_file, "-n", 20, "--seed", 7, "-o", tmp_path / "grasps.h5") == 0
     scene, station = load_scene(scene_file), load_station("panda_tabletop")
     given = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.h5").by_instance)
     assert given.id == sample_candidates(scene, station, 20, seed=7).id
+    asked = ["reach", str(scene_file), "--grasps-per-object", "20", "--seed", "7", "--only", "mug"]
+    reached = reach.sampled_grasps(build_parser().parse_args(asked), scene, station)
+    assert list(reached) == ["mug"]
+    assert [f"mug-{id}" for id in reached["mug"].id] == given.id[:20]
+
+
+@pytest.mark.parametrize("option", ["--clear", "--object", "--instance"])
+def test_options_that_are_no_more_say_what_to_do(option: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        sample("tabletop_six", option, "-o", "x.h5")
+    error = capsys.readouterr().err
+    assert ended.value.code == 2 and error.count("\n") == 1
+    assert f"{option} is no more: " in error
+    assert ("--blind" if option == "--clear" else "--only") in error
 
 
 def test_a_library_with_many_options(tmp_path: Path) -> None:
     faces = len(load_library("household").surface("mug").faces)
     np.save(tmp_path / "weights.npy", np.arange(float(faces)))
     out = tmp_path / "grasps.h5"
-    options = ["--object", "mug", "--object", "can", "--friction", "0.3", "--approaches", "2"]
-    options += ["--standoffs-mm", "0", "4", "-4", "--diverse", "2", "--clear"]
+    options = ["--only", "mug", "--only", "can", "--friction", "0.3", "--approaches", "2"]
+    options += ["--standoffs-mm", "0", "4", "-4", "--diverse", "2"]
     options += ["--weights", f"mug={tmp_path / 'weights.npy'}"]
     assert sample("household", "-n", 12, *options, "-o", out) == 0
     grasps = GraspSet.load(out)
@@ -80,8 +96,8 @@ def test_clear_grasps_keep_a_margin(scene_file: Path, tmp_path: Path) -> None:
     found = {}
     for options in ((), ("--margin-mm", "4"), ("--conservative",)):
         out = tmp_path / "grasps.h5"
-        mug = ["--instance", "mug", "-n", 60, "-o", out]
-        assert sample(scene_file, "--clear", *options, *mug) == 0
+        mug = ["--only", "mug", "-n", 60, "-o", out]
+        assert sample(scene_file, *options, *mug) == 0
         found[options] = GraspSet.load(out)
     least = {
         options: scored_set(grasps, scene.library, station, scene).column("clearance").min()
@@ -98,7 +114,7 @@ def test_clear_grasps_keep_a_margin(scene_file: Path, tmp_path: Path) -> None:
 def test_files_of_other_projects_name_the_mesh(
     scene_file: Path, tmp_path: Path, capsys: Capture, way: str
 ) -> None:
-    options = ["--object", "mug", "-n", 5, "-o"]
+    options = ["--only", "mug", "-n", 5, "-o"]
     graspgen, acronym = tmp_path / "mug.json", tmp_path / "theirs.h5"
     if way == "sampled":
         assert sample("household", *options, graspgen) == 0
@@ -134,7 +150,7 @@ def test_a_folder_gets_a_file_an_object(scene_file: Path, tmp_path: Path, capsys
     text = capsys.readouterr().out
     assert f"wrote 6 grasps to {out} as acronym (ACRONYM)\n" in text and "NaN for 3" in text
     new = f"{tmp_path}/new/"
-    assert sample(scene_file, "-n", 3, "--instance", "mug", "-o", new, "--to", "acronym") == 0
+    assert sample(scene_file, "-n", 3, "--only", "mug", "-o", new, "--to", "acronym") == 0
     assert [path.name for path in Path(new).iterdir()] == ["mug.h5"]
 
 
@@ -156,9 +172,8 @@ def test_nothing_is_sampled_in_vain(
 
 def test_instances_by_name_or_object(scene_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "grasps.h5"
-    for option, name in (("--instance", "bottle"), ("--object", "bottle")):
-        assert sample(scene_file, option, name, "-n", 5, "--from-arm-side", "-o", out) == 0
-        assert set(GraspSet.load(out).column("instance")) == {"bottle"}
+    assert sample(scene_file, "--only", "bottle", "-n", 5, "--from-arm-side", "-o", out) == 0
+    assert set(GraspSet.load(out).column("instance")) == {"bottle"}
 
 
 def test_an_object_without_grasps_is_said(
@@ -167,10 +182,14 @@ def test_an_object_without_grasps_is_said(
     """A box stands on a corner: no line across it is level, and the hand comes straight down."""
     scene_file.write_text(TILTED.format(second="  - object: mug"))
     out = tmp_path / "grasps.h5"
-    options = ["--friction", "0.05", "--approach-angle", "5", "-n", 5, "-o", out]
+    options = ["--friction", "0.05", "--approach-angle", "5", "--blind", "-n", 5, "-o", out]
     assert sample(scene_file, *options) == 0
-    message = "burg-drake: fewer than asked, as there are hardly any more: box\n"
-    assert capsys.readouterr().err == message
+    (note,) = (line for line in capsys.readouterr().out.splitlines() if "note" in line)
+    counts = re.findall(r"(?<![\d.])[\d,]+(?= [a-z])", note.partition("through it")[2])
+    assert note.startswith("note: box: 0 of 5 grasps: of 262,144 lines through it ")
+    assert "allow no approach within the limits" in note and note.endswith("would help")
+    lines = GraspSet.load(out).provenance["parts"]["box"]["left_out"]
+    assert counts == [f"{n:,}" for n in sorted(lines.values(), reverse=True) if n]
     assert GraspSet.load(out).column("instance").tolist() == ["mug"] * 5
     scene_file.write_text(TILTED.format(second=""))
     assert sample(scene_file, *options) == 1
@@ -181,19 +200,16 @@ def test_an_object_without_grasps_is_said(
     ("arguments", "message"),
     [
         (["tabletop", "-o", "x.h5"], "tabletop is neither a scene nor an object library"),
-        (
-            ["household", "--instance", "mug", "-o", "x.h5"],
-            "has no instances; choose with --object",
-        ),
+        (["household", "--only", "bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean 'box'?"),
         (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
-        (["tabletop_six", "--object", "can", "-o", "x.h5"], "has no free object 'can'"),
+        (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free object 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
         (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
         (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read weights no.npy"),
         (
-            ["household", "--margin-mm", "3", "-o", "x.h5"],
-            "margin and conservative are about clear grasps; ask for these, too (--clear)",
+            ["household", "--margin-mm", "3", "--blind", "-o", "x.h5"],
+            "margin and conservative are about the hand, which blind sampling does not know",
         ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],

@@ -48,7 +48,8 @@ def file(grasps: GraspSet, tmp_path: Path) -> Path:
 def shown(capsys: Capture, *arguments: object) -> list[str]:
     """Lines that the verb prints, without the last one, about the page."""
     assert main(["grasps", "show", *map(str, arguments), "--no-wait"]) == 0
-    return capsys.readouterr().out.splitlines()[:-1]
+    lines = capsys.readouterr().out.splitlines()[:-1]
+    return [line for line in lines if not line.startswith("note: ")]
 
 
 def refused(capsys: Capture, *arguments: object) -> str:

@@ -19,6 +19,7 @@ from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.placement import in_frame
 from burg_drake.evaluation.run_grasps import run_grasps
+from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.formats.grasp_format import PANDA
@@ -178,7 +179,7 @@ def test_a_frame_in_place_of_the_formats(scene: Scene, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("format", ["graspnet", "vgn", "burg"])
 def test_there_and_back(format: str, scene: Scene, station: Station, tmp_path: Path) -> None:
-    sampled = sample_candidates(scene, station, 60, seed=3)
+    sampled = sample_candidates(scene, station, 60, 3, SamplingSettings(blind=True))
     sets = {name: sampled.grasps.select(sampled.instance == name) for name in scene.instances}
     path = tmp_path / ("a.csv" if format == "vgn" else "a.npy")
     X_SF = X_SC if format == "graspnet" else make_pose(p_AB=(0.15, 0.05, -0.05))

@@ -23,9 +23,13 @@ from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station, load_station
 
+BLIND = SamplingSettings(blind=True)
 
-def on_scene(scene, station, n=30, seed=0, instances=None, **settings) -> dict[str, GraspSet]:
-    return dict(sample_scene(scene, station, n, seed, SamplingSettings(**settings), instances))
+
+def on_scene(scene, station, n=30, seed=0, only=None, **settings) -> dict[str, GraspSet]:
+    """Blind unless told otherwise: the objects of the small scene are nothing to Drake."""
+    how = SamplingSettings(**{"blind": True, **settings})
+    return dict(sample_scene(scene, station, n, seed, how, only))
 
 
 def turned(scene: Scene, **rpy_deg: tuple[float, float, float]) -> Scene:
@@ -42,24 +46,24 @@ def turned(scene: Scene, **rpy_deg: tuple[float, float, float]) -> Scene:
 def test_a_run_judges_the_grasps_of_a_file_with_the_same_settings(
     scene: Scene, station: Station
 ) -> None:
-    run = sample_candidates(scene, station, 40, seed=3)
+    run = sample_candidates(scene, station, 40, 3, BLIND)
     for name, grasps in on_scene(scene, station, 40, 3).items():
         assert run.grasps.id[run.instance == name].tolist() == grasps.id.tolist()
 
 
 def test_a_library_has_the_grasps_of_a_scene_without_limits(scene: Scene, station: Station) -> None:
-    there = dict(sample_library(scene.library, station, 25, 4, SamplingSettings()))
+    there = dict(sample_library(scene.library, station, 25, 4, BLIND))
     here = on_scene(scene, station, 25, 4, approach_angle_deg=180.0)
     assert here["left"].id.tolist() == here["right"].id.tolist() == there["cube"].id.tolist()
     assert here["bar"].id.tolist() == there["bar"].id.tolist()
-    (only,) = sample_library(scene.library, station, 25, 4, SamplingSettings(), ["bar"])
+    (only,) = sample_library(scene.library, station, 25, 4, BLIND, ["bar"])
     assert only[0] == "bar" and only[1].id.tolist() == there["bar"].id.tolist()
 
 
 def test_some_instances(scene: Scene, station: Station) -> None:
     everything = on_scene(scene, station)
-    some = on_scene(scene, station, instances=["bar", "left", "bar"])
-    assert list(some) == ["bar", "left"]
+    some = on_scene(scene, station, only=["bar", "left", "bar"])
+    assert list(some) == ["left", "bar"]
     assert some["left"].id.tolist() == everything["left"].id.tolist()
 
 
@@ -124,8 +128,8 @@ def test_standoffs_end_with_the_pads_of_the_hand(scene: Scene) -> None:
 
 def test_what_does_not_fit(scene: Scene, station: Station) -> None:
     library, settings = scene.library, SamplingSettings()
-    with pytest.raises(UnknownNameError, match=r"'three' has no free instance 'lef'; .*'left'"):
-        on_scene(scene, station, instances=["lef"])
+    with pytest.raises(UnknownNameError, match=r"'three' has no free object 'lef'; .*'left'"):
+        on_scene(scene, station, only=["lef"])
     with pytest.raises(UnknownNameError, match="weights: the scene has no object 'cub'"):
         on_scene(scene, station, weights={"cub": np.ones(12)})
     with pytest.raises(InvalidInputError, match=r"the mesh has 12 faces, give \(12,\)"):
@@ -145,20 +149,20 @@ def test_what_does_not_fit(scene: Scene, station: Station) -> None:
 def test_clear_grasps_of_a_scene_touch_nothing_by_drakes_own_query(station: Station) -> None:
     scene = load_scene("tabletop_six")
     names = ["mug", "screwdriver"]
-    clear = on_scene(scene, station, 25, instances=names, clear=True)
+    clear = on_scene(scene, station, 25, only=names, blind=False)
     screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
     for name, grasps in clear.items():
         X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
         assert len(grasps) == 25 < grasps.provenance["tried"]
         for X_OG in grasps.X_OG:
             assert max(screen.touched(X_WO @ X_OG).values(), default=0.0) < 1e-6
-    blind = on_scene(scene, station, 400, instances=["mug"])["mug"]
+    blind = on_scene(scene, station, 400, only=["mug"])["mug"]
     expected = [i for i in clear["mug"].id if i in set(blind.id)]
     assert expected == clear["mug"].id[: len(expected)].tolist() and len(expected) > 10
 
 
 def test_clear_grasps_of_a_library_touch_nothing_of_the_object(station: Station) -> None:
-    library, settings = load_library("household"), SamplingSettings(clear=True)
+    library, settings = load_library("household"), SamplingSettings()
     ((_, grasps),) = sample_library(library, station, 40, 0, settings, ["can"])
     screen = hand_clearance_alone(library, "can", station)
     assert len(grasps) == 40 < grasps.provenance["tried"]
@@ -171,7 +175,7 @@ def test_clear_grasps_of_a_library_touch_nothing_of_the_object(station: Station)
 
 
 def test_a_set_says_how_it_was_made(scene: Scene, station: Station) -> None:
-    settings = SamplingSettings(diverse=2, weights={"bar": np.ones(12)})
+    settings = SamplingSettings(blind=True, diverse=2, weights={"bar": np.ones(12)})
     sampled = dict(sample_scene(scene, station, 10, 5, settings))
     grasps = sampled_set(sampled, scene.library, scene, station, 10, 5, settings)
     assert grasps.column("instance").tolist() == [i for i in sampled for _ in range(10)]
@@ -180,7 +184,7 @@ def test_a_set_says_how_it_was_made(scene: Scene, station: Station) -> None:
     assert (told["n"], told["seed"], told["settings"]["diverse"]) == (10, 5, 2)
     assert told["content"]["objects"] == {"cube": "build of cube", "bar": "build of bar"}
     assert told["parts"]["bar"]["weights"] and told["versions"]["burg_drake"]
-    plain = SamplingSettings()
+    plain = BLIND
     parts = dict(sample_library(scene.library, station, 10, 5, plain))
     of_library = sampled_set(parts, scene.library, None, station, 10, 5, plain)
     assert of_library.provenance["library"] == str(scene.library.root)

@@ -15,8 +15,16 @@ from burg_drake.core.schema import Pose
 from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import Candidates, given_candidates
+from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
+
+BLIND = SamplingSettings(blind=True)
+"""The objects of the small scene are nothing to Drake."""
+
+
+def from_above(angle: float) -> SamplingSettings:
+    return SamplingSettings(blind=True, approach_angle_deg=angle)
 
 
 def only(scene: Scene, *names: str) -> Scene:
@@ -30,18 +38,18 @@ def of(candidates: Candidates, instance: str) -> list[str]:
 
 
 def test_instances_of_an_object_get_the_same_grasps(scene: Scene, station: Station) -> None:
-    sampled = sample_candidates(scene, station, 20, seed=0)
+    sampled = sample_candidates(scene, station, 20, 0, BLIND)
     assert len(sampled) == 60 and len(set(sampled.id)) == 60
     assert of(sampled, "left") == of(sampled, "right") != of(sampled, "bar")
     assert sampled.id[0] == f"left-{sampled.grasps.id[0]}"
 
 
 def test_what_else_is_in_the_scene_does_not_matter(scene: Scene, station: Station) -> None:
-    everything = sample_candidates(scene, station, 20, seed=0)
-    alone = sample_candidates(only(scene, "bar"), station, 20, seed=0)
+    everything = sample_candidates(scene, station, 20, 0, BLIND)
+    alone = sample_candidates(only(scene, "bar"), station, 20, 0, BLIND)
     assert of(everything, "bar") == of(alone, "bar")
-    assert of(everything, "bar") != of(sample_candidates(scene, station, 20, seed=1), "bar")
-    assert len(sample_candidates(only(scene), station, 20, seed=0)) == 0
+    assert of(everything, "bar") != of(sample_candidates(scene, station, 20, 1, BLIND), "bar")
+    assert len(sample_candidates(only(scene), station, 20, 0, BLIND)) == 0
 
 
 def posed(scene: Scene, **rpy_deg: tuple[float, float, float]) -> Scene:
@@ -63,7 +71,7 @@ def test_the_hand_comes_from_above(scene: Scene, station: Station, angle: float)
     tilted = Pose((0.4, 0.1, 0.0), rpy_deg=(0.0, 25.0, 70.0))  # a board that is not level
     document = dataclasses.replace(station.document, X_WS=tilted)
     sloping = dataclasses.replace(station, document=document)
-    sampled = sample_candidates(turned, sloping, 200, 0, angle)
+    sampled = sample_candidates(turned, sloping, 200, 0, from_above(angle))
     assert len(sampled) == 600
     for name in turned.instances:
         X_OG = sampled.grasps.X_OG[sampled.instance == name]
@@ -73,24 +81,24 @@ def test_the_hand_comes_from_above(scene: Scene, station: Station, angle: float)
 
 
 def test_objects_on_the_same_side_get_the_same_grasps(scene: Scene, station: Station) -> None:
-    about_vertical = sample_candidates(posed(scene, right=(0, 0, 77.7)), station, 20, seed=0)
+    about_vertical = sample_candidates(posed(scene, right=(0, 0, 77.7)), station, 20, 0, BLIND)
     assert of(about_vertical, "left") == of(about_vertical, "right")
-    tipped = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, seed=0)
+    tipped = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, 0, BLIND)
     assert of(tipped, "left") == of(about_vertical, "left")
     assert not set(of(tipped, "left")) & set(of(tipped, "right"))
-    anywhere = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, 0, 180.0)
+    anywhere = sample_candidates(posed(scene, right=(90, 0, 0)), station, 20, 0, from_above(180.0))
     assert of(anywhere, "left") == of(anywhere, "right")
 
 
 def test_the_hand_opens_wide_enough(scene: Scene, station: Station) -> None:
-    grasps = sample_candidates(only(scene, "bar"), station, 200, seed=0).grasps
+    grasps = sample_candidates(only(scene, "bar"), station, 200, 0, BLIND).grasps
     # the bar is 0.03 x 0.03 x 0.2 m, and the hand opens 0.08 m
     assert grasps.width.min() >= 0.03 - 1e-9
     assert grasps.width.max() < 0.08
 
 
 def test_a_file_gives_back_every_bit(tmp_path: Path, scene: Scene, station: Station) -> None:
-    sampled = sample_candidates(scene, station, 5, seed=0)
+    sampled = sample_candidates(scene, station, 5, 0, BLIND)
     sampled.save(tmp_path / "grasps.npz")
     back = Candidates.load(tmp_path / "grasps.npz")
     assert back.id == sampled.id and back.content == sampled.content
@@ -118,20 +126,20 @@ def test_given_grasps_must_fit_the_scene(scene: Scene) -> None:
     ):
         given_candidates(scene, {"bar": grasps})
     with pytest.raises(InvalidInputError, match="grasps per object is 0"):
-        sample_candidates(scene, None, 0, seed=0)  # type: ignore[arg-type]
+        sample_candidates(scene, None, 0, 0, BLIND)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("angle", [0.0, -10.0, 180.5, np.nan])
 def test_an_approach_angle_out_of_range(scene: Scene, station: Station, angle: float) -> None:
     message = f"^approach angle is {angle:g} degrees; give more than 0, at most 180$"
     with pytest.raises(InvalidInputError, match=message):
-        sample_candidates(scene, station, 5, 0, angle)
+        sample_candidates(scene, station, 5, 0, from_above(angle))
 
 
 def test_grasps_of_a_run_stay_on_their_instances(
     tmp_path: Path, scene: Scene, station: Station
 ) -> None:
-    sampled = sample_candidates(posed(scene, right=(90, 0, 0)), station, 5, seed=0)
+    sampled = sample_candidates(posed(scene, right=(90, 0, 0)), station, 5, 0, BLIND)
     sampled.save(tmp_path / "grasps.npz")
     back = given_candidates(scene, read_grasps(scene, tmp_path / "grasps.npz").by_instance)
     assert back.id == sampled.id and back.content == sampled.content

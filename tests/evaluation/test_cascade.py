@@ -21,6 +21,7 @@ from burg_drake.core.progress import Progress
 from burg_drake.evaluation.candidate_files import read_grasps
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import read_journal
+from burg_drake.evaluation.report.provenance import reproduce_command
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.table import TEXT
 from burg_drake.evaluation.table_file import read_table
@@ -38,7 +39,7 @@ def same_results(a: Run, b: Run) -> bool:
 def test_results_do_not_depend_on_workers(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    options = {"grasps_per_object": 20, "progress": False}
+    options = {"grasps_per_object": 20, "blind": True, "progress": False}
     one = evaluate(scene, station, tmp_path / "one", workers=1, **options)
     two = evaluate(scene, station, tmp_path / "two", workers=2, **options)
     assert same_results(one, two)
@@ -52,20 +53,30 @@ def test_results_do_not_depend_on_workers(
 def test_a_complete_run_returns_at_once(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
 ) -> None:
-    first = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    first = evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
+    )
     monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
-    again = evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    again = evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
+    )
     assert same_results(first, again)
     assert len(again.document.stretches) == 1
     files = {path: path.stat().st_ino for path in first.path.iterdir()}
-    assert len(files) == 7
+    assert len(files) == 8
     dates = {path: path.stat().st_mtime_ns for path in files}
-    evaluate(scene, station, tmp_path / "run", grasps_per_object=5, progress=False)
+    evaluate(scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False)
     assert {path: path.stat().st_ino for path in first.path.iterdir()} == files
     assert {path: path.stat().st_mtime_ns for path in files} == dates
     pytest.importorskip("pyarrow")
     parquet = evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=5, progress=False, table="parquet"
+        scene,
+        station,
+        tmp_path / "run",
+        grasps_per_object=5,
+        blind=True,
+        progress=False,
+        table="parquet",
     )
     assert parquet.table_path.suffix == ".parquet"
     assert read_table(parquet.table_path)["id"].tolist() == first.results["id"].tolist()
@@ -82,7 +93,7 @@ def patch(name, value):
     setattr(sys.modules[module], attribute, value)
 known_judge.install(patch, Path(sys.argv[2]), pause=0.1)
 from burg_drake.evaluation.cascade import evaluate
-evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, workers=2)
+evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, blind=True, workers=2)
 """
 
 
@@ -124,7 +135,13 @@ def test_a_killed_run_goes_on_where_it_was(
     install(monkeypatch.setattr, tmp_path / "second.log")
     events: list[Progress] = []
     run = evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=40, workers=2, progress=events.append
+        scene,
+        station,
+        tmp_path / "run",
+        grasps_per_object=40,
+        blind=True,
+        workers=2,
+        progress=events.append,
     )
     again = (tmp_path / "second.log").read_text().split()
     assert len(again) == len(set(again)) == 120 - len(before)
@@ -133,7 +150,13 @@ def test_a_killed_run_goes_on_where_it_was(
     assert [s.judged for s in run.document.stretches] == [None, len(again)]
 
     fresh = evaluate(
-        scene, station, tmp_path / "fresh", grasps_per_object=40, workers=1, progress=False
+        scene,
+        station,
+        tmp_path / "fresh",
+        grasps_per_object=40,
+        blind=True,
+        workers=1,
+        progress=False,
     )
     assert same_results(run, fresh)
     assert read_table(run.table_path)["id"].tolist() == run.candidates.id
@@ -147,7 +170,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     def judge(known: KnownJudge, out: str, **options: bool) -> Run:
         make = Make(known)
         monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: make)
-        options |= {"grasps_per_object": 10, "progress": False}
+        options |= {"grasps_per_object": 10, "blind": True, "progress": False}
         return evaluate(scene, station, tmp_path / out, workers=1, **options)
 
     def asked(name: str) -> list[str]:
@@ -190,22 +213,60 @@ def test_another_run_is_not_mixed_in(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     run = tmp_path / "run"
-    evaluate(scene, station, run, grasps_per_object=5, workers=1, progress=False)
+    evaluate(scene, station, run, grasps_per_object=5, blind=True, workers=1, progress=False)
     with pytest.raises(InvalidInputError) as error:
-        evaluate(scene, station, run, grasps_per_object=6, engine="reference", progress=False)
+        evaluate(
+            scene, station, run, grasps_per_object=6, blind=True, engine="reference", progress=False
+        )
     assert str(error.value) == (
-        f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object"
-        " there, 6 an object here); choose another -o, or delete it"
+        f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object,"
+        " sampled blind there, 6 an object, sampled blind here); choose another -o, or delete it"
     )
     with pytest.raises(InvalidInputError) as error:
-        evaluate(scene, station, run, grasps_per_object=5, approach_angle_deg=90, progress=False)
+        evaluate(
+            scene,
+            station,
+            run,
+            grasps_per_object=5,
+            blind=True,
+            approach_angle_deg=90,
+            progress=False,
+        )
     assert "(approach angle is 75.0 degrees there, 90.0 degrees here)" in str(error.value)
     with pytest.raises(InvalidInputError, match="mode is reach there, hand here"):
-        evaluate(scene, station, run, grasps_per_object=5, mode="hand", progress=False)
+        evaluate(scene, station, run, grasps_per_object=5, blind=True, mode="hand", progress=False)
+    with pytest.raises(InvalidInputError, match=r"sampled blind there, 5 an object, clear of the"):
+        evaluate(scene, station, run, grasps_per_object=5, progress=False)
+    blind = {"grasps_per_object": 5, "blind": True, "progress": False}
+    with pytest.raises(InvalidInputError, match=r"blind there, .* sampled blind, on bar here"):
+        evaluate(scene, station, run, only=["bar"], **blind)
+    assert evaluate(scene, station, run, only=["bar", "cube"], **blind).complete  # that is all
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
-    with pytest.raises(InvalidInputError, match="5 an object there, given, content") as error:
+    with pytest.raises(
+        InvalidInputError, match="5 an object, sampled blind there, given, content"
+    ) as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
     assert "approach angle" not in str(error.value)  # it goes with the sampling
+
+
+def test_some_objects_only(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    options = {"grasps_per_object": 3, "blind": True, "workers": 1, "progress": False}
+    run = evaluate(scene, station, tmp_path / "a", only=["right", "bar"], **options)
+    everything = evaluate(scene, station, tmp_path / "b", **options)
+    assert run.candidates.id == [i for i in everything.candidates.id if not i.startswith("left")]
+    assert load_run(run.path).document.grasps.objects == {"cube": 3, "bar": 3}
+    assert "--blind --only right --only bar" in reproduce_command(run)
+    given = {
+        name: GraspSet.create(np.eye(4), object=object)
+        for name, object in (("left", "cube"), ("bar", "bar"))
+    }
+    run = evaluate(scene, station, tmp_path / "c", grasps=given, only=["cube"], progress=False)
+    assert set(run.candidates.instance) == {"left"}
+    with pytest.raises(UnknownNameError, match="no free object 'lef'; did you mean 'left'"):
+        evaluate(scene, station, tmp_path / "d", only=["lef"], **options)
+    assert not (tmp_path / "d").exists()
 
 
 def test_given_grasps_are_judged_in_place_of_sampled_ones(
@@ -250,7 +311,7 @@ def test_own_files_are_not_overwritten(
     mine.mkdir()
     (mine / name).write_text("my work")
     with pytest.raises(InvalidInputError) as error:
-        evaluate(scene, station, mine, grasps_per_object=2, progress=False)
+        evaluate(scene, station, mine, grasps_per_object=2, blind=True, progress=False)
     assert str(error.value) == (
         f"{mine} is not empty and holds no run ({name} is in it); choose another -o"
     )
@@ -264,7 +325,7 @@ def test_a_run_that_is_killed_at_its_start_goes_on(
     def die(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    options = {"grasps_per_object": 2, "workers": 1, "progress": False}
+    options = {"grasps_per_object": 2, "blind": True, "workers": 1, "progress": False}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(f"burg_drake.evaluation.run_store.{write}", die)
         with pytest.raises(KeyboardInterrupt):
@@ -287,11 +348,13 @@ def test_failures_are_reported_and_the_others_go_on(
     from known_judge import CrashingJudge
 
     id = evaluate(
-        scene, station, tmp_path / "a", grasps_per_object=2, workers=1, progress=False
+        scene, station, tmp_path / "a", grasps_per_object=2, blind=True, workers=1, progress=False
     ).candidates.id[0]
     judge = Make(CrashingJudge(how=((id, "segfault"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
-    run = evaluate(scene, station, tmp_path / "b", grasps_per_object=2, workers=1, progress=False)
+    run = evaluate(
+        scene, station, tmp_path / "b", grasps_per_object=2, blind=True, workers=1, progress=False
+    )
     assert run.complete and run.failures == [id]
     assert run.row(id)["reason"] == "the worker process was ended by SIGSEGV"
 

@@ -16,6 +16,7 @@ from burg_drake.evaluation.exchange import read_in_frame
 from burg_drake.evaluation.grasp_input import hand_of, hand_reference, read_input
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.sampled_set import sample_grasps
+from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.formats.conversion import write_each_object
 from burg_drake.formats.grasp_files import FORMATS, format_of
 from burg_drake.formats.grasp_format import PANDA
@@ -27,7 +28,13 @@ from burg_drake.station.station import Station, load_station
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=12, workers=1, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        grasps_per_object=12,
+        blind=True,
+        workers=1,
+        progress=False,
     )
 
 
@@ -80,16 +87,20 @@ def test_a_folder_without_a_run(tmp_path: Path) -> None:
 
 def test_sampled_sets_name_their_hand(scene: Scene, tmp_path: Path) -> None:
     station = load_station("panda_wsg")
-    grasps = sample_grasps(scene, station, 3)
+    grasps = sample_grasps(scene, station, 3, settings=SamplingSettings(blind=True))
     assert hand_of(grasps) == {"name": "wsg_50", "document": str(station.hand_path)}
-    both = GraspSet.concatenate([grasps, sample_grasps(scene, station, 3, seed=1)])
+    both = GraspSet.concatenate(
+        [grasps, sample_grasps(scene, station, 3, seed=1, settings=SamplingSettings(blind=True))]
+    )
     assert (hand_of(both) or {})["name"] == "wsg_50"
     both.save(tmp_path / "both.h5")
     assert hand_reference(tmp_path / "both.h5") == str(station.hand_path)
     note = "The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'."
     assert read_grasps(scene, tmp_path / "both.h5", PANDA).notes == (note,)
     assert read_input(tmp_path / "both.h5").notes == ()
-    other = sample_grasps(scene, load_station("panda_tabletop"), 3)
+    other = sample_grasps(
+        scene, load_station("panda_tabletop"), 3, settings=SamplingSettings(blind=True)
+    )
     assert hand_of(GraspSet.concatenate([grasps, other])) is None
 
 

@@ -18,7 +18,9 @@ from burg_drake.station.station import Station
 
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(scene, station, tmp_path / "run", grasps_per_object=3, progress=False)
+    return evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=3, blind=True, progress=False
+    )
 
 
 def spoil(path: Path) -> None:

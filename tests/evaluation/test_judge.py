@@ -21,6 +21,7 @@ from burg_drake.evaluation.judge import (
     judge_grasp,
     screen_grasps,
 )
+from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import load_station
@@ -159,7 +160,7 @@ def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
     judge = StationJudge(scene, station, engine=ENGINES["standard"], mode="hand")
     (screen,) = judge.screens
-    sampled = list(sample_candidates(scene, station, 25, seed=3))
+    sampled = list(sample_candidates(scene, station, 25, 3, SamplingSettings(blind=True)))
     grasps = [sampled[k] for k in np.random.default_rng(0).permutation(len(sampled))]
     together = screen.ask(grasps)
     assert 5 < sum(d.outcome is None for d in together) < len(grasps) - 5

@@ -13,6 +13,7 @@ from burg_drake.core.frames import grasp_from_axes, make_pose, swap_fingers
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.placement import by_instance, held_instances, in_frame
+from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.formats.grasp_format import PANDA
 from burg_drake.scene.scene import Instance, Scene
 from burg_drake.station.station import Station
@@ -93,7 +94,9 @@ def turned(scene: Scene) -> Scene:
 @pytest.mark.parametrize("seed", range(3))
 def test_sampled_grasps_return_to_their_instance(seed: int, scene: Scene, station: Station) -> None:
     scene = turned(scene)
-    sampled = sample_candidates(scene, station, 100, seed, 180.0)
+    sampled = sample_candidates(
+        scene, station, 100, seed, SamplingSettings(blind=True, approach_angle_deg=180.0)
+    )
     sets = {
         name: sampled.grasps.select(sampled.instance == name).with_columns(mark=float(k))
         for k, name in enumerate(scene.instances)

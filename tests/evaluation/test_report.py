@@ -59,7 +59,9 @@ def check(page: str) -> Checker:
 
 @pytest.fixture
 def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(scene, station, tmp_path / "run", grasps_per_object=30, progress=False)
+    return evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=30, blind=True, progress=False
+    )
 
 
 def test_the_page_is_whole_and_stands_alone(run: Run) -> None:
@@ -85,7 +87,7 @@ def test_the_command_is_the_one_that_was_run(run: Run) -> None:
     assert words == [
         *("burg-drake", "evaluate", run.document.scene.path, "--station", "panda_tabletop"),
         *("--mode", "reach"),
-        *("--grasps-per-object", "30", "--approach-angle", "75.0"),
+        *("--grasps-per-object", "30", "--approach-angle", "75.0", "--blind"),
         *("--engine", "standard", "--seed", "0"),
         *("-o", str(run.path)),
     ]
@@ -98,7 +100,9 @@ def test_failures_are_listed_and_escaped(
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     name = "<script>alert(1)</script> & co"
     moved = dataclasses.replace(scene, path=tmp_path / f"{name}.yaml")
-    failed = evaluate(moved, station, tmp_path / "f", grasps_per_object=30, progress=False)
+    failed = evaluate(
+        moved, station, tmp_path / "f", grasps_per_object=30, blind=True, progress=False
+    )
     text = " ".join(check(failed.report_path.read_text()).text)
     assert name in text
     assert "RuntimeError: the solver did not converge" in text

@@ -21,6 +21,9 @@ def table(*rows: dict[str, float], outcome: Outcome = Outcome.LIFTED) -> Columns
     columns: Columns = {
         name: np.array([row.get(name, value) for row in rows]) for name, value in usual.items()
     }
+    columns["clearance"] = np.array([row.get("clearance", 0.004) for row in rows])
+    columns["object"] = np.array(["mug"] * len(rows))
+    columns["instance"] = columns["object"].copy()
     columns["id"] = np.array([f"g{k}" for k in range(len(rows))])
     columns["outcome"] = np.array([outcome.value] * len(rows), dtype=object)
     return columns
@@ -45,6 +48,30 @@ def test_rows_of_a_grasp_are_all_of_its_rows() -> None:
     assert rows_of(columns, "mug-a", "a.csv") == [0, 2] and rows_of(columns, "mug-b", "") == [1]
     with pytest.raises(UnknownNameError, match=r"^a.csv has no judged grasp 'mug-c'; did you mean"):
         rows_of(columns, "mug-c", "a.csv")
+
+
+def test_room_around_the_hand_comes_first() -> None:
+    """5.2 and 5.4 mm are the same step of 0.5 mm; what is not known comes last."""
+    columns = table(
+        {"clearance": math.nan},
+        {"clearance": 5.4 * MILLIMETRE, "slip": 1 * MILLIMETRE},
+        {"clearance": 5.2 * MILLIMETRE},
+        {"clearance": 9.0 * MILLIMETRE, "slip": 4 * MILLIMETRE, "tilt": 0.1},
+        {"clearance": 0.0},
+    )
+    assert best_rows(columns, 10) == [3, 2, 1, 4, 0]
+
+
+def test_the_best_of_each_object_or_of_some() -> None:
+    columns = table(*({"clearance": k * MILLIMETRE} for k in range(6)))
+    columns["object"] = np.array(["mug", "can", "mug", "mug", "can", "box"])
+    columns["instance"] = np.array(["mug", "can", "mug_2", "mug", "can", "box"])
+    assert best_rows(columns, 2) == [5, 4]
+    assert best_rows(columns, 2, each=True) == [3, 2, 4, 1, 5]
+    assert best_rows(columns, 9, only=["mug"]) == [3, 2, 0]
+    assert best_rows(columns, 1, each=True, only=["mug_2", "box"]) == [2, 5]
+    with pytest.raises(UnknownNameError, match=r"no grasps of 'mgu'; did you mean 'mug'\?"):
+        best_rows(columns, only=["mgu"])
 
 
 def test_noise_ranks_nothing() -> None:

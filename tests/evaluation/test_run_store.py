@@ -26,7 +26,9 @@ from burg_drake.station.station import Station, load_station
 
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(scene, station, tmp_path / "run", grasps_per_object=10, progress=False)
+    return evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=10, blind=True, progress=False
+    )
 
 
 def test_a_run_is_read_back_as_it_was(run: Run) -> None:
@@ -173,7 +175,15 @@ def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
     engine = dataclasses.replace(run.document.engine, whole_trial=True)
     assert run_hash(dataclasses.replace(run.document, engine=engine)) != run.document.hash
     with pytest.raises(InvalidInputError, match=r"engine is standard there, standard \(custom\)"):
-        evaluate(scene, station, run.path, grasps_per_object=10, engine=engine, progress=False)
+        evaluate(
+            scene,
+            station,
+            run.path,
+            grasps_per_object=10,
+            blind=True,
+            engine=engine,
+            progress=False,
+        )
 
 
 def test_a_run_of_an_older_release_is_read(run: Run) -> None:

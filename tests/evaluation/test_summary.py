@@ -26,7 +26,9 @@ from burg_drake.evaluation.summary_tables import summary_view
 
 @pytest.fixture
 def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(scene, station, tmp_path / "run", grasps_per_object=30, progress=False)
+    return evaluate(
+        scene, station, tmp_path / "run", grasps_per_object=30, blind=True, progress=False
+    )
 
 
 def test_counts_are_those_of_the_known_judge(run: Run) -> None:
@@ -70,7 +72,9 @@ def test_a_failed_simulation_is_neither_executed_nor_lost_from_the_counts(
 ) -> None:
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
-    failed = evaluate(scene, station, tmp_path / "f", grasps_per_object=30, progress=False)
+    failed = evaluate(
+        scene, station, tmp_path / "f", grasps_per_object=30, blind=True, progress=False
+    )
     funnel = summarize(failed).total.funnel
     assert funnel["reachable"] - funnel["executed"] == 1
 

@@ -10,6 +10,7 @@ from scipy.stats import chisquare
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import pregrasp
+from burg_drake.grasping import antipodal
 from burg_drake.grasping.antipodal import PATIENCE, TEST_PATIENCE
 from burg_drake.grasping.surface import Surface
 
@@ -157,6 +158,23 @@ def test_what_one_grasp_in_300_passes_is_found():
 
     grasps = grasp(lumpy(), n=200, accept=rare)
     assert len(grasps) == 200 and rare(grasps.X_OG).all()
+
+
+@pytest.mark.parametrize("n", [20, 50])
+def test_the_effort_is_bounded_by_the_grasps_that_are_wanted(n: int, monkeypatch):
+    """One in 300 passes, where 20 tries for each grasp that is wanted are allowed."""
+    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 1000)
+    monkeypatch.setattr(antipodal, "TEST_EFFORT", 20)
+    seen = 0
+
+    def rare(X_OG: np.ndarray) -> np.ndarray:
+        nonlocal seen
+        seen += len(X_OG)
+        return (1e6 * X_OG[:, 0, 3]).astype(int) % 300 == 0
+
+    few = grasp(lumpy(), n=n, accept=rare)
+    assert len(few) < n and seen == few.provenance["tried"]
+    assert 1000 + 20 * n <= seen < 1000 + 20 * n + 2000  # and what is left of a block
 
 
 def test_a_test_that_does_not_answer_for_each_grasp():

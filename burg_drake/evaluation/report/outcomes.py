@@ -35,6 +35,7 @@ def objects_section(summary: Summary) -> Html:
         "What became of all grasps. The share counts only grasps whose trial was executed.",
         table(head, rows, numbers=(1, 3)),
         legend([(STYLES[g.name], g.name) for g in present]),
+        *(element("p", note, class_="notice") for note in summary.notes),
     )
 
 

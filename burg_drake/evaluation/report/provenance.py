@@ -44,6 +44,8 @@ def reproduce_command(run: Run) -> str:
     else:
         words += ["--grasps-per-object", str(document.grasps.per_object)]
         words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
+        words += ["--blind"] if document.grasps.blind else []
+        words += [word for name in document.grasps.only for word in ("--only", name)]
     words += ["--engine", document.engine.name, "--seed", str(document.seed)]
     words += [] if document.table == "csv" else ["--table", document.table]
     return shlex.join([*words, "-o", str(run.path)])

@@ -1,0 +1,63 @@
+"""What a run lacks is said with its reason, in numbers that were counted."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run_store import load_run
+from burg_drake.evaluation.sampled_set import sample_grasps
+from burg_drake.evaluation.sampling_settings import SamplingSettings
+from burg_drake.evaluation.scored_set import scored_set
+from burg_drake.evaluation.summary import summarize
+from burg_drake.evaluation.summary_tables import summary_view
+from burg_drake.grasping import antipodal
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.station import load_station
+
+
+def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The scissors lie flat: fingers that reach them reach into the table. The screen, asked about
+    the blind grasps that were tried, is the oracle of the counts."""
+    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 400)
+    scene, station = load_scene("tabletop_twelve"), load_station("panda_tabletop")
+    out = tmp_path / "run"
+    options = {"mode": "hand", "only": ["scissors"], "workers": 1, "progress": False}
+    (note,) = summarize(evaluate(scene, station, out, grasps_per_object=5, **options)).notes
+    tried, *counts = (int(n) for n in re.findall(r"(\d+)(?: antipodal|,| and|;)", note)[:3])
+    assert note.startswith(f"scissors: 0 of 5 grasps: of {tried} antipodal grasps tried, the open")
+    assert sum(counts) == tried >= 400
+    blind = sample_grasps(
+        scene, station, tried, settings=SamplingSettings(blind=True), only=["scissors"]
+    )
+    hits = scored_set(blind, scene.library, station, scene).column("collides_with").tolist()
+    found = Counter("table" if hit == "table" else "itself" for hit in hits)
+    assert len(blind) == tried  # the same ones, as `distinct` left none out
+    assert f"itself in {found['itself']}" in note and f"the table in {found['table']}" in note
+    assert note in re.sub(r"<[^>]*>", "", load_run(out).report_path.read_text())
+    console = Console(file=io.StringIO(), width=80)
+    console.print(summary_view(summarize(load_run(out))))
+    assert note in " ".join(console.file.getvalue().split())
+
+
+def test_nothing_executed_is_explained(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    options = {"mode": "hand", "only": ["screwdriver"], "workers": 1, "progress": False}
+    run = evaluate(
+        "tabletop_six", "panda_tabletop", out, grasps_per_object=20, blind=True, **options
+    )
+    counts = Counter(run.results["outcome"].tolist())
+    assert counts.total() == 20 and not set(counts) - {"collision_table", "collision_target"}
+    (note,) = summarize(run).notes
+    assert note.startswith("screwdriver: nothing executed of 20 grasps: ")
+    assert f"hits the table in {counts[Outcome.COLLISION_TABLE]}" in note
+    assert note.endswith("; sample grasps at which the hand is clear, which is the default")
