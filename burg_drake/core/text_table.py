@@ -145,7 +145,7 @@ class TextTable:
     def _widths(self, columns: Sequence[int], width: int) -> tuple[list[int], int]:
         """Width of each column, and how many blanks are between them: the first that fits of
         everything whole, broken heads, narrow gaps, and the widest names and texts shortened."""
-        wide = self._natural(columns)
+        wide: list[int] = []
         for broken, gap in ((False, 2), (True, 2), (True, 1)):
             wide = self._natural(columns, broken=broken)
             if sum(wide) + gap * (len(wide) - 1) <= width:

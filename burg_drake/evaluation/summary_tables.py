@@ -37,6 +37,7 @@ class SummaryView:
         if self.summary.pushes is not None:
             yield f"{self.summary.pushes}\n"
         yield _cost_table(self.summary)
+        yield ""
 
 
 def summary_view(summary: Summary) -> RenderableType:
