@@ -192,17 +192,12 @@ def _sample(
 
 
 def _load_weights(path: str) -> Array:
-    import numpy as np
+    from pathlib import Path
 
-    try:
-        weights = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        reason = getattr(error, "strerror", None) or "not an array of numbers in numpy's format"
-        raise InvalidInputError(f"cannot read weights {path}: {reason}") from error
-    if not isinstance(weights, np.ndarray):
-        weights.close()
-        raise InvalidInputError(f"{path} holds several arrays; give a .npy file with one")
-    return weights
+    from burg_drake.core.numpy_file import open_npy
+
+    with open_npy(Path(path)) as stored:
+        return stored.read("fiu").astype(float)
 
 
 def sampled_table(

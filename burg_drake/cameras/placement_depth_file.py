@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.opencv_log import quiet
 from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.numpy_file import open_npy
 
 MILLIMETRE = 1e-3
 
@@ -44,10 +45,8 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
 
 
 def _array(path: Path) -> NDArray:
-    try:
-        return np.asarray(np.load(path, allow_pickle=False))
-    except (OSError, ValueError, EOFError) as error:
-        raise InvalidInputError(f"{path} is not a numpy array that can be read: {error}") from error
+    with open_npy(path) as stored:
+        return stored.read("fiu")
 
 
 def _image(path: Path) -> NDArray:

@@ -21,6 +21,7 @@ from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.files import require_writable
 from burg_drake.core.frames import Array
+from burg_drake.core.numpy_file import open_npy
 from burg_drake.core.schema import Pose, load_document, save_document
 
 if TYPE_CHECKING:
@@ -244,11 +245,7 @@ def _read_image(path: Path) -> NDArray[np.uint8]:
 
 def _read_depth(path: Path, shape: tuple[int, int]) -> Array:
     try:
-        depth = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InvalidInputError(f"{path} is damaged; take the snapshot again") from error
-    if depth.shape != shape:
-        raise InvalidInputError(
-            f"{path} is of shape {depth.shape}, its picture of {shape}; take the snapshot again"
-        )
-    return np.asarray(depth)
+        with open_npy(path) as stored:
+            return stored.read("f", shape)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{error}; take the snapshot again") from error

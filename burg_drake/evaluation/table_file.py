@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.columns import describe
+from burg_drake.core.damaged import reason
 from burg_drake.core.document_text import read_rows
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError, quoted
 from burg_drake.core.files import atomic_write, atomic_write_all, open_regular
@@ -124,11 +125,12 @@ def read_table(path: Path) -> Columns:
             cells = _csv_cells([row for _, row in read_rows(path)])
         return {name: _typed(name, values) for name, values in cells.items()}
     except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+        why = error.strerror or reason(error)  # pyarrow's own are OSErrors, too
+        raise InvalidInputError(f"cannot read {path}: {why}") from error
     except InvalidInputError:
         raise
     except ValueError as error:
-        raise InvalidInputError(f"{path} is not a results table ({error})") from error
+        raise InvalidInputError(f"{path} is not a results table ({reason(error)})") from error
 
 
 def is_table(path: Path) -> bool:

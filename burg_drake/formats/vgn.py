@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.document_text import read_rows
-from burg_drake.core.errors import InvalidInputError, quoted
+from burg_drake.core.errors import InvalidInputError, quoted, shown
 from burg_drake.core.files import atomic_write, open_regular
 from burg_drake.core.frames import (
     Array,
@@ -127,7 +127,7 @@ def _cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     header = [name.strip() for name in names]
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
-        raise InvalidInputError(f"{path}:{first}: column {twice!r} is there twice")
+        raise InvalidInputError(f"{path}:{first}: column {quoted(twice)} is there twice")
     for line, row in rows:
         if len(row) != len(header):
             raise InvalidInputError(
@@ -149,7 +149,9 @@ def _numbers(path: Path, name: str, texts: Sequence[str], lines: Sequence[int]) 
     bad = np.isinf(values) | (np.isnan(values) & (name != "width"))
     if bad.any():
         i = int(np.argmax(bad))
-        raise InvalidInputError(f"{path}:{lines[i]}: {name} is {texts[i]}; give a finite number")
+        raise InvalidInputError(
+            f"{path}:{lines[i]}: {name} is {shown(texts[i])}; give a finite number"
+        )
     return values
 
 

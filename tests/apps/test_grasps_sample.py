@@ -206,7 +206,7 @@ def test_an_object_without_grasps_is_said(
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
         (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
         (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),
-        (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read weights no.npy"),
+        (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read no.npy"),
         (
             ["household", "--margin-mm", "3", "--blind", "-o", "x.h5"],
             "margin and conservative are about the hand, which blind sampling does not know",
@@ -238,7 +238,7 @@ def test_values_that_no_option_takes(option: str, value: str, capsys: Capture) -
 def test_weights_that_are_no_array(tmp_path: Path, capsys: Capture) -> None:
     np.savez(tmp_path / "two.npz", a=np.ones(3))
     (tmp_path / "text.npy").write_text("1 2 3")
-    for name, message in (("two.npz", "holds several arrays"), ("text.npy", "not an array")):
+    for name, message in (("two.npz", "is not a .npy file"), ("text.npy", "is not a .npy file")):
         given = f"mug={tmp_path / name}"
         assert sample("household", "--weights", given, "-o", tmp_path / "x.h5") == 2
         assert message in capsys.readouterr().err

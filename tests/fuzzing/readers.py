@@ -1,0 +1,196 @@
+"""Every reader of files of this project, with a sound file to damage."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import trimesh
+
+from burg_drake.cameras.image_file import read_image
+from burg_drake.cameras.intrinsics_file import load_intrinsics
+from burg_drake.cameras.placement_depth_file import read_depth
+from burg_drake.cameras.placement_document import load_placement
+from burg_drake.cameras.recorded_poses import read_poses as read_recorded_poses
+from burg_drake.core.errors import BurgError
+from burg_drake.core.frames import make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.resources import data_root
+from burg_drake.core.schema import load_document
+from burg_drake.evaluation.grasp_input import hand_of
+from burg_drake.evaluation.journal import read_journal
+from burg_drake.evaluation.origin import read_origin
+from burg_drake.evaluation.run_document import RunDocument
+from burg_drake.evaluation.table import table_row
+from burg_drake.evaluation.table_file import is_table, read_table, write_table
+from burg_drake.evaluation.trial import read_trial
+from burg_drake.formats.burg_library import read_burg_library
+from burg_drake.formats.burg_scene import read_burg_scene
+from burg_drake.formats.grasp_files import FORMATS, format_of, read_grasp_file
+from burg_drake.formats.grasp_format import PANDA
+from burg_drake.formats.one_object import description_of
+from burg_drake.formats.pose_file import read_poses
+from burg_drake.objects.library import load_library
+from burg_drake.objects.mesh_file import read_mesh
+from burg_drake.pipeline.recipe import load_recipe
+from burg_drake.pipeline.record import read_record
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.hand import load_hand
+from burg_drake.station.station import load_station
+
+EXAMPLES = Path(__file__).parent / "examples"
+
+MESHES = ("obj", "ply", "stl", "off", "glb")
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader, and what it reads.
+
+    Attributes:
+        name: of the reader.
+        file: name of the file that it reads; the suffix is its kind for `damage.damaged`.
+        read: reads it.
+        make: makes a sound one.
+        share: of the files that a reader gets on average; those that take long get fewer.
+    """
+
+    name: str
+    file: str
+    read: Callable[[Path], Any]
+    make: Callable[[Path], Any]
+    share: float = 1.0
+
+    @property
+    def kind(self) -> str:
+        """How the file can be damaged."""
+        return {"yml": "yaml", "hdf5": "h5"}.get(suffix := self.file.rpartition(".")[2], suffix)
+
+
+def grasps() -> GraspSet:
+    """Five grasps that every format can hold."""
+    rng = np.random.default_rng(0)
+    return GraspSet.create(
+        make_pose(p_AB=rng.uniform(-0.1, 0.1, (5, 3))),
+        object="mug",
+        width=rng.uniform(0.0, 0.08, 5),
+        score=[1.0, 0.0, 1.0, 1.0, 0.0],
+        columns={"slip": np.arange(5.0)},
+        provenance={
+            "scene": "two.yaml",
+            "hand": {"name": "panda_hand", "document": "panda_hand.yaml"},
+            "object_files": {"mug": {"file": "mug.obj", "scale": 1.0, "com": [0.0, 0.0, 0.1]}},
+            "parts": [{"seed": 1, "hand": {"name": "panda_hand"}}],
+        },
+    )
+
+
+def _read_grasps(format: str, path: Path) -> None:
+    """Also what is asked of a set that was read, and whether it can be written."""
+    for chosen in (format, None):
+        found = read_grasp_file(path, chosen).grasps
+        hand_of(found)
+        for name in set(found.object.tolist()):
+            description_of(found, name)
+        found.save(path.with_name("again.npz"))
+
+
+def _recognise(path: Path) -> None:
+    is_table(path)
+    format_of(path)
+
+
+def _read_rows(path: Path) -> None:
+    columns = read_table(path)
+    for i in range(len(next(iter(columns.values()), ()))):
+        row = table_row(columns, i)
+        read_trial(row, f"{path}: row {i + 1}")
+        read_origin(row, f"{path}: row {i + 1}")
+
+
+def _copied(source: Path) -> Callable[[Path], Any]:
+    return partial(shutil.copyfile, source)
+
+
+def _example(name: str) -> Callable[[Path], Any]:
+    return _copied(EXAMPLES / name)
+
+
+def _scene(path: Path) -> None:
+    shutil.copyfile(data_root() / "scenes" / "tabletop_six.yaml", path)
+
+
+def _write_image(path: Path) -> None:
+    cv2.imwrite(str(path), np.arange(192, dtype=np.uint8).reshape(8, 8, 3))
+
+
+READERS: tuple[Reader, ...] = (
+    *(
+        Reader(
+            f"grasps {name}",
+            f"a{format.suffixes[0]}",
+            partial(_read_grasps, name),
+            partial(lambda format, path: format.write(grasps(), path, PANDA), format),
+        )
+        for name, format in FORMATS.items()
+    ),
+    Reader("grasps npz", "a.npz", partial(_read_grasps, "burg_drake"), grasps().save),
+    Reader("recognition", "a.dat", _recognise, lambda path: grasps().save(path.with_suffix(".h5"))
+           or path.with_suffix(".h5").rename(path)),
+    Reader("pose", "a.yaml", lambda path: read_poses([str(path)]), _example("pose.yaml")),
+    Reader("poses", "a.npy", lambda path: read_poses([f"{path}:1"]),
+           lambda path: np.save(path, np.tile(np.eye(4), (3, 1, 1)))),
+    Reader("scene", "a.yaml", load_scene, _scene),
+    Reader("station", "a.yaml", load_station,
+           _copied(data_root() / "stations" / "panda_tabletop.yaml")),
+    Reader("hand", "a.yaml", lambda path: load_hand(str(path)),
+           _copied(data_root() / "models" / "hands" / "wsg_50.yaml")),
+    Reader("library", "library.yaml", lambda path: load_library(path.parent),
+           _copied(data_root() / "models" / "household" / "library.yaml"), 0.3),
+    Reader("recipe", "a.yaml", load_recipe, _example("objects.yaml")),
+    Reader("build record", "build.json", lambda path: read_record(path.parent),
+           _copied(data_root() / "models" / "household" / "mug" / "build.json")),
+    Reader("intrinsics", "a.yaml", load_intrinsics, _example("intrinsics.yaml")),
+    Reader("camera info", "a.yaml", load_intrinsics, _example("camera_info.yaml")),
+    Reader("camera message", "a.yaml", load_intrinsics, _example("message.yaml")),
+    Reader("opencv", "a.yaml", load_intrinsics, _example("opencv.yaml")),
+    Reader("placement", "a.yaml", load_placement, _example("placement.yaml")),
+    Reader("recorded poses", "a.csv", read_recorded_poses, _example("poses.csv")),
+    Reader("depth", "a.npy", read_depth, lambda path: np.save(path, np.ones((4, 6), np.float32))),
+    Reader("image", "a.png", read_image, _write_image),
+    Reader("run", "a.yaml", lambda path: load_document(path, RunDocument), _example("run.yaml")),
+    Reader("results", "a.csv", _read_rows, _example("results.csv")),
+    Reader("parquet", "a.parquet", _read_rows,
+           lambda path: write_table(path, read_table(EXAMPLES / "results.csv"), {"a": 1})),
+    Reader("journal", "a.jsonl", read_journal, _example("journal.jsonl")),
+    Reader("burg library", "a.yaml", read_burg_library, _example("burg_library.yaml")),
+    Reader("burg scene", "a.yaml", read_burg_scene, _example("burg_scene.yaml")),
+    *(
+        Reader(f"mesh {suffix}", f"a.{suffix}", read_mesh,
+               lambda path: trimesh.creation.box((0.05, 0.04, 0.06)).export(path), 0.5)
+        for suffix in MESHES
+    ),
+)  # fmt: skip
+"""All of them."""
+
+
+def failure(reader: Reader, path: Path) -> str | None:
+    """What is wrong with how a file is read; None if it is read, or refused in one line that names
+    it."""
+    try:
+        reader.read(path)
+    except BurgError as error:
+        text = str(error)
+        if "\n" in text or len(text) > 2000:
+            return f"a message of several lines, or a long one: {text[:300]!r}"
+        if path.name not in text and str(path.parent) not in text:
+            return f"a message that does not name the file: {text[:300]!r}"
+    except Exception as error:
+        return f"{type(error).__name__}: {str(error)[:300]!r}"
+    return None
