@@ -1,6 +1,6 @@
 """Kills of the driver and of workers at random moments: does the same table result?
 
-    python benchmarks/kills.py [--kills N] [--verb evaluate|reach] [--grasps N] [--seed N]
+    python benchmarks/kills.py [--kills N] [--verb evaluate|reach] [--mode MODE] [--grasps N]
 
 Judges a small set undisturbed, and once more while processes are killed by SIGKILL: the driver or
 one of its workers, after a random time; a driver that has died is started again. Then it compares:
@@ -14,6 +14,7 @@ import argparse
 import csv
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -34,6 +35,7 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--verb", choices=("evaluate", "reach"), default="evaluate")
     parser.add_argument("--grasps", type=int, default=4, help="an object (default: %(default)s)")
+    parser.add_argument("--mode", default="hand", help="of evaluate (default: %(default)s)")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
@@ -49,13 +51,14 @@ def main() -> None:
             while sum(killed.values()) < arguments.kills:
                 victim = rng.choice(("driver", "worker"))
                 try:
-                    driver.wait(rng.uniform(0.1, 0.5) * usual)
+                    driver.wait(rng.uniform(0.03, 0.3) * usual)
                     break
                 except subprocess.TimeoutExpired:
                     workers = _children(driver.pid)
-                    if victim == "worker" and workers:
-                        os.kill(rng.choice(workers), signal.SIGKILL)
-                        killed["worker"] += 1
+                    if victim == "worker":
+                        if workers:
+                            os.kill(rng.choice(workers), signal.SIGKILL)
+                            killed["worker"] += 1
                         continue
                     killed["driver"] += 1
                     driver.kill()
@@ -66,14 +69,16 @@ def main() -> None:
                 break
             if code == 0:  # it came through: begin anew, and go on killing
                 _compare(arguments.verb, place)
-                (place / "killed").rename(place / f"came through {sum(killed.values())}")
+                shutil.rmtree(place / "killed")
         _compare(arguments.verb, place)
         print(f"killed {killed['driver']} drivers and {killed['worker']} workers: no difference")
 
 
 def _start(arguments: argparse.Namespace, out: Path) -> subprocess.Popen[bytes]:
     verb = [arguments.verb, "tabletop_six", "--grasps-per-object", str(arguments.grasps)]
-    where = ["-o", str(out)] if arguments.verb == "evaluate" else ["--plans", str(out)]
+    where = ["-o", str(out), "--mode", arguments.mode]
+    if arguments.verb == "reach":
+        where = ["--plans", str(out)]
     options = ["--workers", str(arguments.workers), "--quiet"]
     program = "from burg_drake.apps.cli import main; raise SystemExit(main())"
     return subprocess.Popen(
