@@ -48,3 +48,9 @@ def test_of_many_names_the_first_few_are_listed():
 def test_a_field_error_keeps_its_place_on_the_way_back_from_a_worker_process():
     error = pickle.loads(pickle.dumps(errors.FieldError("mass is -1", "parts", 0, "mass")))
     assert str(error) == "mass is -1" and error.place == ("parts", 0, "mass")
+
+
+def test_a_text_from_outside_is_repeated_up_to_a_length() -> None:
+    assert errors.shown("ten digits", 10) == "ten digits"
+    assert errors.shown("eleven digits", 10) == "eleven ..."
+    assert len(errors.quoted("x" * 1000)) < 200
