@@ -87,8 +87,8 @@ def wait(poll: Callable[[], None] | None = None) -> None:
         poll: called several times a second until then.
     """
     terminal = sys.stdin is not None and sys.stdin.isatty()
-    print(f"Press {'Enter' if terminal else 'Ctrl-C'} to end. ", flush=True)
     try:
+        print(f"Press {'Enter' if terminal else 'Ctrl-C'} to end.", flush=True)
         while True:
             if poll is not None:
                 poll()
