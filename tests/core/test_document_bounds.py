@@ -67,6 +67,7 @@ def test_a_second_document_is_refused() -> None:
         ('{"a": 1, "b": {"c": 1, "c": 2}}', r"d: 'c' appears twice"),
         ('{"a": 1,\n"b" 2}', r"d:2: not valid JSON"),
         ('"' * 99, r"d:1: not valid JSON"),
+        ("[" * 65 + '"' + '\\"' * 1_000_000 + "\\", r"d: nested more than 64"),
     ],
 )
 def test_json_beyond_its_bounds(text: str, said: str) -> None:
