@@ -114,11 +114,11 @@ def _add_imports(group: Any) -> None:
     ycb.add_argument(
         "folder", metavar="DIR", help="folder that holds the objects' folders or files"
     )
-    for verb in (burg, ycb):
+    for verb, without in ((burg, " (default: they stay fixed, as background)"), (ycb, "")):
         _add_output(verb)
         _add_named_values(verb)
         verb.add_argument(
-            "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
+            "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
         )
         _add_effort(verb)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -55,7 +55,7 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
     """Builds what a library of BURG-Toolkit lists, and tells how the stable poses agree."""
     from burg_drake.formats.burg_library import read_burg_library
     from burg_drake.objects.library import load_library
-    from burg_drake.pipeline.imports import burg_names, burg_sources, compare_poses
+    from burg_drake.pipeline.imports import burg_names, burg_sources, compare_poses, fixed_note
 
     burg = read_burg_library(arguments.file)
     names = burg_names(burg)
@@ -67,14 +67,15 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
         friction=values.common_friction,
         skip=arguments.skip,
     )
-    for note in burg.notes:
-        print(note)
+    for note in (*burg.notes, fixed_note(burg, sources)):
+        if note:
+            print(note)
     sources = with_frictions(sources, values)
     code = _build(sources, arguments.output, arguments.name or burg.name or None, arguments)
     library = load_library(arguments.output)
     for item in burg.objects:
         name = names[item.identifier]
-        if item.stable_poses and name in library.objects:
+        if item.stable_poses and name in library.objects and not library.entry(name).is_fixed:
             recorded = [pose.X_SO for pose in item.stable_poses]
             comparison = compare_poses(recorded, library, name)
             print(f"{name}: {comparison.sentence(Path(arguments.file).name)}")
@@ -124,9 +125,9 @@ def _build(
         )
     done = {*report.built, *report.cached}
     if report.failed and not done:
-        first = next(iter(report.failed.values()))
-        more = len(report.failed) - 1
-        raise InvalidInputError(first + (f" (and {more} more that failed)" if more else ""))
+        *others, last = report.failed.items()
+        _print_failures(others)
+        raise InvalidInputError(last[1])
     print_library(report.library, only=done)
     _print_report(report)
     return 1 if report.failed else 0
@@ -137,10 +138,14 @@ def _print_report(report: BuildReport) -> None:
         repairs = report.library.objects[name].source.repairs
         for note in dict.fromkeys([*repairs, *report.notes.get(name, ())]):
             print(f"{name}: {note}")
-    for name, message in report.failed.items():
-        text = message if name in message else f"{name}: {message}"
-        print(f"burg-drake: error: {text}", file=sys.stderr)
+    _print_failures(report.failed.items())
     print(
         f"{report.library.root}: {len(report.built)} built, {len(report.cached)} up to date,"
         f" {len(report.failed)} failed"
     )
+
+
+def _print_failures(failed: Iterable[tuple[str, str]]) -> None:
+    for name, message in failed:
+        text = message if name in message else f"{name}: {message}"
+        print(f"burg-drake: error: {text}", file=sys.stderr)

@@ -87,9 +87,10 @@ def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:
     for name, entry in objects.items():
         size = [1e3 * (b - a) for a, b in zip(entry.lower, entry.upper, strict=True)]
         mass = figure(1e3 * entry.mass, 1)
+        marks = {"density": f"~{mass}", "fixed": "fixed"}
         table.row(
             name,
-            mass if entry.mass_properties.source == "given" else f"~{mass}",
+            marks.get(entry.mass_properties.source, mass),
             " x ".join(figure(s, 0) for s in size),
             figure(entry.friction),
             count(len(entry.pieces)),

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+import sys
+from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_verb
+from burg_drake.core.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.scene.scene import Scene
 
 
 def add_to(group: Any) -> None:
@@ -17,6 +22,8 @@ def add_to(group: Any) -> None:
         "make a scene of one of BURG-Toolkit",
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml",
+        "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml"
+        " --station-out my_station.yaml",
         "burg-drake scene validate my_scene.yaml",
     )
     parser.add_argument("file", metavar="SCENE.yaml", help="scene file of BURG-Toolkit")
@@ -30,6 +37,12 @@ def add_to(group: Any) -> None:
         "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
     )
     parser.add_argument("--name", metavar="NAME", help="of the scene (default: that of FILE)")
+    parser.add_argument(
+        "--station-out",
+        metavar="FILE",
+        help="also write a station that the scene fits on: a built-in one, or else a table and an"
+        " arm laid out around the scene",
+    )
 
 
 def run_import_burg(arguments: argparse.Namespace) -> int:
@@ -37,25 +50,66 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
     from pathlib import Path
 
     from burg_drake.apps.scene_file import library_reference, require_another_file
+    from burg_drake.core.files import require_writable
     from burg_drake.core.names import name_from
     from burg_drake.formats.burg_scene import read_burg_scene
     from burg_drake.objects.library import load_library
-    from burg_drake.pipeline.scene_imports import burg_scene_document
-    from burg_drake.scene.scene import save_scene
+    from burg_drake.pipeline.scene_imports import import_burg_scene
+    from burg_drake.scene.scene import load_scene, save_scene
 
-    require_another_file(Path(arguments.file), arguments.output)
-    scene = read_burg_scene(arguments.file)
-    library = load_library(arguments.library)
     output = Path(arguments.output)
-    document = burg_scene_document(
-        scene,
+    for file in filter(None, (arguments.output, arguments.station_out)):
+        require_another_file(Path(arguments.file), file)
+    if arguments.station_out is not None:
+        require_another_file(output, arguments.station_out)
+        require_writable(arguments.station_out)
+    burg = read_burg_scene(arguments.file)
+    library = load_library(arguments.library)
+    imported = import_burg_scene(
+        burg,
         library,
         name=arguments.name or name_from(output.stem),
         reference=library_reference(arguments.library, library, output.parent),
     )
-    for note in scene.notes:
+    for note in (*burg.notes, *imported.notes):
         print(note)
-    save_scene(document, output)
-    fixed = f" and {n} fixed ones" if (n := len(document.background)) else ""
-    print(f"wrote {output}: {len(document.instances)} objects{fixed}")
+    save_scene(imported.document, output)
+    fixed = f" and {n} fixed ones" if (n := len(imported.document.background)) else ""
+    print(f"wrote {output}: {len(imported.document.instances)} objects{fixed}")
+    _propose_station(load_scene(output), arguments.station_out)
     return 0
+
+
+def _propose_station(scene: Scene, output: str | None) -> None:
+    """Says which station fits, and writes it if that is asked for."""
+    from pathlib import Path
+
+    from burg_drake.core.schema import save_document
+    from burg_drake.motion.station_proposal import propose_station
+
+    try:
+        proposal = propose_station(scene, Path(output or f"{scene.path.stem}_station.yaml"))
+    except InvalidInputError as error:
+        if output is not None:
+            raise
+        print(f"no station fits: {error}")
+        return
+    for name, reason in proposal.misfits.items():
+        print(f"station {name} does not fit: {reason}")
+    if proposal.source:
+        print(f"station {proposal.source} fits: --station {proposal.source}")
+    elif output is None:
+        print("no built-in station fits; --station-out FILE writes one that does")
+    if output is None:
+        return
+    save_document(proposal.document, output)
+    arm = proposal.document.arm
+    where = (
+        "without an arm"
+        if arm is None
+        else "the arm's base at ({:g}, {:g}, {:g}) m".format(*arm.X_WA.translation)
+    )
+    width, depth, _ = proposal.document.table.size
+    print(f"wrote {output}: a table of {width:g} x {depth:g} m, {where}")
+    for warning in proposal.warnings:
+        print(f"burg-drake: warning: {output}: {warning}", file=sys.stderr)

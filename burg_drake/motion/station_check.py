@@ -181,7 +181,9 @@ def _reach_warnings(
         f"over {name!r} and close around it the arm reaches none of {len(arm.reachability.tilt)}"
         " hand orientations"
         for name in scene.instances
-        if name not in far and not _is_near_reached(arm.reachability, scene, name)
+        if name not in far
+        and _is_mapped(arm.reachability, scene, name)
+        and not _is_near_reached(arm.reachability, scene, name)
     ]
     return lines
 
@@ -191,6 +193,11 @@ def _reaches_cleared(scene: Scene, station: Station, settings: ReachabilitySetti
     if not scene.instances:
         return False
     return bool(map_reachability(cleared(scene), station, settings=settings).reached.any())
+
+
+def _is_mapped(reachability: ReachabilityMap, scene: Scene, name: str) -> bool:
+    """Whether the map says anything of an instance: what stands on furniture is above it."""
+    return bool(placed_vertices(scene, name)[:, 2].min() < max(reachability.heights))
 
 
 def _is_near_reached(reachability: ReachabilityMap, scene: Scene, name: str) -> bool:

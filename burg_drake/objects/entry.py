@@ -47,7 +47,8 @@ class MassProperties:
 
     Attributes:
         mass: [kg].
-        source: `given` by the user, or computed from volume and `density`.
+        source: `given` by the user, or computed from volume and `density`; `fixed` is furniture
+            that nobody gave a mass, which can only be background of a scene.
         volume: volume of the material that the mass properties were computed with [m^3]: of the
             wall alone where the object is hollow.
         center_of_mass: `p_OOcm` [m].
@@ -58,7 +59,7 @@ class MassProperties:
     """
 
     mass: float
-    source: Literal["given", "density"]
+    source: Literal["given", "density", "fixed"]
     volume: float
     center_of_mass: Vector3
     inertia: Inertia
@@ -234,6 +235,11 @@ class ObjectEntry:
     def mass(self) -> float:
         """Mass [kg]."""
         return self.mass_properties.mass
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it can only be background of a scene, as it has no mass."""
+        return self.mass_properties.source == "fixed"
 
     @property
     def files(self) -> tuple[str, ...]:

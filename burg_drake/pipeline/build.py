@@ -68,8 +68,8 @@ def build_library(
         sources: objects; a path stands for `ObjectSource.from_file(path)`.
         out: the library's folder; objects in it that are not among the sources stay.
         name: the library's name; by default what it has, or else the folder's name.
-        confirm: simulate the stable poses, and keep those that stand the test; otherwise the
-            quasi-static ones are taken as they are.
+        confirm: simulate the stable poses, and keep those that stand the test; otherwise, and for
+            what is fixed, the quasi-static ones are taken as they are.
         workers: number of objects to work on at a time, each in a process of its own.
         progress: called after each object.
 
@@ -98,17 +98,22 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
     todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
         try:
-            keys = stage_keys(source, confirm)
+            keys = stage_keys(source, confirm and not source.fixed)
         except BurgError as error:
             tally.fail(source.name, error)
             continue
         entry = tally.entries.get(source.name)
-        if entry is not None and is_current(entry, keys, source, root, confirm):
+        if entry is not None and is_current(
+            entry, keys, source, root, confirm and not source.fixed
+        ):
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
     with scratch_folder(root) as scratch:
-        work = [Work(s, keys, root, scratch / s.name, confirm) for s, keys in _longest_first(todo)]
+        work = [
+            Work(s, keys, root, scratch / s.name, confirm and not s.fixed)
+            for s, keys in _longest_first(todo)
+        ]
         try:
             for item, outcome in build_all(work, workers):
                 if isinstance(outcome, Built):

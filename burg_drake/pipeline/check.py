@@ -165,7 +165,7 @@ def _pose_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
     if abs(total - 1.0) > 1e-3:
         text = f"probabilities of the stable poses sum to {total:.3f} instead of 1"
         yield _issue(name, "implausible", text)
-    if any(pose.residual is None for pose in entry.stable_poses):
+    if not entry.is_fixed and any(pose.residual is None for pose in entry.stable_poses):
         text = "its stable poses were not confirmed in simulation"
         yield _issue(name, "unsure", text)
 

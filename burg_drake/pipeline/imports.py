@@ -21,9 +21,6 @@ SAME_POSE = np.deg2rad(10.0)
 """Poses whose directions down differ by less are one pose [rad]. BURG-Toolkit records where a fall
 onto its V-HACD pieces came to rest, and not the face of the surface that the object lies on."""
 
-MOST_NAMES = 8
-"""Names that a message lists before it counts the rest."""
-
 
 def burg_sources(
     library: BurgLibrary,
@@ -35,13 +32,14 @@ def burg_sources(
 ) -> list[ObjectSource]:
     """What to build from an object library of BURG-Toolkit.
 
-    Mesh, scale, mass and friction are taken over. Convex pieces, URDF, thumbnails and stable poses
-    are made anew; `compare_poses` tells how the listed poses agree with the new ones.
+    Mesh, scale, mass and friction are taken over. What has no mass stays fixed, as it is there.
+    Convex pieces, URDF, thumbnails and stable poses are made anew; `compare_poses` tells how the
+    listed poses agree with the new ones.
 
     Args:
         library: from `formats.burg_library.read_burg_library`.
         masses: by identifier or object name [kg]; they go before the document's.
-        density: for objects that have no mass [kg/m^3].
+        density: for objects that have no mass, which are fixed otherwise [kg/m^3].
         friction: coefficient of objects that have none.
         skip: identifiers or object names to leave out.
 
@@ -50,15 +48,12 @@ def burg_sources(
 
     Raises:
         UnknownNameError: a mass or `skip` names no object.
-        InvalidInputError: an object has no mass, two get the same name, or a number is impossible.
+        InvalidInputError: two objects get the same name, or a number is impossible.
     """
     names = burg_names(library)
     given = _by_identifier(masses or {}, names, "a mass")
     left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "--skip")
     objects = [o for o in library.objects if o.identifier not in left_out]
-    fixed = [o for o in objects if o.mass is None and o.identifier not in given]
-    if fixed and density is None:
-        raise InvalidInputError(_no_mass(library, fixed, names))
     sources = []
     for item in objects:
         mass = given.get(item.identifier, item.mass)
@@ -67,6 +62,7 @@ def burg_sources(
             mesh=item.mesh,
             mass=mass,
             density=density if mass is None else None,
+            fixed=mass is None and density is None,
             friction=friction if item.friction is None else item.friction,
             scale=item.scale,
             description="" if item.name == item.identifier else item.name,
@@ -74,6 +70,17 @@ def burg_sources(
         check_source(source)
         sources.append(source)
     return sources
+
+
+def fixed_note(library: BurgLibrary, sources: Iterable[ObjectSource]) -> str:
+    """One line that names all sources that are fixed; empty if there are none."""
+    fixed = [source.name for source in sources if source.fixed]
+    if not fixed:
+        return ""
+    return (
+        f"{library.path}: fixed in BURG-Toolkit, as of mass 0, and hence background of scenes:"
+        f" {', '.join(fixed)}; what has a mass is free"
+    )
 
 
 def burg_names(library: BurgLibrary) -> dict[str, str]:
@@ -221,19 +228,6 @@ def _by_identifier(
         if key not in identifiers:
             raise UnknownNameError(f"{what} is given for {key!r}; {nearest(key, names.values())}")
     return {identifiers[key]: value for key, value in values.items()}
-
-
-def _no_mass(library: BurgLibrary, fixed: list[BurgObject], names: Mapping[str, str]) -> str:
-    shown = [names[item.identifier] for item in fixed[:MOST_NAMES]]
-    more = f" and {len(fixed) - MOST_NAMES} more" if len(fixed) > MOST_NAMES else ""
-    has = "has" if len(fixed) == 1 else "have"
-    first = shown[0]
-    return (
-        f"{library.path}: {_count(len(fixed), 'object')} {has} no mass, as BURG-Toolkit holds"
-        f" objects of mass 0 in place: {', '.join(shown)}{more}; give masses (--mass {first}=KG, or"
-        f" --masses FILE with a line '{first}: KG'), a density for all of them (--density KG/M3),"
-        f" or leave them out (--skip {first})"
-    )
 
 
 def _ycb_description(item: YcbObject, weighed: bool) -> str:

@@ -82,6 +82,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
         _floats(source.inertia),
         DEFAULT_DENSITY,
         asdict(DEFAULT_CONTACT),
+        *(["fixed"] if source.fixed else []),
     )
     in_memory = isinstance(source.mesh, trimesh.Trimesh)
     file = mesh if in_memory else hashlib.sha256(Path(source.mesh).read_bytes()).hexdigest()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.names import name_from
@@ -11,17 +12,33 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.pipeline.source import object_name
 from burg_drake.scene.markers import Markers
 from burg_drake.scene.scene import Board, Instance, SceneDocument
+from burg_drake.station.station import MODEL_NAMES
 
 
-def burg_scene_document(
+@dataclass(frozen=True)
+class ImportedScene:
+    """A scene of another collection.
+
+    Attributes:
+        document: the scene.
+        notes: what became other than it was, one sentence each.
+    """
+
+    document: SceneDocument
+    notes: tuple[str, ...] = ()
+
+
+def import_burg_scene(
     scene: BurgScene, library: ObjectLibrary, name: str = "", reference: str = ""
-) -> SceneDocument:
+) -> ImportedScene:
     """The scene document of a scene of BURG-Toolkit.
 
     Objects are those that `pipeline.imports.burg_sources` makes of the scene's object library, by
-    `object_name(identifier)`. Instances have no names in BURG-Toolkit; they get those of their
-    objects, the second one of an object `NAME_2` and so on. The board is the scene's printout with
-    its markers; without one it has the size of the ground area and the markers of this project.
+    `object_name(identifier)`. What has no mass there is background, whichever list it is in.
+    Instances have no names in BURG-Toolkit; they get those of their objects, the second one of an
+    object `NAME_2` and so on. One that would be called as something of every station, such as
+    `table`, begins with `NAME_1`. The board is the scene's printout with its markers; without one
+    it has the size of the ground area and the markers of this project.
 
     Args:
         scene: from `formats.burg_scene.read_burg_scene`.
@@ -30,19 +47,37 @@ def burg_scene_document(
         reference: how the document refers to the library; its folder if empty.
 
     Raises:
-        UnknownNameError: the library lacks an object; the message names file and line.
+        UnknownNameError: the library lacks objects; the message names file and line of each.
         InvalidInputError: an identifier makes no object name; the printout's markers do not exist
             or do not fit.
     """
     names = _Names(scene, library)
-    return SceneDocument(
+    free, fixed, notes = [], [], []
+    for item in scene.objects:
+        instance = names.instance(item)
+        if library.entry(instance.object).is_fixed:
+            fixed.append(instance)
+            notes.append(
+                f"{scene.path}:{item.line}: {instance.object!r} has no mass, and stays fixed"
+            )
+        else:
+            free.append(instance)
+    fixed += [names.instance(item) for item in scene.bg_objects]
+    notes += [
+        f"an instance of {i.object!r} is called {i.name!r}, as something of every station is"
+        f" called {i.object!r}"
+        for i in (*free, *fixed)
+        if i.object in MODEL_NAMES
+    ]
+    document = SceneDocument(
         name=name or name_from(scene.path.stem),
         description=f"Imported from BURG-Toolkit's {scene.path.name}",
         library=reference or str(library.root),
         board=_board(scene),
-        instances=tuple(names.instance(item) for item in scene.objects),
-        background=tuple(names.instance(item) for item in scene.bg_objects),
+        instances=tuple(free),
+        background=tuple(fixed),
     )
+    return ImportedScene(document, tuple(notes))
 
 
 def _board(scene: BurgScene) -> Board:
@@ -70,21 +105,24 @@ class _Names:
         self.scene = scene
         self.library = library
         self.count: Counter[str] = Counter()
-        self.taken = {self.object(item) for item in (*scene.objects, *scene.bg_objects)}
+        items = sorted((*scene.objects, *scene.bg_objects), key=lambda item: item.line)
+        self.taken = {object_name(item.object_type) for item in items}
+        lacking = [i for i in items if object_name(i.object_type) not in library.objects]
+        if lacking:
+            lines = [f"{scene.path}:{i.line}: {self._lacks(i)}" for i in lacking]
+            raise UnknownNameError("; ".join(lines))
 
-    def object(self, item: BurgInstance) -> str:
+    def _lacks(self, item: BurgInstance) -> str:
         name = object_name(item.object_type)
-        if name not in self.library.objects:
-            raise UnknownNameError(
-                f"{self.scene.path}:{item.line}: object {name!r} ({item.object_type!r}) is not in"
-                f" library {self.library.root}; {nearest(name, self.library.objects)}"
-            )
-        return name
+        return (
+            f"object {name!r} ({item.object_type!r}) is not in library {self.library.root};"
+            f" {nearest(name, self.library.objects)}"
+        )
 
     def instance(self, item: BurgInstance) -> Instance:
-        object = self.object(item)
+        object = object_name(item.object_type)
         self.count[object] += 1
-        if self.count[object] == 1:
+        if self.count[object] == 1 and object not in MODEL_NAMES:
             return Instance(object=object, X_SO=item.X_SO)
         while f"{object}_{self.count[object]}" in self.taken:  # an object may be called mug_2
             self.count[object] += 1

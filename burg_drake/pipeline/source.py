@@ -29,6 +29,7 @@ class ObjectSource:
         mesh: mesh file, or a mesh in memory.
         mass: [kg]; computed from the density if None.
         density: of the material [kg/m^3]; `mass.DEFAULT_DENSITY` if None.
+        fixed: it has no mass, as it can only be background of a scene: furniture.
         center_of_mass: `p_OOcm` [m], in place of the centroid.
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
             place of that of uniform density.
@@ -48,6 +49,7 @@ class ObjectSource:
     mesh: str | Path | trimesh.Trimesh
     mass: float | None = None
     density: float | None = None
+    fixed: bool = False
     center_of_mass: Vector3 | None = None
     inertia: Inertia | None = None
     wall_thickness: float | None = None

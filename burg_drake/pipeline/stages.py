@@ -103,6 +103,8 @@ def build_object(
         wall_thickness=geometry.wall,
         bounds=np.array([geometry.lower, geometry.upper]),
     )
+    if source.fixed:
+        properties = replace(properties, source="fixed")
     sdf = model_sdf(
         source.name, properties, source.coefficient, MESH_FILE, geometry.pieces, geometry.contact
     )
@@ -120,7 +122,7 @@ def build_object(
 def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties) -> list[str]:
     """What the user should know of a built object."""
     notes = []
-    if source.mass is None:
+    if source.mass is None and not source.fixed:
         used = DEFAULT_DENSITY if source.density is None else source.density
         why = "no mass or density given" if source.density is None else "no mass given"
         notes.append(f"{why}: {properties.mass:.4g} kg from {used:g} kg/m^3")

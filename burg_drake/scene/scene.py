@@ -172,7 +172,8 @@ def load_scene(reference: str | Path) -> Scene:
 
     Raises:
         UnknownNameError: no such file or library, or an instance of an unknown object.
-        DocumentError: the file does not fit the schema, or two instances share a name.
+        DocumentError: the file does not fit the schema, two instances share a name, or a free one
+            has no mass.
     """
     path = resolve(reference, "scenes")
     document = load_document(path, SceneDocument)
@@ -185,9 +186,14 @@ def load_scene(reference: str | Path) -> Scene:
         for i, instance in enumerate(instances):
             where = f"{path}: {key}[{i}]"
             try:
-                library.entry(instance.object)
+                entry = library.entry(instance.object)
             except UnknownNameError as error:
                 raise UnknownNameError(f"{where}: {error}") from error
+            if entry.is_fixed and key == "instances":
+                raise DocumentError(
+                    f"{where}: {instance.object!r} has no mass; list it under background, or build"
+                    " it with a mass"
+                )
             name = instance.name or instance.object
             if name in seen:
                 raise DocumentError(f"{where}: name {name!r} is used twice; give unique names")

@@ -16,6 +16,9 @@ from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document, plain_data
 from burg_drake.station.hand import Hand, locate_hand
 
+MODEL_NAMES = ("table", "board", "hand", "arm", "lift")
+"""What every station's own models are called; no instance of a scene may be called so."""
+
 FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']""")
 """A mesh in SDF, or in URDF."""
 HALF_PIXEL = 0.5

@@ -147,7 +147,7 @@ def _figures(entry: ObjectEntry) -> list[Html]:
     size = [b - a for a, b in zip(entry.lower, entry.upper, strict=True)]
     pieces = entry.contact.kind in ("pieces", "compliant_pieces")
     fit = entry.fit if pieces else entry.contact.fit
-    about = "~" if mass.source == "density" else ""
+    about = "" if mass.source == "given" else "~"
     wall = mass.wall_thickness
     rows: list[tuple[str, str, bool]] = [
         ("Size [mm]", " × ".join(_millimetres(s) for s in size), False),

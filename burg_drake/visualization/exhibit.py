@@ -117,7 +117,7 @@ def prepare_exhibit(
 
 def _about(name: str, entry: ObjectEntry) -> tuple[str, ...]:
     size = " x ".join(f"{1e3 * (b - a):.0f}" for a, b in zip(entry.lower, entry.upper, strict=True))
-    about = "~" if entry.mass_properties.source == "density" else ""
+    about = "" if entry.mass_properties.source == "given" else "~"
     return name, f"{size} mm", f"{about}{grams(entry.mass)}, friction {entry.friction:g}"
 
 

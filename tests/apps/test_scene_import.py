@@ -9,7 +9,13 @@ import pytest
 import yaml
 
 from burg_drake.apps.cli import main
+from burg_drake.core.resources import builtin_names
+from burg_drake.motion.station_check import require_usable_arm
+from burg_drake.pipeline.check import check_library
 from burg_drake.scene.scene import load_scene
+from burg_drake.station.check import check_scene
+from burg_drake.station.station import load_station
+from tests.apps.burg_kitchen import write_kitchen
 
 Capture = pytest.CaptureFixture[str]
 
@@ -51,8 +57,9 @@ def test_it_becomes_a_sound_scene(burg_scene: Path, tmp_path: Path, capsys: Capt
     output = tmp_path / "kitchen.yaml"
     options = ["--library", "household", "-o", str(output)]
     assert main(["scene", "import-burg", str(burg_scene), *options]) == 0
-    (wrote,) = capsys.readouterr().out.splitlines()
+    wrote, fits = capsys.readouterr().out.splitlines()
     assert wrote == f"wrote {output}: 2 objects"
+    assert fits == "station panda_tabletop fits: --station panda_tabletop"
     scene = load_scene(output)
     assert (scene.name, scene.document.library) == ("kitchen", "household")
     markers = scene.board.markers
@@ -76,6 +83,31 @@ def test_a_library_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.M
     assert main(["scene", "import-burg", "burg.yaml", *options]) == 0
     scene = load_scene("out/scene.yaml")
     assert (scene.name, scene.document.library, scene.library.name) == ("empty", "../mine", "mine")
+
+
+def test_a_scene_with_furniture(tmp_path: Path, capsys: Capture) -> None:
+    """From the documents of BURG-Toolkit to a station on which grasps can be judged."""
+    burg_library, burg_scene = write_kitchen(tmp_path / "burg")
+    library, output, station = (tmp_path / name for name in ("lib", "my.yaml", "station.yaml"))
+    assert main(["library", "import-burg", str(burg_library), "-o", str(library)]) == 0
+    said = capsys.readouterr()
+    assert "background of scenes: open_shelf, table; what has a mass" in said.out
+    assert said.out.count("fixed") == 3  # two in the table
+    options = ["--library", str(library), "-o", str(output), "--station-out", str(station)]
+    assert main(["scene", "import-burg", str(burg_scene), *options]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert "an instance of 'table' is called 'table_1'" in said.out
+    misfits = [line for line in said.out.splitlines() if "does not fit: " in line]
+    assert len(misfits) == len(builtin_names("stations"))
+    assert "its table is 1.2 x 1.4 m, and the board would reach 1340 mm beyond" in misfits[0]
+    scene, proposed = load_scene(output), load_station(station)
+    assert list(scene.background) == ["table_1", "open_shelf"]
+    assert [issue for issue in check_scene(scene, proposed) if issue.is_error] == []
+    assert require_usable_arm(scene, proposed) == ()
+    assert proposed.document.arm is not None
+    assert proposed.document.arm.X_WA.translation[2] == 0.5
+    assert check_library(scene.library) == ()
 
 
 def test_mistakes(burg_scene: Path, tmp_path: Path, capsys: Capture) -> None:

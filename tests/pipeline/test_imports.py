@@ -16,7 +16,7 @@ from burg_drake.formats.burg_library import BurgLibrary, BurgObject
 from burg_drake.formats.ycb import MASS_SOURCE, YcbObject
 from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
 from burg_drake.objects.library import LibraryDocument, ObjectLibrary
-from burg_drake.pipeline.imports import burg_sources, compare_poses, ycb_sources
+from burg_drake.pipeline.imports import burg_sources, compare_poses, fixed_note, ycb_sources
 
 
 def burg(*objects: BurgObject) -> BurgLibrary:
@@ -68,19 +68,17 @@ def message_of(error: type[Exception], *arguments: object, **keywords: object) -
     return str(caught.value)
 
 
-def test_objects_without_a_mass_are_named_with_the_ways_out() -> None:
-    assert message_of(InvalidInputError, burg(MUG, TABLE)) == (
-        "object_library.yaml: 1 object has no mass, as BURG-Toolkit holds objects of mass 0 in"
-        " place: table; give masses (--mass table=KG, or --masses FILE with a line 'table: KG'), a"
-        " density for all of them (--density KG/M3), or leave them out (--skip table)"
-    )
+def test_objects_without_a_mass_are_fixed_and_all_named() -> None:
     walls = [burg_object(f"wall_{i}") for i in range(10)]
-    assert message_of(InvalidInputError, burg(*walls), {"wall_0": 1.0}) == (
-        "object_library.yaml: 9 objects have no mass, as BURG-Toolkit holds objects of mass 0 in"
-        " place: wall_1, wall_2, wall_3, wall_4, wall_5, wall_6, wall_7, wall_8 and 1 more; give"
-        " masses (--mass wall_1=KG, or --masses FILE with a line 'wall_1: KG'), a density for all"
-        " of them (--density KG/M3), or leave them out (--skip wall_1)"
+    library = burg(MUG, *walls)
+    sources = burg_sources(library, {"wall_0": 1.0})
+    assert [s.name for s in sources if s.fixed] == [f"wall_{i}" for i in range(1, 10)]
+    assert fixed_note(library, sources) == (
+        "object_library.yaml: fixed in BURG-Toolkit, as of mass 0, and hence background of scenes:"
+        " wall_1, wall_2, wall_3, wall_4, wall_5, wall_6, wall_7, wall_8, wall_9; what has a mass"
+        " is free"
     )
+    assert fixed_note(library, sources[:2]) == ""
 
 
 def test_values_for_objects_that_are_not_there() -> None:

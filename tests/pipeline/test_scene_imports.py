@@ -12,7 +12,8 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.schema import Pose
 from burg_drake.formats.burg_scene import BurgInstance, BurgPrintout, BurgScene
 from burg_drake.objects.library import load_library
-from burg_drake.pipeline.scene_imports import burg_scene_document
+from burg_drake.pipeline.scene_imports import import_burg_scene
+from burg_drake.station.station import MODEL_NAMES
 
 
 def placed(*types: str) -> tuple[BurgInstance, ...]:
@@ -33,9 +34,9 @@ def scene(free: tuple[str, ...], fixed: tuple[str, ...] = ()) -> BurgScene:
 
 def test_objects_and_instances_get_names() -> None:
     library = load_library("household")
-    document = burg_scene_document(
+    document = import_burg_scene(
         scene(("Mug", "box", "mug", "MUG"), ("box",)), library, "kitchen", "../household"
-    )
+    ).document
     assert (document.name, document.library) == ("kitchen", "../household")
     assert document.board.size == (0.42, 0.297)
     assert [(i.name, i.object) for i in document.instances] == [
@@ -43,13 +44,13 @@ def test_objects_and_instances_get_names() -> None:
     ]  # fmt: skip
     assert [(i.name, i.object) for i in document.background] == [("box_2", "box")]
     assert document.instances[2].X_SO.translation == (0.2, 0.0, 0.0)
-    assert burg_scene_document(scene(()), library).name == "scene"
+    assert import_burg_scene(scene(()), library).document.name == "scene"
 
 
 def test_an_object_that_is_called_like_an_instance() -> None:
     library = load_library("household")
     library.document.objects["mug_2"] = library.objects["mug"]
-    document = burg_scene_document(scene(("mug", "mug", "mug_2")), library)
+    document = import_burg_scene(scene(("mug", "mug", "mug_2")), library).document
     assert [(i.name, i.object) for i in document.instances] == [
         ("", "mug"), ("mug_3", "mug"), ("", "mug_2"),
     ]  # fmt: skip
@@ -58,7 +59,37 @@ def test_an_object_that_is_called_like_an_instance() -> None:
 def test_an_object_that_the_library_lacks() -> None:
     message = r"there/scene.yaml:11: object 'mugg' \('Mugg'\) is not in .*; did you mean 'mug'\?"
     with pytest.raises(UnknownNameError, match=message):
-        burg_scene_document(scene(("mug", "Mugg")), load_library("household"))
+        import_burg_scene(scene(("mug", "Mugg")), load_library("household"))
+
+
+def test_all_objects_that_the_library_lacks_are_named() -> None:
+    with pytest.raises(UnknownNameError) as caught:
+        import_burg_scene(scene(("mug", "Mugg"), ("shelf",)), load_library("household"))
+    assert [f"scene.yaml:{line}: object" in str(caught.value) for line in (10, 11)] == [True, True]
+
+
+def test_an_instance_is_not_called_like_something_of_every_station() -> None:
+    library = load_library("household")
+    for name in MODEL_NAMES:
+        library.document.objects[name] = library.objects["box"]
+    imported = import_burg_scene(scene(("mug",), (*MODEL_NAMES, "table")), library)
+    names = [i.name for i in imported.document.background]
+    assert names == [*(f"{name}_1" for name in MODEL_NAMES), "table_2"]
+    assert imported.notes[0] == (
+        "an instance of 'table' is called 'table_1', as something of every station is called"
+        " 'table'"
+    )
+
+
+def test_what_has_no_mass_is_background() -> None:
+    library = load_library("household")
+    box = library.objects["box"]
+    fixed = dataclasses.replace(box.mass_properties, source="fixed")
+    library.document.objects["box"] = dataclasses.replace(box, mass_properties=fixed)
+    imported = import_burg_scene(scene(("mug", "box")), library)
+    assert [i.object for i in imported.document.instances] == ["mug"]
+    assert [i.object for i in imported.document.background] == ["box"]
+    assert imported.notes == ("there/scene.yaml:11: 'box' has no mass, and stays fixed",)
 
 
 PRINTOUT = BurgPrintout(
@@ -69,7 +100,7 @@ PRINTOUT = BurgPrintout(
 def test_the_printed_board() -> None:
     """BURG-Toolkit's default on A2: the border of its grid is half of what 7 x 5 markers leave."""
     printed = dataclasses.replace(scene(("mug",)), printout=PRINTOUT)
-    board = burg_scene_document(printed, load_library("household")).board
+    board = import_burg_scene(printed, load_library("household")).document.board
     layout = board.layout
     assert (board.size, layout.dictionary, layout.ids.tolist()) == (
         (0.594, 0.42), "4X4_250", list(range(35)),
@@ -91,4 +122,4 @@ def test_a_board_that_cannot_be(change: dict[str, object], message: str) -> None
     printout = dataclasses.replace(PRINTOUT, **change)
     printed = dataclasses.replace(scene(()), printout=printout)
     with pytest.raises(InvalidInputError, match=message):
-        burg_scene_document(printed, load_library("household"))
+        import_burg_scene(printed, load_library("household"))

@@ -110,3 +110,13 @@ def test_an_unused_object_does_not_count(make_scene: MakeScene) -> None:
 
 def test_unnamed_instances_go_by_their_object() -> None:
     assert Instance(object="cube").X_SO.matrix() == pytest.approx(np.eye(4))
+
+
+def test_what_has_no_mass_cannot_be_free(make_scene: MakeScene, library: ObjectLibrary) -> None:
+    cube = library.objects["cube"]
+    fixed = dataclasses.replace(cube.mass_properties, source="fixed")
+    library.objects["cube"] = dataclasses.replace(cube, mass_properties=fixed)
+    library.save()
+    assert list(make_scene(background=(("cube",),)).background) == ["fixed_0"]
+    with pytest.raises(DocumentError, match=r"instances\[0\]: 'cube' has no mass; list it under"):
+        make_scene(("cube",))

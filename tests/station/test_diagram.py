@@ -21,7 +21,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.station.station import MODEL_NAMES, Obstacle, Station, load_station
 
 GRAVITY = 9.81
 HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
@@ -242,7 +242,7 @@ def test_background_objects_and_obstacles_do_not_move(
         np.testing.assert_allclose(X_WB.translation(), p_WB, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["table", "board", "hand", "arm", "lift"])
+@pytest.mark.parametrize("name", MODEL_NAMES)
 @pytest.mark.parametrize("robot", ["arm", "none"])
 def test_instance_named_like_a_part_of_the_station(
     make_scene: Callable[..., Scene], station: Station, name: str, robot: str
