@@ -37,7 +37,13 @@ format of objects.yaml, with all that can be said of an object:
   defaults: {unit: mm, friction: 0.4}
   objects:
     mug: {mesh: scans/mug.obj, mass: 0.118}
-    tin: {mesh: scans/tin.stl, mass: 0.05, wall_thickness: 0.0003}"""
+    tin: {mesh: scans/tin.stl, mass: 0.05, wall_thickness: 0.0003}
+    rack: {mesh: scans/rack.stl, mass: 0.4, decomposition: {threshold: 0.02}}
+
+convex pieces: 'decomposition.threshold' says how finely a shape is cut into them (0.01 to 1,
+default 0.05). Pieces of more than 1.25 times the volume, or off by more than 5 % of the diagonal,
+are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 64 pieces, and
+build says what came of it"""
 
 
 def add_to(verbs: Any) -> None:

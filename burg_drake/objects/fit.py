@@ -14,6 +14,12 @@ from burg_drake.core.frames import Array
 from burg_drake.objects.entry import Fit
 from burg_drake.objects.symmetry import sample_surface
 
+MOST_VOLUME = 1.25
+"""Volume of the convex pieces over that of the surface from which on they are called coarse."""
+
+MOST_DEVIATION = 0.05
+"""Hausdorff distance over the object's diagonal from which on the pieces are called coarse."""
+
 SAMPLES = 8000
 """Points on each surface whose distance to the other counts, beside the vertices."""
 
@@ -54,6 +60,34 @@ def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volu
     points, normals = _points(union)
     back = _farthest(points[_reached(points, normals, parts)], surface)
     return Fit(volume_ratio=float(union.volume / volume), hausdorff=max(there, back))
+
+
+def coarseness(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
+    """How coarse convex pieces are: above 1, grasps are judged on another shape than the object's.
+
+    Args:
+        fit: of the pieces; None, of a surface that is not closed, is 0.
+        surface: of the object, or the diagonal of its bounding box [m].
+    """
+    if fit is None:
+        return 0.0
+    diagonal = surface if isinstance(surface, float) else float(np.linalg.norm(surface.extents))
+    return max(fit.volume_ratio / MOST_VOLUME, fit.hausdorff / (MOST_DEVIATION * diagonal))
+
+
+def coarse_note(fit: Fit | None, diagonal: float) -> str:
+    """What to say of coarse pieces; empty if they are not."""
+    if fit is None or coarseness(fit, diagonal) <= 1.0:
+        return ""
+    return (
+        f"the convex pieces are coarse: {describe_fit(fit)}; a lower decomposition.threshold"
+        " cuts finer"
+    )
+
+
+def describe_fit(fit: Fit) -> str:
+    """For people."""
+    return f"{fit.volume_ratio:.2f} times the volume, up to {1e3 * fit.hausdorff:.1f} mm off"
 
 
 def union_of(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:

@@ -12,6 +12,7 @@ import numpy as np
 
 from burg_drake.core.errors import MeshError
 from burg_drake.objects.entry import ObjectEntry
+from burg_drake.objects.fit import coarse_note
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.objects.mass import implausible
 from burg_drake.objects.meshes import mesh_hash
@@ -24,12 +25,6 @@ from burg_drake.pipeline.record import (
 )
 
 IssueKind = Literal["missing", "changed", "stale", "broken", "implausible", "unsure"]
-
-MOST_VOLUME = 1.25
-"""Volume of the convex pieces over that of the surface from which on they are called coarse."""
-
-MOST_DEVIATION = 0.05
-"""Hausdorff distance over the object's diagonal from which on the pieces are called coarse."""
 
 USUAL_FRICTION = (0.05, 1.5)
 """Coefficients of dry household materials, ice and soft rubber left out."""
@@ -151,12 +146,8 @@ def _fit_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "unsure", text)
         return
     diagonal = float(np.linalg.norm(np.subtract(entry.upper, entry.lower)))
-    if entry.fit.volume_ratio > MOST_VOLUME or entry.fit.hausdorff > MOST_DEVIATION * diagonal:
-        text = (
-            f"the convex pieces are coarse: {entry.fit.volume_ratio:.2f} times the volume,"
-            f" up to {1e3 * entry.fit.hausdorff:.1f} mm off; a lower decomposition.threshold"
-            " cuts finer"
-        )
+    text = coarse_note(entry.fit, diagonal)
+    if text:
         yield _issue(name, "implausible", text)
 
 

@@ -16,7 +16,6 @@ from burg_drake.core.files import atomic_write
 from burg_drake.core.frames import Array
 from burg_drake.core.schema import Vector3
 from burg_drake.objects.contact import contact_geometry
-from burg_drake.objects.decompose import convex_pieces, given_pieces
 from burg_drake.objects.entry import (
     DEFAULT_FRICTION,
     ContactGeometry,
@@ -24,7 +23,6 @@ from burg_drake.objects.entry import (
     Source,
     StablePose,
 )
-from burg_drake.objects.fit import measure_fit
 from burg_drake.objects.library import LibraryDocument, ObjectLibrary
 from burg_drake.objects.mass import Solid, mass_properties, solid_of_pieces, solid_of_surface
 from burg_drake.objects.meshes import Preparation, SurfaceMesh, load_mesh, texture_image
@@ -33,6 +31,7 @@ from burg_drake.objects.primitive import primitive_mesh
 from burg_drake.objects.sdf import model_sdf
 from burg_drake.objects.shell import solid_of_shell
 from burg_drake.objects.stable_poses import stable_poses
+from burg_drake.pipeline.cutting import Cut, cut
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import Geometry, intact, read_record
 from burg_drake.pipeline.source import ObjectSource
@@ -40,9 +39,6 @@ from burg_drake.pipeline.source import ObjectSource
 MESH_FILE = "mesh.obj"
 SURFACE_FILE = "surface.obj"
 PIECES_FOLDER = "pieces"
-PIECE_DECIMALS = 7
-"""Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
-
 Pieces = tuple[trimesh.Trimesh, ...]
 
 
@@ -71,15 +67,15 @@ def build_geometry(
         preparation = Preparation(wall_thickness=source.wall_thickness, openings=source.openings)
         mesh = load_mesh(source.mesh, source.scale, preparation)
     with _timed(seconds, "pieces"):
-        pieces, child = _pieces(source, keys, home, mesh)
+        made = _pieces(source, keys, home, mesh)
+        pieces = made.pieces
         names = tuple(f"{PIECES_FOLDER}/{i:03d}.obj" for i in range(len(pieces)))
         for name, piece in zip(names, pieces, strict=True):
             write_piece(piece, folder / name)
-    seconds["pieces"] += child
+    seconds["pieces"] += made.seconds
     with _timed(seconds, "mass"):
         solid, wall = _solid(source, mesh, pieces)
     with _timed(seconds, "fit"):
-        fit = measure_fit(mesh.surface, pieces, mesh.surface.volume) if mesh.closed else None
         contact, _ = contact_geometry(source.contact, mesh.surface, mesh.closed, pieces, folder)
     with _timed(seconds, "visual"):
         image = texture_image(mesh.visual)
@@ -103,7 +99,9 @@ def build_geometry(
         p_OOcm=_vector(solid.p_OOcm),
         G_OOcm=tuple(solid.G_OOcm.reshape(-1).tolist()),
         pieces=names,
-        fit=fit,
+        threshold=made.threshold,
+        cut=made.note,
+        fit=made.fit,
         contact=contact,
         stable_poses=poses,
     )
@@ -114,25 +112,16 @@ def build_geometry(
     return replace(geometry, stable_poses=poses, notes=notes)
 
 
-def _pieces(
-    source: ObjectSource, keys: StageKeys, home: Path, mesh: SurfaceMesh
-) -> tuple[Pieces, float]:
-    """The pieces, rounded as they are written, and the CPU time of child processes [s]."""
+def _pieces(source: ObjectSource, keys: StageKeys, home: Path, mesh: SurfaceMesh) -> Cut:
+    """The pieces; those of an earlier build where nothing of them has changed."""
     before = read_record(home)
     if before is not None and before.keys.pieces == keys.pieces:
-        files = [home / name for name in before.geometry.pieces]
-        if intact(home, before, before.geometry.pieces):
-            return tuple(trimesh.load_mesh(file, process=False) for file in files), 0.0
-    if source.pieces is not None:
-        pieces = given_pieces(source.pieces)
-    else:
-        pieces = convex_pieces(mesh.surface, mesh.closed, source.decomposition)
-    rounded = (np.round(p.vertices, PIECE_DECIMALS) + 0.0 for p in pieces.meshes)
-    meshes = (
-        trimesh.Trimesh(vertices, piece.faces, process=False)
-        for vertices, piece in zip(rounded, pieces.meshes, strict=True)
-    )
-    return tuple(meshes), pieces.seconds
+        known = before.geometry
+        if intact(home, before, known.pieces):
+            files = [home / name for name in known.pieces]
+            pieces = tuple(trimesh.load_mesh(file, process=False) for file in files)
+            return Cut(pieces, known.fit, known.threshold, known.cut)
+    return cut(source, mesh)
 
 
 def _solid(

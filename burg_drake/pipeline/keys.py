@@ -14,6 +14,7 @@ from burg_drake.core.content import content_hash
 from burg_drake.objects.mass import DEFAULT_DENSITY
 from burg_drake.objects.meshes import mesh_hash
 from burg_drake.objects.sdf import DEFAULT_CONTACT
+from burg_drake.pipeline.cutting import FINER, MOST_PIECES
 from burg_drake.pipeline.source import ObjectSource, check_source
 
 VERSION = 2
@@ -61,7 +62,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     makers = (_release("trimesh"), _release("manifold3d"))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)
     visual = content_hash(VERSION, "opaque visual", *surface, _floats(source.rgba))
-    maker = [_release("coacd")] if given is None else []
+    maker = [_release("coacd"), *FINER, MOST_PIECES] if given is None else []
     pieces = content_hash(VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker)
     rest = content_hash(
         VERSION,

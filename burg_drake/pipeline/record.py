@@ -38,6 +38,8 @@ class Geometry:
         lower, upper: bounds [m].
         volume, p_OOcm, G_OOcm: see `mass.Solid`; the matrix by rows.
         pieces: file names in the object's folder.
+        threshold: that the pieces were cut with; None for pieces that came with the object.
+        cut: what was done to get them beyond what was asked for; or empty.
         fit: how well the pieces stand for the surface.
         contact: what touches; file names are those in the object's folder.
         stable_poses: most probable first.
@@ -54,6 +56,8 @@ class Geometry:
     p_OOcm: Vector3
     G_OOcm: tuple[float, ...]
     pieces: tuple[str, ...]
+    threshold: float | None = None
+    cut: str = ""
     fit: Fit | None
     contact: ContactGeometry
     stable_poses: tuple[StablePose, ...]

@@ -12,7 +12,8 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.files import atomic_write
-from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.objects.entry import Decomposition, MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.objects.fit import coarse_note
 from burg_drake.objects.mass import DEFAULT_DENSITY, implausible, mass_properties
 from burg_drake.objects.sdf import model_sdf
 from burg_drake.pipeline.geometry import MESH_FILE, build_geometry
@@ -129,7 +130,9 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
     if not geometry.closed:
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
     notes += implausible(properties, geometry.lower, geometry.upper)
-    return notes + list(geometry.notes)
+    diagonal = float(np.linalg.norm(np.subtract(geometry.upper, geometry.lower)))
+    notes += [geometry.cut, coarse_note(geometry.fit, diagonal), *geometry.notes]
+    return [note for note in notes if note]
 
 
 def _origin(source: ObjectSource, root: Path) -> tuple[str, str]:
@@ -158,7 +161,7 @@ def _entry(
         surface=f"{source.name}/{geometry.surface}" if geometry.surface else "",
         sdf=f"{source.name}/{source.name}.sdf",
         pieces=tuple(f"{source.name}/{name}" for name in geometry.pieces),
-        decomposition=source.decomposition if source.pieces is None else None,
+        decomposition=_decomposition(source, geometry),
         fit=geometry.fit,
         contact=contact,
         friction=source.coefficient,
@@ -170,4 +173,13 @@ def _entry(
             file=file, path=path, sha256=keys.file, scale=source.scale, repairs=geometry.repairs
         ),
         build=keys.build,
+    )
+
+
+def _decomposition(source: ObjectSource, geometry: Geometry) -> Decomposition | None:
+    """The parameters that the pieces were cut with, if they were."""
+    if source.pieces is not None:
+        return None
+    return replace(
+        source.decomposition, threshold=geometry.threshold or source.decomposition.threshold
     )

@@ -91,7 +91,7 @@ def test_a_scene_with_furniture(tmp_path: Path, capsys: Capture) -> None:
     library, output, station = (tmp_path / name for name in ("lib", "my.yaml", "station.yaml"))
     assert main(["library", "import-burg", str(burg_library), "-o", str(library)]) == 0
     said = capsys.readouterr()
-    assert "background of scenes: open_shelf, table; what has a mass" in said.out
+    assert "background of scenes: table, open_shelf; what has a mass" in said.out
     assert said.out.count("fixed") == 3  # two in the table
     options = ["--library", str(library), "-o", str(output), "--station-out", str(station)]
     assert main(["scene", "import-burg", str(burg_scene), *options]) == 0

@@ -1,0 +1,93 @@
+"""Cuts an object's surface into convex pieces, and finer where these turn out coarse."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+
+from burg_drake.core.errors import MeshError
+from burg_drake.objects.decompose import Pieces, convex_pieces, given_pieces
+from burg_drake.objects.entry import Decomposition, Fit
+from burg_drake.objects.fit import coarseness, describe_fit, measure_fit
+from burg_drake.objects.meshes import SurfaceMesh
+from burg_drake.pipeline.source import ObjectSource
+
+PIECE_DECIMALS = 7
+"""Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
+
+FINER = (0.4, 0.2)
+"""Thresholds that are tried where the pieces at the default one are coarse, as shares of it."""
+
+MOST_PIECES = 64
+"""Finer cuts with more pieces are not taken: each costs time wherever the object is touched."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The convex pieces of an object.
+
+    Attributes:
+        pieces: rounded as they are written.
+        fit: how well they stand for the surface; None if it is not closed.
+        threshold: that they were cut with; None for pieces that came with the object.
+        note: on what was done beyond what was asked for; or empty.
+        seconds: CPU time spent in child processes [s].
+    """
+
+    pieces: tuple[trimesh.Trimesh, ...]
+    fit: Fit | None
+    threshold: float | None
+    note: str = ""
+    seconds: float = 0.0
+
+
+def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
+    """The convex pieces of a mesh.
+
+    Where they are coarse and no threshold was asked for, finer ones are tried, each within the
+    time that one cut may take, and the best is kept.
+
+    Raises:
+        MeshError: it cannot be cut, or given pieces are not convex.
+    """
+    if source.pieces is not None:
+        return _measured(given_pieces(source.pieces), mesh, None)
+    parameters = source.decomposition
+    first = best = _at(mesh, parameters)
+    if parameters.threshold != Decomposition().threshold:
+        return best
+    seconds = first.seconds
+    for share in FINER:
+        if coarseness(best.fit, mesh.surface) <= 1.0:
+            break
+        with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
+            finer = _at(mesh, replace(parameters, threshold=share * parameters.threshold))
+            seconds += finer.seconds
+            better = coarseness(finer.fit, mesh.surface) < coarseness(best.fit, mesh.surface)
+            if better and len(finer.pieces) <= MOST_PIECES:
+                best = finer
+    note = ""
+    if best is not first and first.fit is not None and best.fit is not None:
+        note = (
+            f"cut again with threshold {best.threshold:g} in place of {first.threshold:g}, as the"
+            f" {len(first.pieces)} pieces were coarse ({describe_fit(first.fit)}):"
+            f" {len(best.pieces)} pieces ({describe_fit(best.fit)})"
+        )
+    return replace(best, note=note, seconds=seconds)
+
+
+def _at(mesh: SurfaceMesh, parameters: Decomposition) -> Cut:
+    pieces = convex_pieces(mesh.surface, mesh.closed, parameters)
+    return _measured(pieces, mesh, parameters.threshold)
+
+
+def _measured(pieces: Pieces, mesh: SurfaceMesh, threshold: float | None) -> Cut:
+    rounded = tuple(
+        trimesh.Trimesh(np.round(p.vertices, PIECE_DECIMALS) + 0.0, p.faces, process=False)
+        for p in pieces.meshes
+    )
+    fit = measure_fit(mesh.surface, rounded, mesh.surface.volume) if mesh.closed else None
+    return Cut(rounded, fit, threshold, seconds=pieces.seconds)
