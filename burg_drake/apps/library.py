@@ -42,7 +42,7 @@ format of objects.yaml, with all that can be said of an object:
 
 convex pieces: 'decomposition.threshold' says how finely a shape is cut into them (0.01 to 1,
 default 0.05). Pieces of more than 1.25 times the volume, or off by more than 5 % of the diagonal,
-are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 64 pieces, and
+are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 96 pieces, and
 build says what came of it"""
 
 

@@ -21,7 +21,7 @@ PIECE_DECIMALS = 7
 FINER = (0.4, 0.2)
 """Thresholds that are tried where the pieces at the default one are coarse, as shares of it."""
 
-MOST_PIECES = 64
+MOST_PIECES = 96
 """Finer cuts with more pieces are not taken: each costs time wherever the object is touched."""
 
 
@@ -59,17 +59,18 @@ def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
     first = best = _at(mesh, parameters)
     if parameters.threshold != Decomposition().threshold:
         return best
-    seconds = first.seconds
+    seconds, tried = first.seconds, 0
     for share in FINER:
         if coarseness(best.fit, mesh.surface) <= 1.0:
             break
+        tried += 1
         with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
             finer = _at(mesh, replace(parameters, threshold=share * parameters.threshold))
             seconds += finer.seconds
             better = coarseness(finer.fit, mesh.surface) < coarseness(best.fit, mesh.surface)
             if better and len(finer.pieces) <= MOST_PIECES:
                 best = finer
-    note = ""
+    note = f"finer cuts with at most {MOST_PIECES} pieces fit no better" if tried else ""
     if best is not first and first.fit is not None and best.fit is not None:
         note = (
             f"cut again with threshold {best.threshold:g} in place of {first.threshold:g}, as the"
