@@ -1,0 +1,46 @@
+"""Coarse convex pieces: a thin ring, which the default cut fills by half again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from burg_drake.objects.entry import Decomposition
+from burg_drake.objects.fit import union_of
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.check import check_library
+from burg_drake.pipeline.source import ObjectSource
+
+
+@pytest.fixture(scope="module")
+def ring() -> trimesh.Trimesh:
+    return trimesh.creation.annulus(r_min=0.049, r_max=0.05, height=0.03, sections=40)
+
+
+def test_a_finer_cut_by_itself(tmp_path: Path, ring: trimesh.Trimesh) -> None:
+    source = ObjectSource(name="ring", mesh=ring, mass=0.05, contact="pieces")
+    report = build_library([source], tmp_path, confirm=False)
+    entry = report.library.entry("ring")
+    pieces = [report.library.mesh(piece) for piece in entry.pieces]
+    assert union_of(pieces).volume < 1.1 * ring.volume
+    assert entry.decomposition == Decomposition(threshold=0.02)
+    (note,) = report.notes["ring"]
+    assert note.startswith("cut again with threshold 0.02 in place of 0.05, as the ")
+    assert not [i for i in check_library(report.library) if "coarse" in i.message]
+    heavier = ObjectSource(name="ring", mesh=ring, mass=0.06, contact="pieces", friction=0.3)
+    again = build_library([heavier], tmp_path, confirm=False)
+    assert again.library.entry("ring").decomposition == entry.decomposition
+    assert "pieces" not in again.seconds["ring"]  # but those of the first build
+
+
+def test_a_threshold_that_was_asked_for_stays(tmp_path: Path, ring: trimesh.Trimesh) -> None:
+    """Build and check say the same of what comes of it."""
+    source = ObjectSource(
+        name="ring", mesh=ring, mass=0.05, decomposition=Decomposition(threshold=0.06)
+    )
+    report = build_library([source], tmp_path, confirm=False)
+    (note,) = report.notes["ring"]
+    assert note.startswith("the convex pieces are coarse: ")
+    assert note in [issue.message for issue in check_library(report.library)]
