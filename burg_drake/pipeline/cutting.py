@@ -18,8 +18,8 @@ from burg_drake.pipeline.source import ObjectSource
 PIECE_DECIMALS = 7
 """Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
 
-FINER = (0.4, 0.2)
-"""Thresholds that are tried where the pieces at the default one are coarse, as shares of it."""
+FINER = (0.02, 0.01)
+"""Thresholds that are tried where the pieces at the default one are coarse."""
 
 MOST_PIECES = 96
 """Finer cuts with more pieces are not taken: each costs time wherever the object is touched."""
@@ -60,12 +60,12 @@ def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
     if parameters.threshold != Decomposition().threshold:
         return best
     seconds, tried = first.seconds, 0
-    for share in FINER:
+    for threshold in FINER:
         if coarseness(best.fit, mesh.surface) <= 1.0:
             break
         tried += 1
         with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
-            finer = _at(mesh, replace(parameters, threshold=share * parameters.threshold))
+            finer = _at(mesh, replace(parameters, threshold=threshold))
             seconds += finer.seconds
             better = coarseness(finer.fit, mesh.surface) < coarseness(best.fit, mesh.surface)
             if better and len(finer.pieces) <= MOST_PIECES:
