@@ -53,6 +53,7 @@ def run_add(arguments: argparse.Namespace) -> int:
 
 def run_import_burg(arguments: argparse.Namespace) -> int:
     """Builds what a library of BURG-Toolkit lists, and tells how the stable poses agree."""
+    from burg_drake.core.names import name_from
     from burg_drake.formats.burg_library import read_burg_library
     from burg_drake.objects.library import load_library
     from burg_drake.pipeline.imports import burg_names, burg_sources, compare_poses, fixed_note
@@ -71,7 +72,8 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
         if note:
             print(note)
     sources = with_frictions(sources, values)
-    code = _build(sources, arguments.output, arguments.name or burg.name or None, arguments)
+    name = arguments.name or (name_from(burg.name) if burg.name else None)
+    code = _build(sources, arguments.output, name, arguments)
     library = load_library(arguments.output)
     for item in burg.objects:
         name = names[item.identifier]

@@ -13,7 +13,7 @@ import trimesh
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.objects.library import load_library
-from burg_drake.pipeline import geometry, keys
+from burg_drake.pipeline import cutting, geometry, keys
 from burg_drake.pipeline.build import BuildReport, build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.target import SCRATCH
@@ -108,7 +108,7 @@ def test_a_new_colour_keeps_the_pieces(
     source = _sources(meshes)[0]
     build([source], tmp_path / "lib")
     pieces = (tmp_path / "lib/box/pieces/000.obj").read_bytes()
-    monkeypatch.setattr(geometry, "convex_pieces", None)
+    monkeypatch.setattr(geometry, "cut", None)
     report = build([replace(source, rgba=(1.0, 0.0, 0.0, 1.0))], tmp_path / "lib")
     assert report.built == ("box",)
     assert "Kd 1 0 0" in (tmp_path / "lib/box/mesh.mtl").read_text()
@@ -185,14 +185,14 @@ def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> Non
 def test_programming_errors_in_one_object_do_not_stop_the_others(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = geometry.convex_pieces
+    original = cutting.convex_pieces
 
     def fails_for_cans(surface, *args):  # type: ignore[no-untyped-def]
         if len(surface.vertices) > 8:
             raise RuntimeError("unheard of\nwith details")
         return original(surface, *args)
 
-    monkeypatch.setattr(geometry, "convex_pieces", fails_for_cans)
+    monkeypatch.setattr(cutting, "convex_pieces", fails_for_cans)
     report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
     assert report.failed == {"can": "RuntimeError: unheard of"}
