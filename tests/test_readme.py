@@ -16,7 +16,7 @@ NOT_RUN = "<!-- not run by tests: needs files of yours -->"
 SMALL = {
     "grasps_per_object=100)": "grasps_per_object=1, engine='screening', workers=1)",
     "scene, station, 50, ": "scene, station, 8, ",
-    "scene, station, 500, ": "scene, station, 1, ",
+    "scene, station, 500)": "scene, station, 1)",
     "burg.reach(scene, station, grasps)": "burg.reach(scene, station, grasps, workers=1)",
     '"runs/best", grasps=best)': '"runs/best", grasps=best, engine="screening", workers=1)',
 }
