@@ -140,6 +140,13 @@ def test_light_imports(statement: str) -> None:
     assert {name.partition(".")[0] for name in modules} & HEAVY == set()
 
 
+def test_workers_start_without_scipys_rotations() -> None:
+    """Half of the time that importing them takes would go there."""
+    run_python(
+        "import sys, burg_drake.evaluation.executors\nassert 'scipy.spatial' not in sys.modules"
+    )
+
+
 @installed_only
 def test_console_script() -> None:
     script = Path(sysconfig.get_path("scripts")) / "burg-drake"
