@@ -122,7 +122,7 @@ def test_outcomes_of_a_run(mug: str, run: Run, capsys: pytest.CaptureFixture[str
 
 
 def test_the_hand_is_that_of_the_set(mug: str, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--object", "mug", "--station", "panda_wsg", "-n", "3", "-o", "wsg.h5"]
+    options = ["--only", "mug", "--station", "panda_wsg", "-n", "3", "-o", "wsg.h5"]
     assert cli.main(["grasps", "sample", "household", *options]) == 0
     for hand, joints in ((None, "wsg_left_joint"), ("panda_hand", "panda_finger_joint1")):
         asked = ["--hand", hand] if hand else []

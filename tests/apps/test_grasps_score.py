@@ -19,7 +19,7 @@ Capture = pytest.CaptureFixture[str]
 @pytest.fixture
 def grasp_file(tmp_path: Path) -> Path:
     path = tmp_path / "grasps.h5"
-    options = ["--object", "can", "--object", "box", "-n", "12", "-o", str(path)]
+    options = ["--only", "can", "--only", "box", "-n", "12", "-o", str(path)]
     assert main(["grasps", "sample", "household", *options]) == 0
     return path
 
@@ -72,7 +72,7 @@ def test_a_run_and_what_became_of_it(run: Run, tmp_path: Path) -> None:
 
 def test_another_hand_is_said(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "wsg.h5"
-    options = ["--object", "can", "-n", "3", "--station", "panda_wsg", "-o", str(path)]
+    options = ["--only", "can", "-n", "3", "--station", "panda_wsg", "-o", str(path)]
     assert main(["grasps", "sample", "household", *options]) == 0
     told = ((), ("--station", "panda_tabletop"), ("--station", "panda_wsg"))
     for station, said in zip(told, (False, True, False), strict=True):
@@ -124,7 +124,7 @@ def test_one_line_says_what_is_wrong(grasp_file: Path, capsys: Capture) -> None:
 
 def test_a_scene_tells_collisions(scene_file: Path, tmp_path: Path, capsys: Capture) -> None:
     grasps, out = tmp_path / "grasps.h5", tmp_path / "scored.h5"
-    sampling = ["grasps", "sample", str(scene_file), "--object", "mug", "-n", "20"]
+    sampling = ["grasps", "sample", str(scene_file), "--only", "mug", "-n", "20"]
     assert main([*sampling, "-o", str(grasps)]) == 0
     capsys.readouterr()
     assert score(grasps, "-o", out) == 0
