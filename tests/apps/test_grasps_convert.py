@@ -159,7 +159,7 @@ def test_both_names_are_needed(mug: str, capsys: pytest.CaptureFixture[str]) -> 
         (["mug.h5", "out.yaml"], "isaac_grasp or graspgen_yaml"),
         (["mug.h5", "out.h5", "--to", "acronim"], "did you mean 'acronym'"),
         (["mug.h5", "out.h5", "--from", "vgm"], "did you mean 'vgn'"),
-        (["mug.h5", "out.h5", "--from", "vgn"], "not a CSV file"),
+        (["mug.h5", "out.h5", "--from", "vgn"], "not a text file"),
         (["mug.h5", "out.h5", "--object", "bowl"], "no grasps are of object 'bowl'"),
         (["mug.h5", "out.csv"], "(--scene)"),
         (["mug.h5", "out.h5", "--hand", "wsg"], "wsg_50"),
