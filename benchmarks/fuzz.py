@@ -25,7 +25,7 @@ from random import Random
 from tests.fuzzing.damage import damaged
 from tests.fuzzing.readers import READERS, Reader, failure
 
-BATCH = 200
+BATCH = 400
 """Files that one process reads."""
 MEMORY = 6 << 30
 """Bytes of address space that a process may have; reading needs up to 3 GiB."""

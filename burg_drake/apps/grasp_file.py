@@ -108,12 +108,15 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
         UnknownNameError: it is not there.
     """
     from burg_drake.core.errors import UnknownNameError
+    from burg_drake.core.references import is_found
     from burg_drake.evaluation.grasp_input import station_reference
     from burg_drake.station.station import load_station
 
     if arguments.station is not None:
         return load_station(arguments.station)
     told = station_reference(path)
+    if told is not None and not is_found(told, "stations"):
+        raise UnknownNameError(f"{path} names station {told}, which is not there; give --station")
     try:
         return load_station(told or DEFAULT_STATION)
     except UnknownNameError as error:

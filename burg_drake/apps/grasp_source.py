@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.apps.arguments import Parser
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.references import is_found
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
@@ -96,6 +97,9 @@ def source_of(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> Sou
             f"{path} does not say where its objects are; give --scene or --library"
         )
     try:
+        told = reference not in (arguments.scene, arguments.library)
+        if told and not is_found(str(reference), "scenes", "models"):
+            raise UnknownNameError(str(reference))
         source = open_source(str(reference))
     except UnknownNameError as error:
         if reference in (arguments.scene, arguments.library):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.resources import PACKAGE_URI, data_root, resolve
+from burg_drake.core.resources import PACKAGE_URI, builtin_names, data_root, resolve
 
 SHIPPED = ("models", "scenes", "stations")
 """Folders that the package installs."""
@@ -58,6 +58,19 @@ def with_found_references(values: Any, folder: Path) -> Any:
         folder: the folder.
     """
     return _changed(values, lambda text: _found(text, folder))
+
+
+def is_found(reference: str, *kinds: str) -> bool:
+    """Whether `with_found_references` has found something, or it is built in; what it has not found
+    is relative to a folder that the file has left, not to the working directory.
+
+    Args:
+        reference: from a provenance.
+        kinds: of what may be built in, as `resources.builtin_names` has them.
+    """
+    if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):
+        return True
+    return any(reference in builtin_names(kind) for kind in kinds)
 
 
 def _found(text: str, folder: Path) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import GraspSet, parts_of
+from burg_drake.core.references import is_found
 from burg_drake.evaluation.run_grasps import run_documents, run_grasps
 from burg_drake.evaluation.run_store import load_run
 from burg_drake.evaluation.table_file import is_table
@@ -93,7 +94,8 @@ def hand_reference(path: str | Path) -> str | None:
     if hand is None:
         return None
     document = hand.get("document")
-    return document if document and Path(document).is_file() else hand["name"]
+    there = document is not None and is_found(document) and Path(document).is_file()
+    return document if there else hand["name"]
 
 
 def station_reference(path: str | Path) -> str | None:

@@ -6,6 +6,7 @@ import importlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from burg_drake.core.damaged import reading
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats.grasp_format import PANDA, GraspFormat, Gripper, Imported
@@ -63,7 +64,8 @@ def read_grasp_file(
         kind = "is a folder" if path.is_dir() else "does not exist"
         raise InvalidInputError(f"cannot read grasps: {path} {kind}; give a file")
     chosen = FORMATS[format] if format is not None else format_of(path)
-    return chosen.read(path, gripper)
+    with reading(path, f"a file of {chosen.title} that can be read"):
+        return chosen.read(path, gripper)
 
 
 def format_of(path: str | Path) -> GraspFormat:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from burg_drake.core.references import (
+    is_found,
     told_reference,
     with_found_references,
     with_told_references,
@@ -72,3 +73,14 @@ def test_references_are_found_again_where_all_has_moved(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "~nosuchuser/x", "a\0b", "x" * 5000, "package://x/y", "a\nb"])
 def test_what_is_no_path_stays(tmp_path: Path, text: str) -> None:
     assert with_found_references({"scene": text}, tmp_path) == {"scene": text}
+
+
+def test_what_was_not_found_is_not_looked_for_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lib").mkdir()
+    monkeypatch.chdir(tmp_path)
+    (told,) = with_found_references({"library": "lib"}, tmp_path / "elsewhere").values()
+    assert not is_found(told, "models")
+    assert is_found(str(tmp_path / "lib")) and is_found("household", "models")
+    assert is_found("package://burg_drake/scenes/tabletop_six.yaml")

@@ -16,6 +16,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats import graspgen_yaml, isaac_grasp
+from burg_drake.formats.grasp_files import read_grasp_file
 from burg_drake.formats.grasp_format import PANDA
 
 MANUAL = """\
@@ -384,3 +385,13 @@ def test_every_line_of_a_file_can_be_the_last(file: Callable[[str], Path]) -> No
             assert len(isaac_grasp.FORMAT.read(path, PANDA).grasps) == 1
         except InvalidInputError as error:
             assert str(path) in str(error)
+
+
+def test_widths_beyond_all_numbers_name_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    isaac_grasp.FORMAT.write(
+        GraspSet.create(np.eye(4), object="mug", width=0.04, score=1.0), path, PANDA
+    )
+    path.write_text(path.read_text().replace("joint1: 0.02", "joint1: 1e308"))
+    with pytest.raises(InvalidInputError, match=r"a\.yaml: width\[0\] is inf"):
+        read_grasp_file(path)
