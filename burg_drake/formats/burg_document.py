@@ -7,6 +7,7 @@ null, and paths are relative to the file, in the writer's spelling: with backsla
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -109,8 +110,8 @@ def relocated(given: str | None, folder: Path) -> Path | None:
         return None
     parts = given.replace("\\", "/")
     named = folder / parts
-    if named.exists():
+    if os.path.exists(named):  # in contrast to Path.exists, no error for names that are too long
         return named
     names = [name for name in parts.split("/") if name not in ("", ".", "..")]
     ends = (folder.joinpath(*names[i:]) for i in range(len(names)))
-    return next((end for end in ends if end.is_file()), named)
+    return next((end for end in ends if os.path.isfile(end)), named)

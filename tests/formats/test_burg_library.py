@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import DocumentError
+from burg_drake.formats.burg_document import relocated
 from burg_drake.formats.burg_library import read_burg_library
 
 # What `yaml.dump` makes of an ObjectLibrary: sorted keys, block lists, null for what is not known.
@@ -295,3 +296,8 @@ def test_no_file(tmp_path: Path) -> None:
     assert str(caught.value) == (
         f"cannot read {tmp_path / 'object_library.yaml'}: No such file or directory"
     )
+
+
+def test_a_name_that_is_too_long_for_a_file_is_one_that_is_not_there(tmp_path: Path) -> None:
+    given = "meshes/" + "a" * 5000
+    assert relocated(given, tmp_path) == tmp_path / given
