@@ -116,7 +116,7 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
         return load_station(arguments.station)
     told = station_reference(path)
     if told is not None and not is_found(told, "stations"):
-        raise UnknownNameError(f"{path} names station {told}, which is not there; give --station")
+        raise UnknownNameError(f"{path} names a station: {told} is not there; give --station")
     try:
         return load_station(told or DEFAULT_STATION)
     except UnknownNameError as error:
