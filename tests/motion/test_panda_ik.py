@@ -190,5 +190,5 @@ def test_what_cannot_be_solved_is_said(ik: PandaIk) -> None:
         ik.solve(X[0], [0.0])
     with pytest.raises(InvalidInputError, match=r"q7 has shape \(2, 1\); expected .* \(3, M\)"):
         ik.solve(X, [[0.0], [0.1]])
-    with pytest.raises(InvalidInputError, match="X_AH has NaN"):
+    with pytest.raises(InvalidInputError, match=r"X_AH\[0\] has NaN"):
         ik.solve(X * np.nan, [0.0])

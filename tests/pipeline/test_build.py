@@ -344,7 +344,7 @@ def test_a_library_is_a_package(meshes: Path, tmp_path: Path) -> None:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    build(_sources(meshes), tmp_path / "lib", name="My Things")
+    build(_sources(meshes), tmp_path / "lib", name="My.Things")
     moved = tmp_path / "moved"
     (tmp_path / "lib").rename(moved)
     plant = MultibodyPlant(0.001)
