@@ -117,6 +117,21 @@ def add_station(parser: Parser) -> None:
     )
 
 
+def add_only(parser: Parser, what: str) -> None:
+    """The option --only, by which all verbs choose objects.
+
+    Args:
+        parser: gets it.
+        what: is chosen, before "of this object".
+    """
+    parser.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help=f"{what} of this object, or instance of a scene, alone; may be given several times",
+    )
+
+
 def add_renaming(parser: Parser) -> None:
     """The option --rename; evaluate, which is not about a file alone, calls it --grasps-object."""
     parser.add_argument(

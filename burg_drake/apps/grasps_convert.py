@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import Parser, add_renaming, add_verb, number
+from burg_drake.apps.arguments import Parser, add_only, add_renaming, add_verb, number
 from burg_drake.apps.grasp_file import (
     FRAMES,
     add_camera_options,
@@ -30,7 +30,7 @@ def add_to(group: Any) -> None:
         run_convert,
         "write grasps of one format in another",
         "burg-drake grasps convert Mug_10f6_0.00027.h5 mug.h5 --rename mug",
-        "burg-drake grasps convert grasps.h5 mug.yaml --to isaac_grasp --object mug",
+        "burg-drake grasps convert grasps.h5 mug.yaml --to isaac_grasp --only mug",
         "burg-drake grasps convert grasps.h5 out/ --to graspgen --success-above 0.5",
         "burg-drake grasps convert runs/first out/ --to acronym",
         "burg-drake grasps convert scene.npy grasps.h5 --scene tabletop_six --camera-pose cam.npy",
@@ -47,7 +47,7 @@ def add_to(group: Any) -> None:
 
 def _add_selection(parser: Parser) -> None:
     """Options about which grasps are written, and of what."""
-    parser.add_argument("--object", metavar="NAME", help="write the grasps of this object only")
+    add_only(parser, "write grasps")
     add_renaming(parser)
     parser.add_argument(
         "--success-above",
@@ -103,10 +103,12 @@ def _read(arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper) 
 
 
 def _selected(grasps: GraspSet, arguments: argparse.Namespace) -> GraspSet:
-    from burg_drake.formats.conversion import of_object, with_success
+    from burg_drake.evaluation.instance_names import are_of
+    from burg_drake.formats.conversion import with_success
 
-    if arguments.object is not None:
-        grasps = of_object(grasps, arguments.object)
+    if arguments.only:
+        instances = grasps.columns.get("instance")
+        grasps = grasps.select(are_of(arguments.only, arguments.input, grasps.object, instances))
     if arguments.success_above is not None:
         grasps = with_success(grasps, arguments.success_above)
     return grasps

@@ -17,7 +17,6 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.apps.grasp_output import add_format, output_of
 from burg_drake.apps.sampling_options import (
-    add_replaced,
     add_sampling,
     grasps_per_object,
     print_shortfalls,
@@ -64,9 +63,6 @@ def add_to(group: Any) -> None:
     add_format(parser)
     add_station(parser)
     _add_settings(parser)
-    add_replaced(parser, "--clear", "grasps are clear of the scene unless you say --blind")
-    for option in ("--object", "--instance"):
-        add_replaced(parser, option, "choose objects and instances with --only")
 
 
 def _add_settings(parser: argparse.ArgumentParser) -> None:

@@ -13,8 +13,8 @@ from burg_drake.apps.arguments import (
     add_verb,
     add_view,
     number,
-    positive_int,
 )
+from burg_drake.apps.grasp_choice import add_choice, choose, holders
 from burg_drake.apps.grasp_file import (
     add_file_options,
     add_told_station,
@@ -22,8 +22,7 @@ from burg_drake.apps.grasp_file import (
     station_for,
 )
 from burg_drake.apps.grasp_source import Source, add_source, source_of
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.best_grasps import Ranking
     from burg_drake.station.station import Station
-
-DEFAULT_MOST = 20
 
 
 def add_to(group: Any) -> None:
@@ -44,11 +41,11 @@ def add_to(group: Any) -> None:
         run_show,
         "show grasps in Meshcat, coloured by outcome, score or any other column",
         "burg-drake grasps show runs/first",
-        "burg-drake grasps show runs/first --instance mug --outcome lifted,slipped --all",
+        "burg-drake grasps show runs/first --only mug --outcome lifted,slipped --all",
         "burg-drake grasps show runs/first --select mug-0123456789ab",
         "burg-drake grasps show runs/first --color slip --range 0 0.005",
         "burg-drake grasps show grasps.h5 --color clearance --html grasps.html",
-        "burg-drake grasps show mug.h5 --library household --object mug",
+        "burg-drake grasps show mug.h5 --library household --only mug",
         "",
         "A click on a grasp of a page, or in its list, shows the whole gripper there; in the live",
         "view the slider `grasp` of Meshcat's controls does, best ones of each object first.",
@@ -58,7 +55,7 @@ def add_to(group: Any) -> None:
     add_source(show)
     add_told_station(show)
     add_renaming(show)
-    _add_choice(show)
+    add_choice(show)
     show.add_argument(
         "--color",
         metavar="COLUMN",
@@ -74,29 +71,6 @@ def add_to(group: Any) -> None:
         " without outliers)",
     )
     add_view(show)
-
-
-def _add_choice(show: argparse.ArgumentParser) -> None:
-    show.add_argument("--instance", metavar="NAME", help="only grasps of this object of the scene")
-    show.add_argument("--object", metavar="NAME", help="only grasps of this object of the library")
-    show.add_argument(
-        "--outcome",
-        metavar="A,B",
-        type=_outcomes,
-        help="only grasps with these outcomes: " + ", ".join(Outcome),
-    )
-    count = show.add_mutually_exclusive_group()
-    count.add_argument(
-        "--most",
-        metavar="N",
-        type=positive_int,
-        default=DEFAULT_MOST,
-        help="the best N grasps of each object: of a run those that were lifted, as `replay --best`"
-        " ranks them, and then those that came farthest; of a file those with the highest scores,"
-        " or without scores evenly taken (default: %(default)s)",
-    )
-    count.add_argument("--all", action="store_true", help="all grasps")
-    show.add_argument("--select", metavar="ID", help="begin with the whole gripper at this grasp")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -129,7 +103,7 @@ def run_show(arguments: argparse.Namespace) -> int:
     from burg_drake.visualization.gripper_view import GripperView
 
     content = _content(arguments)
-    chosen, selected, caption = _choose(content, arguments)
+    chosen, selected, caption = choose(content.grasps, content.ranking, arguments)
     grasps, station = content.grasps.select(chosen), content.station
     color = arguments.color and column_called(grasps, arguments.color)
     groups, legend = color_by(grasps, color, arguments.range)
@@ -150,7 +124,7 @@ def run_show(arguments: argparse.Namespace) -> int:
         caption=[caption],
         legend=legend,
         controls=GraspPicker(
-            gripper, X_WG, width, _holders(grasps), _labels(grasps), groups, selected
+            gripper, X_WG, width, holders(grasps), _labels(grasps), groups, selected
         ),
     )
     return 0
@@ -231,51 +205,6 @@ def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
     )
 
 
-def _choose(content: Content, arguments: argparse.Namespace) -> tuple[list[int], int | None, str]:
-    """Indices of the grasps to be drawn, which of these has the gripper, and what people are told
-    about the choice."""
-    import numpy as np
-
-    from burg_drake.evaluation.best_grasps import best_of_each, index_of
-
-    grasps = content.grasps
-    keep = np.ones(len(grasps), dtype=bool)
-    for column in ("instance", "object"):
-        name = getattr(arguments, column)
-        if name is not None:
-            known = set(grasps.column(column).tolist())
-            if name not in known:
-                raise UnknownNameError(
-                    f"{arguments.file} has no grasps on {name!r}; {nearest(name, known)}"
-                )
-            keep &= grasps.column(column) == name
-    if arguments.outcome is not None:
-        keep &= np.isin(grasps.column("outcome"), [o.value for o in arguments.outcome])
-    if not keep.any():
-        raise InvalidInputError(f"{arguments.file} has no such grasps; choose other outcomes")
-    most = None if arguments.all else arguments.most
-    holder = np.array(_holders(grasps))
-    chosen = best_of_each(holder, keep, content.ranking, most)
-    caption = f"{len(chosen):,} of {len(grasps):,} grasps shown"
-    if len(chosen) < keep.sum():
-        by = content.ranking.by
-        how = f"the best {most} of each object by {by}" if by else f"{most} of each object, evenly"
-        caption += f": {how}; --most N or --all shows more"
-    selected = None
-    if arguments.select is not None:
-        index = index_of(grasps, arguments.select, arguments.file)
-        if index not in chosen:
-            same = [k for k, other in enumerate(chosen) if holder[other] == holder[index]]
-            chosen.insert(same[-1] + 1 if same else len(chosen), index)
-        selected = chosen.index(index)
-    return chosen, selected, caption
-
-
-def _holders(grasps: GraspSet) -> list[str]:
-    """The instance of each grasp, or without a scene the object."""
-    return list(grasps.column("instance" if "instance" in grasps.columns else "object").tolist())
-
-
 def _labels(grasps: GraspSet) -> list[str]:
     """What a list says of each grasp: its score or outcome, and its identifier."""
     from burg_drake.evaluation.best_grasps import shown_ids
@@ -304,13 +233,3 @@ def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -
     ends = np.vstack([X_WG[:, :3, 3], station.hand.X_AH(X_WG)[:, :3, 3]])
     aim_camera(scene, station, meshcat, robot="none", also=ends)
     return X_WG
-
-
-def _outcomes(text: str) -> set[Outcome]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    known = [outcome.value for outcome in Outcome]
-    unknown = [name for name in names if name not in known]
-    if unknown or not names:
-        given = unknown[0] if unknown else text
-        raise argparse.ArgumentTypeError(f"{given!r} is no outcome; {nearest(given, known)}")
-    return {Outcome(name) for name in names}

@@ -151,14 +151,19 @@ def _add_views(group: Any) -> None:
         run_show,
         "show objects, their convex pieces, contact surfaces and stable poses in Meshcat",
         "burg-drake library show household",
-        "burg-drake library show my_library --only mug bowl",
+        "burg-drake library show my_library --only mug --only bowl",
         "burg-drake library show my_library --html gallery.html --sheet sheet.html",
     )
     for verb in (listing, check, show):
         verb.add_argument(
             "library", metavar="LIBRARY", help="folder of a library, or name of a built-in one"
         )
-    show.add_argument("--only", metavar="NAME", nargs="+", help="these objects alone")
+    show.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help="this object alone; may be given several times",
+    )
     show.add_argument(
         "--sheet", metavar="FILE", help="write a contact sheet: one page with pictures and figures"
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_verb, add_view, positive_int
+from burg_drake.apps.arguments import add_only, add_verb, add_view, positive_int
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -60,12 +60,7 @@ def add_to(verbs: Any) -> None:
         " again when things are not quite where they should be; of equal ones (to 0.5 mm) that"
         " which slipped, tilted and pushed others least",
     )
-    parser.add_argument(
-        "--only",
-        metavar="OBJECT",
-        action="append",
-        help="with --best, of this object or instance; may be given several times",
-    )
+    add_only(parser, "with --best, the best grasp")
     parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
     parser.add_argument("--station", metavar="FILE", help="where its station is now")
     parser.add_argument(

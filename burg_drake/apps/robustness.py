@@ -7,7 +7,15 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import add_quiet, add_verb, not_negative, positive_int, seed, workers
+from burg_drake.apps.arguments import (
+    add_only,
+    add_quiet,
+    add_verb,
+    not_negative,
+    positive_int,
+    seed,
+    workers,
+)
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 from burg_drake.core.errors import InvalidInputError
 
@@ -51,12 +59,7 @@ def add_to(verbs: Any) -> None:
         help="the N best lifted grasps of each object: those with the most room around the open"
         " hand, as `replay --best` ranks them (default: %(default)s)",
     )
-    parser.add_argument(
-        "--only",
-        metavar="OBJECT",
-        action="append",
-        help="the best ones of this object or instance alone; may be given several times",
-    )
+    add_only(parser, "the best grasps")
     parser.add_argument(
         "--tests",
         metavar="LIST",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.arguments import (
     DEFAULT_APPROACH_ANGLE,
     Parser,
+    add_only,
     approach_angle,
     positive_int,
     seed,
@@ -41,12 +42,7 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
         action="store_true",
         help="sample without regard to the hand, by points of contact alone, as in the literature",
     )
-    parser.add_argument(
-        "--only",
-        metavar="OBJECT",
-        action="append",
-        help="grasps of this object, or instance of the scene, alone; may be given several times",
-    )
+    add_only(parser, "grasps")
     parser.add_argument(
         "--approach-angle",
         metavar="DEG",
@@ -82,15 +78,3 @@ def print_shortfalls(sampled: Mapping[str, GraspSet], asked: int) -> None:
         note = shortfall(name, asked, grasps.provenance, len(grasps))
         if note:
             print(f"note: {note}")
-
-
-def add_replaced(parser: Parser, option: str, instead: str) -> None:
-    """Adds an option that is no more, which ends with what to do instead."""
-    parser.add_argument(
-        option, nargs="?", action=_Replaced, metavar="", const=instead, help=argparse.SUPPRESS
-    )
-
-
-class _Replaced(argparse.Action):
-    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
-        parser.error(f"{option_string} is no more: {self.const}")

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.scene.scene import Scene
 
@@ -108,3 +111,31 @@ def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...
     names = list(only or scene.instances)
     chosen = {key for name in names for key in instances_called(scene, name)}
     return tuple(key for key in scene.instances if key in chosen)
+
+
+def are_of(
+    only: Iterable[str] | None,
+    where: str,
+    objects: NDArray[np.str_],
+    instances: NDArray[np.str_] | None = None,
+) -> NDArray[np.bool_]:
+    """Which grasps are of objects or instances that go by some names, (N,); all without names.
+
+    Args:
+        only: the names.
+        where: the grasps are, for messages.
+        objects: (N,) object of each grasp.
+        instances: (N,) instance of each grasp, if it is known.
+
+    Raises:
+        UnknownNameError: no grasp is of that name.
+    """
+    names = list(only or ())
+    holders = [objects] if instances is None else [objects, instances]
+    if not names:
+        return np.ones(len(objects), dtype=bool)
+    known = {name for column in holders for name in column.tolist()}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(f"{where} has no grasps of {name!r}; {nearest(name, known)}")
+    return np.any([np.isin(column, names) for column in holders], axis=0)

@@ -6,11 +6,11 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core.errors import UnknownNameError, listing, nearest
+from burg_drake.core.errors import UnknownNameError, listing
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.instance_names import are_of
 from burg_drake.evaluation.table import Columns
 
 LENGTH_STEP = 1e-4
@@ -52,7 +52,8 @@ def best_rows(
     Raises:
         UnknownNameError: the table has no such object or instance.
     """
-    lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & _chosen(columns, only))
+    chosen = are_of(only, "the table", columns["object"], columns["instance"])
+    lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & chosen)
     clearance = columns["clearance"][lifted] if "clearance" in columns else np.full(len(lifted), 0)
     room = np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-np.inf)
     penalty = (
@@ -73,19 +74,6 @@ def best_rows(
         for name in dict.fromkeys(objects.tolist())
         for row in [row for row in ranked if objects[row] == name][:count]
     ]
-
-
-def _chosen(columns: Columns, only: Iterable[str] | None) -> NDArray[np.bool_]:
-    """(N,) rows of the objects and instances that go by some names; all if None."""
-    names = None if only is None else list(only)
-    if not names:
-        return np.ones(len(columns["id"]), dtype=bool)
-    for name in names:
-        known = {*columns["object"].tolist(), *columns["instance"].tolist()}
-        if name not in known:
-            raise UnknownNameError(f"there are no grasps of {name!r}; {nearest(name, known)}")
-    objects = np.isin(columns["object"], names)
-    return np.asarray(objects | np.isin(columns["instance"], names))
 
 
 def _rounded(values: Array, step: float) -> Array:

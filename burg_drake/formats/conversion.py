@@ -67,19 +67,6 @@ def _renamed(provenance: Any, names: Mapping[str, str]) -> Any:
     return result
 
 
-def of_object(grasps: GraspSet, name: str) -> GraspSet:
-    """The grasps of one object.
-
-    Raises:
-        UnknownNameError: there are none.
-    """
-    chosen = grasps.object == name
-    if not chosen.any():
-        known = set(grasps.object.tolist())
-        raise UnknownNameError(f"no grasps are of object {name!r}; {nearest(name, known)}")
-    return grasps.select(chosen)
-
-
 def with_success(grasps: GraspSet, above: float) -> GraspSet:
     """The same grasps, of which those succeed whose score is above a limit."""
     success = np.where(np.isnan(grasps.score), np.nan, (grasps.score > above).astype(float))

@@ -75,7 +75,7 @@ def test_a_folder_gets_one_file_an_object(mug: str) -> None:
         "a.json": [False, True],
         "b.json": [True],
     }
-    assert convert("both.npz", "b.json", "--object", "b", "--success-above", "0.5") == 0
+    assert convert("both.npz", "b.json", "--only", "b", "--success-above", "0.5") == 0
     assert Path("b.json").read_text() == Path("out/b.json").read_text()
 
 
@@ -107,7 +107,7 @@ def ended(*arguments: str) -> int | str | None:
 
 def test_options_may_stand_anywhere(mug: str) -> None:
     convert(mug, "mug.h5", "--rename", "mug")
-    assert convert("mug.h5", "--to", "isaac_grasp", "x.yaml", "--object", "mug") == 0
+    assert convert("mug.h5", "--to", "isaac_grasp", "x.yaml", "--only", "mug") == 0
     assert Path("x.yaml").exists()
 
 
@@ -160,7 +160,7 @@ def test_both_names_are_needed(mug: str, capsys: pytest.CaptureFixture[str]) -> 
         (["mug.h5", "out.h5", "--to", "acronim"], "did you mean 'acronym'"),
         (["mug.h5", "out.h5", "--from", "vgm"], "did you mean 'vgn'"),
         (["mug.h5", "out.h5", "--from", "vgn"], "not a text file"),
-        (["mug.h5", "out.h5", "--object", "bowl"], "no grasps are of object 'bowl'"),
+        (["mug.h5", "out.h5", "--only", "bowl"], "mug.h5 has no grasps of 'bowl'"),
         (["mug.h5", "out.csv"], "(--scene)"),
         (["mug.h5", "out.h5", "--hand", "wsg"], "wsg_50"),
     ],

@@ -63,16 +63,6 @@ def test_evaluate_and_reach_judge_the_same_grasps(scene_file: Path, tmp_path: Pa
     assert [f"mug-{id}" for id in reached["mug"].id] == given.id[:20]
 
 
-@pytest.mark.parametrize("option", ["--clear", "--object", "--instance"])
-def test_options_that_are_no_more_say_what_to_do(option: str, capsys: Capture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        sample("tabletop_six", option, "-o", "x.h5")
-    error = capsys.readouterr().err
-    assert ended.value.code == 2 and error.count("\n") == 1
-    assert f"{option} is no more: " in error
-    assert ("--blind" if option == "--clear" else "--only") in error
-
-
 def test_a_library_with_many_options(tmp_path: Path) -> None:
     faces = len(load_library("household").surface("mug").faces)
     np.save(tmp_path / "weights.npy", np.arange(float(faces)))

@@ -83,7 +83,7 @@ def test_in_the_scene_by_any_column(file: Path, capsys: Capture) -> None:
 
 def test_choice(file: Path, capsys: Capture) -> None:
     library = ("--library", "household", "--color", "object")
-    assert shown(capsys, file, *library, "--object", "bowl") == [
+    assert shown(capsys, file, *library, "--only", "bowl") == [
         "■ bowl (4)",
         "4 of 12 grasps shown",
     ]
@@ -129,7 +129,7 @@ def test_the_gripper_is_put_where_the_grasp_is(
 ) -> None:
     """Of the Panda hand, G is 0.1034 m before the flange, and two parts slide, half each."""
     page = tmp_path / "page.html"
-    shown(capsys, file, "--scene", "tabletop_six", "--html", page, "--object", "mug")
+    shown(capsys, file, "--scene", "tabletop_six", "--html", page, "--only", "mug")
     labels, data, _ = picker(page)
     assert len(labels) == 9 and all(label.split()[1].startswith("mug-") for label in labels[1:])
     X_WO = load_station("panda_tabletop").document.X_WS.matrix()
@@ -201,9 +201,8 @@ def test_refusals(file: Path, run: Run, tmp_path: Path, capsys: Capture) -> None
     library = ("--library", "household")
     for arguments, message in [
         ((file, *library, "--color", "clearence"), "no column 'clearence'; did you mean 'clear"),
-        ((file, *library, "--object", "mugg"), "has no grasps on 'mugg'; did you mean 'mug'"),
+        ((file, *library, "--only", "mugg"), "has no grasps of 'mugg'; did you mean 'mug'"),
         ((file, *library, "--outcome", "lifted"), "no column 'outcome'"),
-        ((file, *library, "--instance", "mug"), "no column 'instance'"),
         ((file, *library, "--color", "maker", "--range", 0, 1), "column 'maker' has names"),
         ((file, *library, "--range", 1, 0), "the range 1 to 0 does not rise"),
         ((file, "--library", "kitchen"), "is neither a scene nor an object library"),

@@ -277,7 +277,7 @@ def test_grasps_in_colour(run: Run, tmp_path: Path, capsys: Capture) -> None:
     ("options", "line"),
     [
         (["--outcome", "lifted,dropped"], "■ lifted (1)"),
-        (["--instance", "box", "--most", "1"], "■ lifted (1)"),
+        (["--only", "box", "--most", "1"], "■ lifted (1)"),
     ],
 )
 def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Capture) -> None:
@@ -289,7 +289,7 @@ def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Captu
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--instance", "bux"], "has no grasps on 'bux'; did you mean 'box'? Known: box"),
+        (["--only", "bux"], "has no grasps of 'bux'; did you mean 'box'? Known: box"),
         (["--outcome", "dropped"], "has no such grasps; choose other outcomes"),
         (["--outcome", "lifte"], "'lifte' is no outcome; did you mean 'lifted'? Known: "),
     ],

@@ -12,7 +12,6 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats.conversion import (
-    of_object,
     with_objects_renamed,
     with_success,
     write_each_object,
@@ -53,12 +52,6 @@ def test_names_that_do_not_fit_are_refused(both: GraspSet) -> None:
         with_objects_renamed(both, {"mag": "cup"})
     with pytest.raises(InvalidInputError, match=r"of 2 objects \(1a/2b, mug\); say which is 'cup'"):
         with_objects_renamed(both, {"": "cup"})
-
-
-def test_one_object_is_chosen(both: GraspSet) -> None:
-    np.testing.assert_array_equal(of_object(both, "mug").id, both.id[:3])
-    with pytest.raises(UnknownNameError, match="no grasps are of object 'bowl'"):
-        of_object(both, "bowl")
 
 
 def test_success_is_what_scores_above_the_limit() -> None:
