@@ -161,14 +161,13 @@ def _grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> Mapping[str, GraspSet]:
     """The grasps of the file, or sampled ones, by instance."""
-    from burg_drake.evaluation.instance_names import chosen_instances
+    from burg_drake.evaluation.instance_names import on_chosen
 
     if arguments.grasps is not None:
         given = read_given(arguments, scene, station)
         for note in given.notes:
             print(f"note: {note}")
-        chosen = chosen_instances(scene, arguments.only)
-        return {name: grasps for name, grasps in given.by_instance.items() if name in chosen}
+        return on_chosen(scene, given.by_instance, arguments.only)
     return sampled_grasps(arguments, scene, station)
 
 

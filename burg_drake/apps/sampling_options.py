@@ -33,8 +33,9 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
         "--grasps-per-object",
         metavar="N",
         type=positive_int,
-        help="grasps sampled for each object that the hand can take as it is: open it is clear of"
-        f" object and scene, and its pads meet the object antipodally (default: {default})",
+        help="number of grasps to sample on each object; only those at which the open hand collides"
+        " with nothing, and its pads meet the object within the friction cones"
+        f" (default: {default})",
     )
     parser.set_defaults(default_grasps=default)
     parser.add_argument(
@@ -66,8 +67,11 @@ def require_sampled(arguments: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: names the option.
     """
-    if arguments.grasps is not None and arguments.blind:
-        raise InvalidInputError("--blind is about sampled grasps; leave it or --grasps away")
+    for name in ("blind", "approach_angle"):
+        if getattr(arguments, name) and arguments.grasps is not None:
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} is about sampled grasps; leave it or --grasps away"
+            )
 
 
 def print_shortfalls(sampled: Mapping[str, GraspSet], asked: int) -> None:

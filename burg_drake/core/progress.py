@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
+from burg_drake.core.figures import figure
 from burg_drake.core.outcome import Outcome
 
 INTERVAL = 30.0
@@ -250,7 +251,8 @@ def _pace(event: Progress) -> str:
     clock = f"{left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
     if event.rate <= 0.0:
         return clock
-    rate = f"{event.rate:.1f}/s" if event.rate >= 1.0 else f"{60.0 * event.rate:.1f}/min"
+    slow = event.rate < 1.0
+    rate = f"{figure(60.0 * event.rate)}/min" if slow else f"{figure(event.rate)}/s"
     return f"{rate}  {clock}"
 
 

@@ -28,7 +28,7 @@ from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.instance_names import chosen_instances
+from burg_drake.evaluation.instance_names import chosen_instances, on_chosen
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.report import write_report
@@ -134,7 +134,7 @@ def evaluate(
     chosen = chosen_instances(scene, only)
     if grasps is not None:
         grasps = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
-        grasps = grasps if only is None else {k: v for k, v in grasps.items() if k in chosen}
+        grasps = on_chosen(scene, grasps, only)
     workers = default_workers() if workers is None else workers
     if workers < 1:
         raise InvalidInputError(f"workers is {workers}; give 1 or more")

@@ -1,4 +1,5 @@
-"""Which instances of a scene the names in a grasp file stand for."""
+"""Which instances of a scene, and which grasps, names stand for: names in a grasp file, and names
+by which a user chooses."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.core.grasps import GraspSet
 from burg_drake.scene.scene import Scene
 
 
@@ -111,6 +113,26 @@ def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...
     names = list(only or scene.instances)
     chosen = {key for name in names for key in instances_called(scene, name)}
     return tuple(key for key in scene.instances if key in chosen)
+
+
+def on_chosen(
+    scene: Scene, by_instance: Mapping[str, GraspSet], only: Iterable[str] | None
+) -> Mapping[str, GraspSet]:
+    """The grasps on the instances that some names stand for; all if there are no names.
+
+    Raises:
+        UnknownNameError: a name stands for no instance of the scene.
+        InvalidInputError: there are no grasps on any of them.
+    """
+    names = list(only or ())
+    if not names:
+        return by_instance
+    chosen = chosen_instances(scene, names)
+    found = {name: by_instance[name] for name in chosen if len(by_instance.get(name, ()))}
+    if not found:
+        there = listing([name for name, grasps in by_instance.items() if len(grasps)])
+        raise InvalidInputError(f"no grasps are of {listing(names)}; there are some of {there}")
+    return found
 
 
 def are_of(

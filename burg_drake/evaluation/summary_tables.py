@@ -96,4 +96,4 @@ def _cost_table(summary: Summary) -> TextTable:
 
 
 def _rows(summary: Summary) -> list[Group]:
-    return [*summary.objects, summary.total] if len(summary.objects) > 1 else [summary.total]
+    return [*summary.objects, summary.total] if len(summary.objects) != 1 else [*summary.objects]

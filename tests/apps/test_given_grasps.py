@@ -103,6 +103,8 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
         (["--grasps-object", "mug"], "--grasps-object is about a file; add --grasps FILE"),
         (["--object-ids", "5=mug"], "--object-ids is about a file; add --grasps FILE"),
         (["--scene-id", "a"], "--scene-id is about a file; add --grasps FILE"),
+        (["--grasps", "a.npy", "--blind"], "--blind is about sampled grasps; leave it or"),
+        (["--grasps", "a.npy", "--approach-angle", "30"], "--approach-angle is about sampled"),
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),

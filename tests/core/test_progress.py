@@ -79,11 +79,11 @@ def test_without_a_terminal_there_is_a_line_every_half_minute(capsys: Capture) -
     assert lines == [
         "starting  0/1,000 grasps  0 lifted, 1 failed",
         "judging  1/1,000 grasps  1 lifted, 1 failed",
-        "judging  41/1,000 grasps  8.0/s  0:02:00 left  41 lifted, 1 failed",  # within seconds
-        "judging  281/1,000 grasps  8.0/s  0:01:30 left  281 lifted, 1 failed",
-        "judging  521/1,000 grasps  8.0/s  0:01:00 left  521 lifted, 1 failed",
-        "judging  761/1,000 grasps  8.0/s  0:00:30 left  761 lifted, 1 failed",
-        "judging  1,000/1,000 grasps  8.0/s  0:00:00 left  1,000 lifted, 1 failed",
+        "judging  41/1,000 grasps  8/s  0:02:00 left  41 lifted, 1 failed",  # within seconds
+        "judging  281/1,000 grasps  8/s  0:01:30 left  281 lifted, 1 failed",
+        "judging  521/1,000 grasps  8/s  0:01:00 left  521 lifted, 1 failed",
+        "judging  761/1,000 grasps  8/s  0:00:30 left  761 lifted, 1 failed",
+        "judging  1,000/1,000 grasps  8/s  0:00:00 left  1,000 lifted, 1 failed",
     ]
 
 

@@ -108,6 +108,15 @@ def test_names_of_objects_are_whole_at_80_columns(run: Run) -> None:
     assert all(line == line.rstrip() for line in lines)
 
 
+def test_a_single_object_goes_by_its_name(run: Run) -> None:
+    summary = summarize(run)
+    stream = io.StringIO()
+    view = summary_view(dataclasses.replace(summary, objects=summary.objects[:1]))
+    Console(file=stream, width=80).print(view)
+    heads = [line.split()[0] for line in stream.getvalue().splitlines() if line]
+    assert "cube" in heads and "all" not in heads
+
+
 def test_many_objects_become_a_list(run: Run) -> None:
     summary = summarize(run)
     names = [f"{k:03d}_a_scanned_thing" for k in range(12)]
