@@ -18,6 +18,7 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
+from burg_drake.apps.retries import add_retry_failed, how_to_retry
 from burg_drake.apps.sampling_options import (
     add_sampling,
     grasps_per_object,
@@ -95,6 +96,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
+    add_retry_failed(parser, "grasps")
     add_quiet(parser)
 
 
@@ -111,6 +113,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
     require_sampled(arguments)
     if arguments.plan_format and not arguments.plans:
         raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
+    if arguments.retry_failed and not arguments.plans:
+        raise InvalidInputError("--retry-failed is about a folder of plans; add --plans DIR")
     if arguments.only_reachable and arguments.output is None:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
     if arguments.plans:
@@ -130,6 +134,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         exact=not arguments.screening,
         plans=arguments.plans,
         plan_format=arguments.plan_format or "csv",
+        retry_failed=arguments.retry_failed,
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
@@ -141,18 +146,20 @@ def run_reach(arguments: argparse.Namespace) -> int:
         print(f"{(yes & ~unplanned).sum()} plans are in {arguments.plans}")
     if output is not None:
         _write(judged.select(yes) if arguments.only_reachable else judged, output, station)
-    _print_failures(judged.select(~answered), "could not be judged", len(judged))
+    failed = judged.select(~answered)
+    retry = f"; {how_to_retry(0, len(failed))}" if arguments.plans else ""
+    _print_failures(failed, "could not be judged", len(judged), retry)
     _print_failures(judged.select(unplanned), "have no plan", int(yes.sum()))
     return 0 if answered.all() and not unplanned.any() else 1
 
 
-def _print_failures(failed: GraspSet, what: str, total: int) -> None:
+def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:
     """A line about grasps whose computation has failed, if there are any."""
     if len(failed):
         reason = failed.column("reason")[0].removeprefix("no plan: ")
         id = f"{failed.column('instance')[0]}-{failed.id[0]}"
         print(
-            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}",
+            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}{retry}",
             file=sys.stderr,
         )
 

@@ -53,6 +53,7 @@ def reach(
     exact: bool = True,
     plans: str | Path | None = None,
     plan_format: PlanFormat = "csv",
+    retry_failed: bool = False,
     workers: int | None = None,
     progress: bool | Listener = False,
 ) -> GraspSet:
@@ -74,6 +75,7 @@ def reach(
             grasps are tried again whose worker process was ended from outside or whose plan is
             missing.
         plan_format: `json` for files that `load_plan` reads.
+        retry_failed: try all grasps again that an earlier call with these `plans` could not judge.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
 
@@ -121,7 +123,7 @@ def reach(
                 ),
             )
             journal = opened.enter_context(folder.opened())
-            verdicts = folder.finished()
+            verdicts = folder.finished(retry_failed=retry_failed)
         factory = ReachJudgeFactory(scene, station, exact, folder)
         left = [candidate for candidate in candidates if candidate.id not in verdicts]
         outcomes = Counter(v.outcome for v in verdicts.values())

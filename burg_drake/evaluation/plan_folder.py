@@ -92,12 +92,16 @@ class PlanFolder:
         """What the journal holds, by grasp id."""
         return read_journal(self.path / JOURNAL_FILE)
 
-    def finished(self) -> dict[str, Verdict]:
-        """Verdicts that stand: the plan of what is reachable is there."""
+    def finished(self, *, retry_failed: bool = False) -> dict[str, Verdict]:
+        """Verdicts that stand: the plan of what is reachable is there.
+
+        Args:
+            retry_failed: see `Verdict.is_open`.
+        """
         return {
             id: verdict
             for id, verdict in self.verdicts().items()
-            if not verdict.is_open()
+            if not verdict.is_open(retry_failed=retry_failed)
             and (verdict.outcome is not Outcome.REACHABLE or self.plan(id).is_file())
         }
 

@@ -97,21 +97,20 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
     root = tally.library.root
     todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
+        checked = _confirms(source, confirm)
         try:
-            keys = stage_keys(source, confirm and not source.fixed)
+            keys = stage_keys(source, checked)
         except BurgError as error:
             tally.fail(source.name, error)
             continue
         entry = tally.entries.get(source.name)
-        if entry is not None and is_current(
-            entry, keys, source, root, confirm and not source.fixed
-        ):
+        if entry is not None and is_current(entry, keys, source, root, checked):
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
     with scratch_folder(root) as scratch:
         work = [
-            Work(s, keys, root, scratch / s.name, confirm and not s.fixed)
+            Work(s, keys, root, scratch / s.name, _confirms(s, confirm))
             for s, keys in _longest_first(todo)
         ]
         try:
@@ -122,6 +121,11 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
                     tally.fail(item.source.name, outcome)
         finally:
             tally.save()
+
+
+def _confirms(source: ObjectSource, confirm: bool) -> bool:
+    """Whether the stable poses of an object are simulated, if any are: not what is fixed."""
+    return confirm and not source.fixed
 
 
 def _longest_first(

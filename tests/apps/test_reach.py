@@ -121,6 +121,7 @@ def test_a_board_out_of_reach_is_one_line(
     ("options", "message"),
     [
         (["--only-reachable"], "--only-reachable is about what is written; add -o OUT"),
+        (["--retry-failed"], "--retry-failed is about a folder of plans; add --plans DIR"),
         (["--station", "wsg_tabletop"], "station 'wsg_tabletop' has no arm"),
         (["-o", "/dev/null/reach.csv"], "/dev/null"),
         (["-o", "reach.xyz"], "(--to)"),

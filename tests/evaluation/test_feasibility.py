@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,11 +16,14 @@ import pytest
 from known_judge import refuse
 
 from burg_drake.core.columns import describe
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.progress import Progress
 from burg_drake.evaluation.feasibility import reach, reach_columns
+from burg_drake.evaluation.journal import encode
+from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.table_file import read_table, write_table
 from burg_drake.motion.plan_file import load_plan
 from burg_drake.scene.scene import Scene, load_scene
@@ -161,6 +165,26 @@ def test_what_is_finished_is_not_asked_again(
     assert contents(plans) == before
     for name, values in judged.columns.items():
         np.testing.assert_array_equal(again.column(name), values)
+
+
+def test_what_failed_is_asked_again_on_request(
+    judged: GraspSet,
+    plans: Path,
+    scene: Scene,
+    station: Station,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.feasibility.ReachJudgeFactory", lambda *_: refuse)
+    folder = shutil.copytree(plans, tmp_path / "plans")
+    given = GraspSet.create(GRASPS, object="box", width=0.06)
+    failed = Verdict(Outcome.SIMULATION_FAILED, Stage.PLANNED, reason="it crashed")
+    with (folder / "journal.jsonl").open("ab") as journal:
+        journal.write(encode(f"box-{judged.id[2]}", failed))
+    kept = reach(scene, station, given, plans=folder, plan_format="json")
+    assert np.flatnonzero(kept.column("outcome") == "").tolist() == [2]
+    with pytest.raises(BurgError, match="no such model"):
+        reach(scene, station, given, plans=folder, plan_format="json", retry_failed=True)
 
 
 KILLED = """
