@@ -46,7 +46,7 @@ def add_to(group: Any) -> None:
         "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
         "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
         "",
-        "The grasps of an object follow from --seed and the object, whatever else there is;",
+        "The grasps of an object follow from --seed, the object and what stands around it;",
         "`evaluate` and `reach` sample the same ones with the same settings.",
     )
     parser.add_argument(

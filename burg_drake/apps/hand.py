@@ -21,7 +21,9 @@ def add_to(verbs: Any) -> None:
         "burg-drake hand check my_hand.yaml",
     )
     check.add_argument(
-        "hand", metavar="HAND", help="hand document, or name of a built-in one: wsg_50"
+        "hand",
+        metavar="HAND",
+        help="hand document, or name of a built-in one, see `burg-drake hand list`",
     )
 
 

@@ -50,6 +50,6 @@ def number_table(title: str, heads: list[str], rows: Rows, frame: str = "object"
     for name, (known, figures) in rows.items():
         column = describe(name)
         unit, size = SHOWN.get(column.unit, (column.unit, 1.0)) if column else ("", 1.0)
-        label = f"{name} ({unit})" if unit not in ("", PLAIN) else name
+        label = f"{name} [{unit}]" if unit not in ("", PLAIN) else name
         table.row(label, count(known), *(figure(figures[head] / size) for head in heads))
     return table

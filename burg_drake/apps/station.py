@@ -46,7 +46,9 @@ def add_to(verbs: Any) -> None:
 
 def _add_station(parser: Parser) -> None:
     parser.add_argument(
-        "station", metavar="STATION", help="station file, or name of a built-in one: panda_tabletop"
+        "station",
+        metavar="STATION",
+        help="station file, or name of a built-in one, see `burg-drake station list`",
     )
     parser.add_argument(
         "--scene",

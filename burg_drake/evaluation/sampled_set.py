@@ -34,8 +34,8 @@ def sample_grasps(
         source: the scene, or the library, in which objects lie nowhere.
         station: gives the hand and, in a scene, the place of the arm.
         n: grasps for each instance or object; there are fewer where there are no more.
-        seed: of the random numbers. The grasps of an object follow from it and the object,
-            whatever else there is.
+        seed: of the random numbers. The grasps of an object follow from it, the object and, unless
+            they are sampled blind, what stands around it.
         settings: how; the defaults if None.
         only: names of objects, or of instances of the scene; all if None.
 

@@ -52,7 +52,7 @@ def test_one_set(files: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> 
     printed = capsys.readouterr().out
     rows = [line.split() for line in printed.splitlines()]
     assert ["mug", "3", "-", "0", "-", "1.000", "36.7"] in rows  # 10, 10 and 90 mm
-    assert ["x", "(mm)", "3", "36.7", "0", "1", "10", "91", "100"] in rows
+    assert ["x", "[mm]", "3", "36.7", "0", "1", "10", "91", "100"] in rows
     assert "A and B" not in printed
 
 

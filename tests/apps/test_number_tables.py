@@ -22,18 +22,18 @@ WIDE = """\
 mug
 column                    known       0%       5%    50%     95%  100%
 ──────────────────────────────────────────────────────────────────────
-gravity_margin (weights)    200  1.23e-7  8.66e-4  0.707  10,000  1e30
-patch_area (mm2)            200      5.9     17.7     82     100   324
-antipodal_angle (deg)     1,000        0       90    180     inf     -
+gravity_margin [weights]    200  1.23e-7  8.66e-4  0.707  10,000  1e30
+patch_area [mm2]            200      5.9     17.7     82     100   324
+antipodal_angle [deg]     1,000        0       90    180     inf     -
 """
 
 NARROW = """\
 mug
 column                    known       0%    50%  100%
 ─────────────────────────────────────────────────────
-gravity_margin (weights)    200  1.23e-7  0.707  1e30
-patch_area (mm2)            200      5.9     82   324
-antipodal_angle (deg)     1,000        0    180     -
+gravity_margin [weights]    200  1.23e-7  0.707  1e30
+patch_area [mm2]            200      5.9     82   324
+antipodal_angle [deg]     1,000        0    180     -
 """
 
 
@@ -94,5 +94,5 @@ def test_nothing_is_cut_in_stats(
     grasps.save(tmp_path / "a.h5")
     assert main(["grasps", "stats", str(tmp_path / "a.h5"), str(tmp_path / "a.h5")]) == 0
     printed = capsys.readouterr().out
-    for text in ("-1.23e-7", "1.24e-5", "123,000", "-0.123", "1.23e11", "(mm2)", "(weights)"):
+    for text in ("-1.23e-7", "1.24e-5", "123,000", "-0.123", "1.23e11", "[mm2]", "[weights]"):
         assert text in printed
