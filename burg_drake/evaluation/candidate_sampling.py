@@ -224,8 +224,8 @@ class _Sampler:
         jaws = jaws_of(self._station.hand, self._station.hand_model)
         test = ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
         grasps = self(object, cones, test)
-        provenance = {**grasps.provenance, "target": name, "blocked": dict(test.blocked)}
-        return dataclasses.replace(grasps, provenance=provenance)
+        told = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
+        return dataclasses.replace(grasps, provenance={**grasps.provenance, **told})
 
     def _friction(self, object: str) -> float:
         given = self._settings.friction

@@ -28,6 +28,7 @@ SELF, TABLE = "the object itself", "the table"
 REMEDY_OF_TABLE = "another pose of the object, or a hand with thinner fingers, would help"
 REMEDY_OF_SELF = "other directions of the approach, or a slimmer hand, would help"
 REMEDY_OF_OTHERS = "more room beside {body} would help"
+REMEDY_OF_MARGIN = "a smaller margin would help"
 BODIES = 3
 """So many bodies are named that are in the way."""
 
@@ -52,11 +53,12 @@ def shortfall(name: str, asked: int, provenance: Mapping[str, Any], found: int) 
         causes = dict(lines)
     if sum(blocked.values()):
         bodies = _named(blocked, provenance.get("target", name))
-        parts.append(f"of {tried:,} antipodal grasps tried, {_of_bodies(bodies)}")
+        margin = provenance.get("margin", 0.0)
+        parts.append(f"of {tried:,} antipodal grasps tried, {_of_bodies(bodies, margin)}")
         causes = bodies if tried > found else causes
     if not parts:
         return told
-    return f"{told}: {'; '.join(parts)}; {_remedy(causes)}"
+    return f"{told}: {'; '.join(parts)}; {_remedy(causes, provenance)}"
 
 
 def _named(blocked: Mapping[str, int], target: str) -> dict[str, int]:
@@ -73,20 +75,23 @@ def _of_lines(provenance: Mapping[str, Any]) -> str:
     return f"of {provenance['rays']:,} lines through it {_joined(parts)}"
 
 
-def _of_bodies(bodies: Mapping[str, int]) -> str:
+def _of_bodies(bodies: Mapping[str, int], margin: float) -> str:
     hit = {body: n for body, n in bodies.items() if body != PADS}
     parts = [f"{body} in {n:,}" for body, n in list(hit.items())[:BODIES]]
     rest = sum(list(hit.values())[BODIES:])
     parts += [f"others in {rest:,}"] if rest else []
-    text = f"the open hand hits {_joined(parts)}" if parts else ""
+    meets = f"comes within {1e3 * margin:g} mm of" if margin else "hits"
+    text = f"the open hand {meets} {_joined(parts)}" if parts else ""
     if bodies.get(PADS):
         text += f"{', and ' if text else ''}its pads meet the object elsewhere in {bodies[PADS]:,}"
     return text
 
 
-def _remedy(causes: Mapping[str, int]) -> str:
+def _remedy(causes: Mapping[str, int], provenance: Mapping[str, Any]) -> str:
     """What would help against the most frequent cause."""
     cause = max(causes, key=causes.__getitem__)
+    if provenance.get("margin") and cause not in REMEDIES:
+        return REMEDY_OF_MARGIN
     known = {**REMEDIES, TABLE: REMEDY_OF_TABLE, SELF: REMEDY_OF_SELF}
     return known.get(cause, REMEDY_OF_OTHERS.format(body=cause))
 

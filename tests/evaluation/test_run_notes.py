@@ -16,9 +16,11 @@ from burg_drake.evaluation.run_store import load_run
 from burg_drake.evaluation.sampled_set import sample_grasps
 from burg_drake.evaluation.sampling_settings import SamplingSettings
 from burg_drake.evaluation.scored_set import scored_set
+from burg_drake.evaluation.shortfall import shortfall
 from burg_drake.evaluation.summary import summarize
 from burg_drake.evaluation.summary_tables import summary_view
 from burg_drake.grasping import antipodal
+from burg_drake.objects.library import load_library
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import load_station
 
@@ -61,3 +63,17 @@ def test_nothing_executed_is_explained(tmp_path: Path) -> None:
     assert note.startswith("screwdriver: nothing executed of 20 grasps: ")
     assert f"hits the table in {counts[Outcome.COLLISION_TABLE]}" in note
     assert note.endswith("; sample grasps at which the hand is clear, which is the default")
+
+
+def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No finger can close on a box and stay 0.2 m away from it."""
+    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 100)
+    household, station = load_library("household"), load_station("panda_tabletop")
+    settings = SamplingSettings(margin=0.2)
+    grasps = sample_grasps(household, station, 2, settings=settings, only=["box"])
+    note = shortfall("box", 2, grasps.provenance["parts"]["box"], len(grasps))
+    assert re.fullmatch(
+        r"box: 0 of 2 grasps: of (\d+) antipodal grasps tried, the open hand comes within 200 mm of"
+        r" the object itself in \1; a smaller margin would help",
+        note,
+    )
