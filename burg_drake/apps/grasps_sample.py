@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
+    add_quiet,
     add_station,
     add_verb,
     not_negative,
@@ -63,6 +64,7 @@ def add_to(group: Any) -> None:
     add_format(parser)
     add_station(parser)
     _add_settings(parser)
+    add_quiet(parser)
 
 
 def _add_settings(parser: argparse.ArgumentParser) -> None:
@@ -154,11 +156,11 @@ def run_sample(arguments: argparse.Namespace) -> int:
 
 
 def _objects(only: list[str] | None, source: Source) -> list[str]:
-    """The objects that are to be sampled on, as far as there are such."""
+    """The objects that are to be sampled on, of a scene one for each instance."""
     from burg_drake.evaluation.instance_names import chosen_instances
 
     if source.scene is None:
-        return only or list(source.library.objects)
+        return list(dict.fromkeys(only or source.library.objects))
     return [source.scene.instance(name).object for name in chosen_instances(source.scene, only)]
 
 
@@ -170,6 +172,7 @@ def _sample(
     settings: SamplingSettings,
 ) -> tuple[dict[str, GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
+    from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.evaluation.candidate_sampling import sample_library, sample_scene
 
     seed, only = arguments.seed, arguments.only
@@ -178,10 +181,14 @@ def _sample(
     else:
         stream = sample_scene(source.scene, station, n, seed, settings, only)
     sampled, seconds = {}, {}
-    start = time.perf_counter()
-    for name, grasps in stream:
-        sampled[name], seconds[name] = grasps, time.perf_counter() - start
+    total = len(_objects(only, source))
+    with Reporter(not arguments.quiet) as reporter:
+        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
         start = time.perf_counter()
+        for name, grasps in stream:
+            sampled[name], seconds[name] = grasps, time.perf_counter() - start
+            pace.step(note=name)
+            start = time.perf_counter()
     if not sampled:
         raise InvalidInputError(f"{arguments.source} has no free objects; nothing to sample on")
     return sampled, seconds

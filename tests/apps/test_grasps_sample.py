@@ -67,7 +67,17 @@ def test_a_library_with_many_options(tmp_path: Path) -> None:
     faces = len(load_library("household").surface("mug").faces)
     np.save(tmp_path / "weights.npy", np.arange(float(faces)))
     out = tmp_path / "grasps.h5"
-    options = ["--only", "mug", "--only", "can", "--friction", "0.3", "--approaches", "2"]
+    options = [
+        "--only",
+        "mug",
+        "--only",
+        "can",
+        "--friction",
+        "0.3",
+        "--approaches",
+        "2",
+        "--quiet",
+    ]
     options += ["--standoffs-mm", "0", "4", "-4", "--diverse", "2"]
     options += ["--weights", f"mug={tmp_path / 'weights.npy'}"]
     assert sample("household", "-n", 12, *options, "-o", out) == 0
