@@ -106,7 +106,7 @@ def broken_files(folder: Path) -> list[tuple[Path, str]]:
         (folder / "empty.png", r"is empty \(0 bytes\)"),
         (folder / "text.png", "not an image"),
     ]
-    return [*found, (folder / "gone.png", "No such file"), (folder, "Is a directory")]
+    return [*found, (folder / "gone.png", "No such file"), (folder, "it is a folder")]
 
 
 def test_what_is_no_image_is_refused_in_one_line(

@@ -153,7 +153,7 @@ def test_agrees_with_drake_and_is_the_same_in_a_batch(clearance: HandClearance) 
 def test_what_is_not_a_pose_is_refused(clearance: HandClearance) -> None:
     X_WG = np.eye(4)
     X_WG[0, 3] = np.nan
-    with pytest.raises(InvalidInputError, match="X_WG has NaN"):
+    with pytest.raises(InvalidInputError, match=r"X_WG\[0\] has NaN"):
         clearance.check("box", X_WG)
     assert clearance.check_all("box", np.empty((0, 4, 4))) == []
 

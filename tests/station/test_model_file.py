@@ -9,6 +9,7 @@ import pytest
 from pydrake.geometry import Mesh, Role
 from pydrake.planning import RobotDiagramBuilder
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import data_root
 from burg_drake.station.model_file import add_models
 
@@ -63,6 +64,7 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
     source = data_root() / "models/household/box/box.sdf"
     lacking = tmp_path / "lacking.sdf"  # its mesh is not there
     lacking.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
-    for path in (lacking, tmp_path / "none.sdf"):
-        with pytest.raises(RuntimeError, match=str(path)):
-            add_models(parser, path)
+    with pytest.raises(RuntimeError, match=str(lacking)):
+        add_models(parser, lacking)
+    with pytest.raises(InvalidInputError, match=r"none\.sdf: No such file"):
+        add_models(parser, tmp_path / "none.sdf")
