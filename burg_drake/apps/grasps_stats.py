@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.arguments import add_renaming, add_verb, not_negative
 from burg_drake.apps.grasp_file import add_file_options, add_hand, gripper_for
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write
+from burg_drake.core.files import atomic_write, require_writable
 
 if TYPE_CHECKING:
     from burg_drake.formats.grasp_format import Imported
@@ -81,6 +81,8 @@ def run_stats(arguments: argparse.Namespace) -> int:
     from burg_drake.grasping.comparison import compare, summarize
     from burg_drake.grasping.ranking import rank_by
 
+    if arguments.json is not None:
+        require_writable(arguments.json)
     tolerance, column = _tolerance(arguments), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
     told = arguments.hand or arguments.gripper_link

@@ -118,6 +118,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     if arguments.only_reachable and arguments.output is None:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
     if arguments.plans:
+        require_writable(Path(arguments.plans) / "plan")
         arguments.after_interrupt = "; the same command goes on from here"
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
@@ -199,10 +200,9 @@ def _output(arguments: argparse.Namespace) -> Path | Output | None:
         return None
     path = Path(arguments.output)
     if arguments.target is None and path.suffix in TABLES and not path.is_dir():
-        from burg_drake.evaluation.table_file import require_writer
+        from burg_drake.evaluation.table_file import require_table
 
-        require_writer(path.suffix.removeprefix("."))
-        require_writable(path)
+        require_table(path)
         return path
     return output_of(arguments.output, arguments.target, frame="object")
 

@@ -105,8 +105,14 @@ def add_to(verbs: Any) -> None:
 
 def run_robustness(arguments: argparse.Namespace) -> int:
     """Tests; 1 if something could not be simulated."""
+    from pathlib import Path
+
     from rich.console import Console
 
+    from burg_drake.evaluation.table_file import require_table
+
+    if arguments.output is not None:
+        require_table(Path(arguments.output))
     from burg_drake.evaluation.robustness import assess_robustness
     from burg_drake.evaluation.robustness_table import robustness_view
     from burg_drake.evaluation.run_store import load_run

@@ -142,6 +142,7 @@ def run_validate(arguments: argparse.Namespace) -> int:
 def run_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
     from burg_drake.apps.scene_file import require_another_file
+    from burg_drake.core.files import require_writable
     from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.scene.scene import load_scene
     from burg_drake.simulation.settle_scene import settle_scene
@@ -149,6 +150,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     from burg_drake.station.engine import engine_preset
     from burg_drake.station.station import load_station
 
+    require_writable(arguments.output)
     scene = load_scene(arguments.scene)
     require_another_file(scene.path, arguments.output)
     station = load_station(arguments.station)

@@ -59,10 +59,10 @@ def run_import_burg(arguments: argparse.Namespace) -> int:
 
     output = Path(arguments.output)
     for file in filter(None, (arguments.output, arguments.station_out)):
+        require_writable(file)
         require_another_file(Path(arguments.file), file)
     if arguments.station_out is not None:
         require_another_file(output, arguments.station_out)
-        require_writable(arguments.station_out)
     burg = read_burg_scene(arguments.file)
     library = load_library(arguments.library)
     imported = import_burg_scene(

@@ -66,6 +66,7 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
     path = Path()
     try:
         for path, content in contents.items():
+            _refuse_what_is_no_file(path)
             path.parent.mkdir(parents=True, exist_ok=True)
             temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
             written[path] = temporary
@@ -103,8 +104,9 @@ def writable_folder(path: str | Path) -> Path:
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
+        why = "it is a file" if path.is_file() else error.strerror or error
         raise InvalidInputError(
-            f"cannot write to folder {path}: {error.strerror or error}; choose a writable place"
+            f"cannot write to folder {path}: {why}; choose a writable place"
         ) from error
     return path
 
@@ -113,16 +115,23 @@ def require_writable(path: str | Path) -> None:
     """Finds out whether a file can be written, before any work is spent on it; makes none.
 
     Raises:
-        InvalidInputError: `path` is a folder, or nothing can be written where it is to be.
+        InvalidInputError: `path` is a folder or a device, or nothing can be written where it is to
+            be.
     """
-    path = Path(path).absolute()
-    place = path if path.is_dir() else next(p for p in path.parents if p.exists())
+    path = Path(path)
     try:
-        if place == path:
-            raise IsADirectoryError(errno.EISDIR, "it is a folder")
-        with tempfile.TemporaryFile(dir=place):
+        _refuse_what_is_no_file(path)
+        with tempfile.TemporaryFile(dir=next(p for p in path.absolute().parents if p.exists())):
             pass
     except OSError as error:
         raise InvalidInputError(
             f"cannot write {path}: {error.strerror or error}; choose a writable place"
         ) from error
+
+
+def _refuse_what_is_no_file(path: Path) -> None:
+    """Refuses what is there and is no file: a folder, or a device that a file would replace."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")
+    if path.exists() and not path.is_file():
+        raise FileExistsError(errno.EEXIST, "it is a pipe or a device, not a file")

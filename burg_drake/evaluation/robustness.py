@@ -31,7 +31,7 @@ from burg_drake.evaluation.probes import (
 from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_columns
 from burg_drake.evaluation.run_document import origin_of, software_versions
 from burg_drake.evaluation.run_store import JOURNAL_FILE, RUN_FILE, Run, load_run
-from burg_drake.evaluation.table_file import require_writer, write_table
+from burg_drake.evaluation.table_file import require_table, write_table
 
 TABLE_FILE = "robustness.csv"
 DEFAULT_BEST = 3
@@ -93,7 +93,7 @@ def assess_robustness(
     run = run if isinstance(run, Run) else load_run(run)
     settings = RobustnessSettings() if settings is None else settings
     table = run.path / TABLE_FILE if out is None else Path(out)
-    require_writer(table.suffix.removeprefix("."))
+    require_table(table)
     journal_path = table.with_suffix(".jsonl")
     _require_other_files(run, table, journal_path)
     chosen = _choose(run, grasps, best, only)

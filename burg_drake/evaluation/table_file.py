@@ -22,7 +22,7 @@ from burg_drake.core.columns import describe
 from burg_drake.core.damaged import reason
 from burg_drake.core.document_text import read_rows
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError, quoted
-from burg_drake.core.files import atomic_write, atomic_write_all, open_regular
+from burg_drake.core.files import atomic_write, atomic_write_all, open_regular, require_writable
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
 from burg_drake.evaluation.trial import MOVED, PUSHED
@@ -54,6 +54,22 @@ def require_writer(table: str) -> None:
         raise InvalidInputError(f"table format {table!r} does not exist; give csv or parquet")
     if table == "parquet":
         _pyarrow()
+
+
+def require_table(path: Path) -> None:
+    """Finds out before any work whether a table can be written to a file.
+
+    Raises:
+        InvalidInputError: the suffix tells no format, or the place cannot be written to.
+        MissingDependencyError: Parquet without pyarrow.
+    """
+    if path.suffix not in (".csv", ".parquet"):
+        raise InvalidInputError(
+            f"{path} is no table of a known format; give a file that ends in .csv or .parquet,"
+            f" such as {path.with_suffix('.csv') if path.name else 'table.csv'}"
+        )
+    require_writer(path.suffix.removeprefix("."))
+    require_writable(path)
 
 
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:

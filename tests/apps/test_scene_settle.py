@@ -86,6 +86,28 @@ def test_what_falls_off_the_table_is_named(scene_file: Path, capsys: Capture) ->
     assert list(load_scene(out).instances) == ["bottle"]
 
 
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ["scene", "settle", "nothing", "-o"],
+        ["scene", "import-burg", "nothing", "--library", "nothing", "-o"],
+        ["robustness", "nothing", "-o"],
+        ["reach", "nothing", "-o"],
+        ["reach", "nothing", "--plans"],
+        ["grasps", "stats", "nothing", "--json"],
+    ],
+)
+def test_the_output_of_a_verb_is_checked_before_its_input(
+    verb: list[str], tmp_path: Path, capsys: Capture
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    output = tmp_path / "file" / "below.csv"
+    assert main([*verb, str(output)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"burg-drake: error: cannot write {output}"), error
+    assert error.count("Not a directory; choose a writable place") == 1
+
+
 def test_what_validate_refuses_is_not_settled(scene_file: Path, capsys: Capture) -> None:
     """The mug reaches over the edge of the board, not of the table."""
     edited(scene_file, ("[0.12, 0.11, 0.0]", "[0.01, 0.11, 0.02]"))

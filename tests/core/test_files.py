@@ -63,11 +63,21 @@ def test_unwritable_places_are_named(tmp_path: Path):
     for write in (lambda: atomic_write(file / "x.csv", "x"), lambda: writable_folder(file / "run")):
         with pytest.raises(InvalidInputError, match=r"^cannot write .*choose a writable place$"):
             write()
-    with pytest.raises(InvalidInputError, match="cannot write to folder"):
+    with pytest.raises(InvalidInputError, match=r"cannot write to folder .*: it is a file;"):
         writable_folder(file)
-    with pytest.raises(InvalidInputError, match="Is a directory"):
-        atomic_write(tmp_path, "x")
     assert file.read_text() == "in the way"
+
+
+@pytest.mark.parametrize("name", [".", "..", "/", "", "folder", "pipe"])
+@pytest.mark.parametrize("write", [require_writable, lambda path: atomic_write(path, "x")])
+def test_what_is_no_file_is_not_written_to(tmp_path: Path, monkeypatch, name: str, write):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    kind = "a pipe or a device" if name == "pipe" else "a folder"
+    with pytest.raises(InvalidInputError, match=f"^cannot write .*: it is {kind}, not a file;"):
+        write(name)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "pipe"]
 
 
 def test_a_file_that_could_be_written_is_not_made(tmp_path: Path):
