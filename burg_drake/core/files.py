@@ -69,8 +69,8 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
             _refuse_what_is_no_file(path)
             path.parent.mkdir(parents=True, exist_ok=True)
             temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-            written[path] = temporary
             with temporary.open("xb") as stream:  # with the permissions that the umask leaves
+                written[path] = temporary
                 stream.write(content.encode() if isinstance(content, str) else content)
                 stream.flush()
                 os.fsync(stream.fileno())

@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 POSE_TOLERANCE = 1e-6
 """Largest deviation from orthonormality that `check_pose` accepts."""
 
+FARTHEST = 1e6
+"""Largest coordinate that `check_pose` accepts [m]; squares of larger ones overflow some day."""
+
 
 def make_pose(R_AB: ArrayLike | None = None, p_AB: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Poses from rotations and positions.
@@ -118,7 +121,8 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         The poses as float array.
 
     Raises:
-        InvalidInputError: wrong shape, not finite, not a right-handed rotation, or bad last row.
+        InvalidInputError: wrong shape, not finite, beyond `FARTHEST`, not a right-handed rotation,
+            or bad last row.
     """
     X = np.asarray(X_AB, dtype=float)
     if X.shape[-2:] != (4, 4):
@@ -132,6 +136,10 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
     refuse(
         ~np.isfinite(X).all(axis=(-2, -1)),
         "has NaN or infinite numbers; give finite metres and angles",
+    )
+    refuse(
+        (np.abs(X[..., :3, 3]) > FARTHEST).any(axis=-1),
+        f"is more than {FARTHEST:g} m from the origin; give metres",
     )
     R = X[..., :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from burg_drake.core.errors import FieldError, quoted
 
 LONGEST = 100
-"""Characters of a name; file systems take 255 bytes, with what is put before and behind it."""
+"""Of a name, in bytes of UTF-8; file systems take 255, with what is put before and behind it."""
 
 _NAME = re.compile(r"(?!\.)[\w.-]+")
 _UNSAFE = re.compile(r"[^\w.-]+")
@@ -24,10 +24,10 @@ def require_name(name: str, *place: str | int) -> None:
     Raises:
         FieldError: it is no name.
     """
-    if not _NAME.fullmatch(name) or len(name) > LONGEST:
+    if not _NAME.fullmatch(name) or len(name.encode()) > LONGEST:
         raise FieldError(
             f"name {quoted(name)} cannot be used in paths; give letters, digits, '_', '-' and '.',"
-            f" no '.' in front, at most {LONGEST}",
+            f" no '.' in front, at most {LONGEST} bytes",
             *place,
         )
 
@@ -40,4 +40,5 @@ def require_names(names: Iterable[str], key: str) -> None:
 
 def name_from(text: str) -> str:
     """A name made of any text: `my scene (2)` becomes `my_scene_2`, and nothing `unnamed`."""
-    return _UNSAFE.sub("_", text).lstrip(".").strip("_")[:LONGEST] or "unnamed"
+    name = _UNSAFE.sub("_", text).lstrip(".").strip("_")
+    return name.encode()[:LONGEST].decode(errors="ignore") or "unnamed"

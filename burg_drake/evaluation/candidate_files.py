@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidates import INSTANCE
+from burg_drake.evaluation.candidates import INSTANCE, require_instances
 from burg_drake.evaluation.grasp_input import read_input
 from burg_drake.evaluation.instance_names import InstanceNames
 from burg_drake.evaluation.near_objects import require_near
@@ -128,6 +128,7 @@ def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     """The same, with the names of a file."""
     on_instances = INSTANCE in grasps.columns and not names.given
     found = _of_instances(grasps) if on_instances else _of_objects(grasps, names)
+    require_instances(names.scene, found, names.path)
     for part in found.values():
         require_near(part, names.scene.library, names.path, is_file=names.is_file)
     return found

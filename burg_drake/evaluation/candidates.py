@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest, quoted
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.scene.scene import Scene
@@ -103,12 +103,8 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
         UnknownNameError: no free instance goes by such a name.
         InvalidInputError: a set holds grasps of another object.
     """
+    require_instances(scene, grasps)
     for name, grasp_set in grasps.items():
-        if name not in scene.instances:
-            raise UnknownNameError(
-                f"grasps are given for {name!r}, which is not a free instance of scene"
-                f" {scene.name!r}; {nearest(name, scene.instances)}"
-            )
         expected = scene.instance(name).object
         others = set(grasp_set.object.tolist()) - {expected, ""}
         if others:
@@ -119,6 +115,25 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
     return join_candidates(
         {name: distinct(grasps[name]) for name in scene.instances if name in grasps}
     )
+
+
+def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> None:
+    """Refuses names that no free instance goes by.
+
+    Args:
+        scene: with the instances.
+        names: of the instances that grasps are given for.
+        path: of their file, for the message.
+
+    Raises:
+        UnknownNameError: there is no such instance.
+    """
+    for name in names:
+        if name not in scene.instances:
+            raise UnknownNameError(
+                f"{path}{': ' if path else ''}grasps are given for {quoted(name)}, which is not a"
+                f" free instance of scene {scene.name!r}; {nearest(name, scene.instances)}"
+            )
 
 
 def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:

@@ -143,6 +143,7 @@ def evaluate(
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         _require_sound(scene, station, mode)
+    given = None if grasps is None else given_candidates(scene, grasps)
     writable_folder(folder)
     asked = Grasps(origin="given", count=0, objects={}, content="")
     if grasps is None:
@@ -160,7 +161,7 @@ def evaluate(
             folder,
             scene,
             station,
-            grasps,
+            given,
             _document(folder, scene, station, asked, engine, seed=seed, mode=mode, table=table),
             reporter,
         )
@@ -211,14 +212,13 @@ def _open(
     folder: Path,
     scene: Scene,
     station: Station,
-    grasps: Mapping[str, GraspSet] | None,
+    candidates: Candidates | None,
     document: RunDocument,
     reporter: Reporter,
 ) -> Run:
-    """Goes on with the run in the folder, or begins a new one there."""
-    candidates: Candidates | None = None
-    if grasps is not None:
-        candidates = given_candidates(scene, grasps)
+    """Goes on with the run in the folder, or begins a new one there; samples if no candidates are
+    given."""
+    if candidates is not None:
         document = _with_grasps(document, scene, candidates, 0.0)
     if (folder / RUN_FILE).exists():
         run = load_run(folder)

@@ -20,14 +20,18 @@ from numpy.typing import NDArray
 
 from burg_drake.core.columns import describe
 from burg_drake.core.damaged import reason
-from burg_drake.core.document_text import read_rows
+from burg_drake.core.document_text import TABLE, read_rows
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError, quoted
 from burg_drake.core.files import atomic_write, atomic_write_all, open_regular, require_writable
+from burg_drake.core.stored_array import Allowance, text_array
 from burg_drake.evaluation.judge import MARGINS
 from burg_drake.evaluation.table import INTEGER, TEXT, Columns
 from burg_drake.evaluation.trial import MOVED, PUSHED
 
 T = TypeVar("T", int, float)
+
+BATCH = 1 << 10
+"""Rows of a Parquet file that are unpacked at once."""
 
 HEAD = 1 << 16
 """Characters that are looked at to recognise a file."""
@@ -135,11 +139,12 @@ def read_table(path: Path) -> Columns:
         if path.suffix == ".parquet":
             _, parquet = _pyarrow()
             with open_regular(path) as binary:
-                table = parquet.read_table(binary)
+                table = _bounded(path, parquet.ParquetFile(binary))
             cells = {name: table.column(name).to_pylist() for name in table.column_names}
         else:
             cells = _csv_cells([row for _, row in read_rows(path)])
-        return {name: _typed(name, values) for name, values in cells.items()}
+        allowance = Allowance(path)
+        return {name: _typed(name, values, allowance) for name, values in cells.items()}
     except OSError as error:
         why = error.strerror or reason(error)  # pyarrow's own are OSErrors, too
         raise InvalidInputError(f"cannot read {path}: {why}") from error
@@ -147,6 +152,25 @@ def read_table(path: Path) -> Columns:
         raise
     except ValueError as error:
         raise InvalidInputError(f"{path} is not a results table ({reason(error)})") from error
+
+
+def _bounded(path: Path, file: Any) -> Any:
+    """The table of a Parquet file, which can be a thousand times as large as the file.
+
+    Raises:
+        InvalidInputError: it is beyond the limits of tables.
+    """
+    arrow, _ = _pyarrow()
+    cells = file.metadata.num_rows * file.metadata.num_columns
+    if cells > TABLE.values:
+        raise InvalidInputError(f"cannot read {path}: more than {TABLE.values:,} cells")
+    batches, size = [], 0
+    for batch in file.iter_batches(batch_size=BATCH):
+        size += batch.nbytes
+        if size > TABLE.size:
+            raise InvalidInputError(f"cannot read {path}: its cells have more than 1 GiB")
+        batches.append(batch)
+    return arrow.Table.from_batches(batches, file.schema_arrow)
 
 
 def is_table(path: Path) -> bool:
@@ -227,10 +251,10 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def _typed(name: str, values: Sequence[Any]) -> NDArray[Any]:
+def _typed(name: str, values: Sequence[Any], allowance: Allowance) -> NDArray[Any]:
     texts = ["" if value is None else str(value) for value in values]
     if name in TEXT:
-        return np.array(texts, dtype=np.str_)
+        return text_array(f"{allowance.path}: {name}", texts, allowance)
     if name in INTEGER:
         whole = [_read(int, name, row, text, "a whole number") for row, text in enumerate(texts, 1)]
         return np.array(whole, dtype=np.int64)
@@ -244,7 +268,7 @@ def _typed(name: str, values: Sequence[Any]) -> NDArray[Any]:
     except ValueError:
         if name in (*MARGINS, "friction", "mass") or name.startswith((MOVED, PUSHED)):
             raise
-        return np.array(texts, dtype=np.str_)
+        return text_array(f"{allowance.path}: {name}", texts, allowance)
 
 
 def _read(kind: type[T], name: str, row: int, text: str, expected: str) -> T:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,9 @@ import numpy as np
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.names import name_from
 from burg_drake.formats.grasp_format import GraspFormat, Gripper
 from burg_drake.formats.one_object import SUCCESS_COLUMN
-
-_UNSAFE = re.compile(r"[^\w.+-]")
 
 
 def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet:
@@ -86,7 +84,7 @@ def write_each_object(
     """
     paths: dict[Path, str] = {}
     for name in dict.fromkeys(grasps.object.tolist()):
-        path = folder / f"{_UNSAFE.sub('_', name) or 'grasps'}{format.suffixes[0]}"
+        path = folder / f"{name_from(name) if name else 'grasps'}{format.suffixes[0]}"
         if path in paths:
             raise InvalidInputError(
                 f"grasps of {paths[path]!r} and of {name!r} would both go to {path}; rename one"

@@ -96,6 +96,12 @@ def test_writable_folder_is_made_and_left_empty(tmp_path: Path):
     assert not list((tmp_path / "runs" / "first").iterdir())
 
 
+def test_a_name_that_is_too_long_is_an_error_of_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match=r"cannot write .*too long"):
+        atomic_write(tmp_path / ("x" * 250), "")
+    assert not list(tmp_path.iterdir())
+
+
 def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> None:
     table, beside = tmp_path / "a.csv", tmp_path / "a.json"
     atomic_write_all({table: "1", beside: b"2"})

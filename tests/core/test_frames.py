@@ -173,6 +173,8 @@ def test_check_pose_error_texts():
     assert message(bad) == (
         "X_SO of 'mug'[1] has NaN or infinite numbers; give finite metres and angles"
     )
+    bad[1, 0, 3] = -1e200
+    assert message(bad) == "X_SO of 'mug'[1] is more than 1e+06 m from the origin; give metres"
     bad = good.copy()
     bad[2, :3, :3] *= 1.01
     assert message(bad) == (

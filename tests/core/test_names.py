@@ -27,7 +27,8 @@ def test_names(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["", ".", "..", "../x", "a/b", "/a", ".a", "a b", "a\n", "a\0", "~", "x" * 101]
+    "name",
+    ["", ".", "..", "../x", "a/b", "/a", ".a", "a b", "a\n", "a\0", "~", "x" * 101, "ä" * 51],
 )
 def test_what_is_no_name(name: str) -> None:
     with pytest.raises(InvalidInputError, match="cannot be used in paths"):

@@ -266,6 +266,8 @@ def test_some_objects_only(
     assert set(run.candidates.instance) == {"left"}
     with pytest.raises(InvalidInputError, match=r"no grasps are of right; .* some of left, bar"):
         evaluate(scene, station, tmp_path / "d", grasps=given, only=["right"], progress=False)
+    with pytest.raises(UnknownNameError, match="'lef', which is not a free instance"):
+        evaluate(scene, station, tmp_path / "d", grasps={"lef": given["left"]}, progress=False)
     with pytest.raises(UnknownNameError, match="no free object 'lef'; did you mean 'left'"):
         evaluate(scene, station, tmp_path / "d", only=["lef"], **options)
     assert not (tmp_path / "d").exists()

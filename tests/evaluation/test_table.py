@@ -14,10 +14,12 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
+from burg_drake.core.document_text import Limits
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation import table_file
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.mode import MODES
@@ -309,3 +311,20 @@ def test_bad_files_and_formats_are_named(tmp_path: Path) -> None:
             read_table(tmp_path / name)
     with pytest.raises(InvalidInputError, match="'xlsx' does not exist; give csv or parquet"):
         require_writer("xlsx")
+
+
+def test_small_files_of_large_tables_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = tmp_path / "cells.csv"
+    cells.write_text("id,reason\na," + "x" * 130_000 + "\n" + "a,b\n" * 7_000)
+    with pytest.raises(InvalidInputError, match=r"cells\.csv: reason would take .* GiB"):
+        read_table(cells)
+    parquet = tmp_path / "rows.parquet"
+    pytest.importorskip("pyarrow")
+    write_table(parquet, {"reason": np.full(5_000, "x" * 100)})
+    assert len(read_table(parquet)["reason"]) == 5_000
+    for limits, match in ((Limits(1 << 30, 4_999), "4,999 cells"), (Limits(400_000, 5_000), "GiB")):
+        monkeypatch.setattr(table_file, "TABLE", limits)
+        with pytest.raises(InvalidInputError, match=rf"rows\.parquet: .*{match}"):
+            read_table(parquet)

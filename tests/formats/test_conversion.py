@@ -69,6 +69,15 @@ def test_a_folder_gets_one_file_an_object(tmp_path: Path, both: GraspSet) -> Non
     assert counts == {"1a_2b.json": 2, "mug.json": 3}
 
 
+@pytest.mark.parametrize("name", ["..", "../x", "ä" * 200])
+def test_no_name_of_an_object_leads_elsewhere(
+    tmp_path: Path, random_grasps: Callable[..., GraspSet], name: str
+) -> None:
+    grasps = random_grasps(1, 3, object=name, success=True)
+    (path,) = write_each_object(grasps, tmp_path, FORMATS["graspgen"], PANDA)
+    assert list(tmp_path.iterdir()) == [path] and not path.name.startswith(".")
+
+
 def test_two_objects_never_share_a_file(
     tmp_path: Path, both: GraspSet, random_grasps: Callable[..., GraspSet]
 ) -> None:
