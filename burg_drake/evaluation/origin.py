@@ -144,14 +144,14 @@ def _engine(label: str, settings: str, where: str) -> Engine:
     engine = _typed({"name": name, **_pairs(settings, where)}, Engine, f"{where}, engine_settings")
     if label == name and name not in ENGINES:
         raise InvalidInputError(
-            f"{where}: engine {name!r} is not a preset of this release ({', '.join(ENGINES)});"
-            f" one with settings of its own is called {name + CUSTOM!r}"
+            f"{where}: engine {quoted(name)} is not a preset of this release"
+            f" ({', '.join(ENGINES)}); one with settings of its own is called {quoted(name + CUSTOM)}"
         )
     if label == name and engine != ENGINES[name]:
         raise InvalidInputError(
             f"{where}: engine {name!r} and engine_settings contradict each other: the preset of"
             f" this release has {_other_settings(ENGINES[name], engine)}; an engine with settings"
-            f" of its own is called {name + CUSTOM!r}"
+            f" of its own is called {quoted(name + CUSTOM)}"
         )
     return engine
 
@@ -175,7 +175,7 @@ def _pairs(text: str, where: str) -> dict[str, str]:
     pairs = [word.partition("=") for word in text.split()]
     bad = [name for name, equals, _ in pairs if not equals]
     if bad:
-        raise InvalidInputError(f"{where}: {bad[0]!r} is not name=value")
+        raise InvalidInputError(f"{where}: {quoted(bad[0])} is not name=value")
     return {name: value for name, _, value in pairs}
 
 
