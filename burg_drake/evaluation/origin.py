@@ -145,7 +145,8 @@ def _engine(label: str, settings: str, where: str) -> Engine:
     if label == name and name not in ENGINES:
         raise InvalidInputError(
             f"{where}: engine {quoted(name)} is not a preset of this release"
-            f" ({', '.join(ENGINES)}); one with settings of its own is called {quoted(name + CUSTOM)}"
+            f" ({', '.join(ENGINES)});"
+            f" one with settings of its own is called {quoted(name + CUSTOM)}"
         )
     if label == name and engine != ENGINES[name]:
         raise InvalidInputError(
