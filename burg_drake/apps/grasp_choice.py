@@ -40,10 +40,11 @@ def add_choice(show: Parser) -> None:
 
 
 def choose(
-    grasps: GraspSet, ranking: Ranking, arguments: argparse.Namespace
+    grasps: GraspSet, ranking: Ranking, column: str | None, arguments: argparse.Namespace
 ) -> tuple[list[int], int | None, str]:
     """Indices of the grasps to be drawn, which of these has the gripper, and what people are told
-    about the choice."""
+    about the choice. Of each object those with the highest number in `column` come first; where it
+    has no numbers, the best."""
     import numpy as np
 
     from burg_drake.evaluation.best_grasps import best_of_each, index_of
@@ -63,14 +64,22 @@ def choose(
         by = ranking.by
         how = f"the best {most} of each object by {by}" if by else f"{most} of each object, evenly"
         caption += f": {how}; --most N or --all shows more"
-    selected = None
+    index = None
     if arguments.select is not None:
         index = index_of(grasps, arguments.select, arguments.file)
         if index not in chosen:
             same = [k for k, other in enumerate(chosen) if holder[other] == holder[index]]
             chosen.insert(same[-1] + 1 if same else len(chosen), index)
-        selected = chosen.index(index)
-    return chosen, selected, caption
+    values = None if column is None else grasps.column(column)
+    if values is not None and values.dtype.kind in "fiu":
+        objects = list(dict.fromkeys(holder[chosen].tolist()))
+        chosen.sort(key=lambda k: (objects.index(holder[k]), *_highest_first(float(values[k]))))
+    return chosen, None if index is None else chosen.index(index), caption
+
+
+def _highest_first(value: float) -> tuple[bool, float]:
+    """Sorts numbers down, NaN last."""
+    return value != value, 0.0 if value != value else -value
 
 
 def holders(grasps: GraspSet) -> list[str]:

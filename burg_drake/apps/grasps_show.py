@@ -48,7 +48,8 @@ def add_to(group: Any) -> None:
         "burg-drake grasps show mug.h5 --library household --only mug",
         "",
         "A click on a grasp of a page, or in its list, shows the whole gripper there; in the live",
-        "view the slider `grasp` of Meshcat's controls does, best ones of each object first.",
+        "view the slider `grasp` of Meshcat's controls does, in the order of the list: the highest",
+        "number first that colours stand for, or the best.",
     )
     show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
     add_file_options(show)
@@ -97,16 +98,17 @@ def run_show(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.legend_text import print_legend
     from burg_drake.apps.live import open_view, present
     from burg_drake.evaluation.run_grasps import column_called
-    from burg_drake.visualization.grasp_legend import color_by
+    from burg_drake.visualization.grasp_legend import color_by, default_column
     from burg_drake.visualization.grasp_picker import GraspPicker
     from burg_drake.visualization.grasp_view import draw_grasps
     from burg_drake.visualization.gripper_view import GripperView
 
     content = _content(arguments)
-    chosen, selected, caption = choose(content.grasps, content.ranking, arguments)
+    column = arguments.color and column_called(content.grasps, arguments.color)
+    column = column or default_column(content.grasps)
+    chosen, selected, caption = choose(content.grasps, content.ranking, column, arguments)
     grasps, station = content.grasps.select(chosen), content.station
-    color = arguments.color and column_called(grasps, arguments.color)
-    groups, legend = color_by(grasps, color, arguments.range)
+    groups, legend = color_by(grasps, column, arguments.range)
     width = _widths(grasps, station.hand.opening[1])
     meshcat = open_view(arguments)
     X_WG = _place(content, grasps, width, meshcat)
@@ -124,7 +126,13 @@ def run_show(arguments: argparse.Namespace) -> int:
         caption=[caption],
         legend=legend,
         controls=GraspPicker(
-            gripper, X_WG, width, holders(grasps), _labels(grasps), groups, selected
+            gripper,
+            X_WG,
+            width,
+            holders(grasps),
+            *_labels(grasps, column, content.ranking.by),
+            groups,
+            selected,
         ),
     )
     return 0
@@ -205,15 +213,28 @@ def _on_instances(by_instance: Mapping[str, GraspSet]) -> GraspSet:
     )
 
 
-def _labels(grasps: GraspSet) -> list[str]:
-    """What a list says of each grasp: its score or outcome, and its identifier."""
-    from burg_drake.evaluation.best_grasps import shown_ids
-    from burg_drake.visualization.grasp_legend import default_column
+def _labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[str], str]:
+    """What a list says of each grasp, its colour's meaning and its identifier, and the title."""
+    import numpy as np
 
-    column = default_column(grasps)
-    values = [""] * len(grasps) if column is None else grasps.column(column).tolist()
-    texts = [value if isinstance(value, str) else f"{value:.3g}" for value in values]
-    return [f"{text} {id}".strip() for text, id in zip(texts, shown_ids(grasps), strict=True)]
+    from burg_drake.evaluation.best_grasps import shown_ids
+    from burg_drake.visualization.grasp_legend import with_unit
+
+    ids = shown_ids(grasps)
+    if column is None:
+        return ids, "identifier"
+    values = grasps.column(column)
+    if values.dtype.kind == "f":
+        texts = ["-" if value != value else f"{value:.3g}" for value in values.tolist()]
+    else:
+        truths = values.dtype.kind == "b"
+        texts = [str(v) for v in (np.where(values, "yes", "no") if truths else values).tolist()]
+    title = f"{with_unit(column)} and identifier"
+    if values.dtype.kind in "fiu":
+        title += ", highest first"
+    elif by:
+        title += ", best first"
+    return [f"{text} {id}".strip() for text, id in zip(texts, ids, strict=True)], title
 
 
 def _place(content: Content, grasps: GraspSet, width: Array, meshcat: Meshcat) -> Array:

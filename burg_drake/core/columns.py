@@ -65,9 +65,17 @@ _MARGINS = {
     "tilt": Column("rad", "turn of the target in the hand since the grip"),
     "pad_force": Column("N", "normal force of the weaker pad along the closing direction"),
     "patch_area": Column("m2", "contact patch of the pad with the smaller one"),
-    "lift": Column("m", "how far the target's centre of mass rose"),
+    "lift": Column(
+        "m",
+        "how far the target's centre of mass rose; of a trial decided on the way up with the"
+        " rest of the way, which is free by geometry",
+    ),
     "others_moved": Column("m", "largest displacement of any other object's centre of mass"),
-    "end_time": Column("s", "simulated time at which the outcome was decided"),
+    "end_time": Column(
+        "s",
+        "simulated time at which the outcome was decided, which ends the trial, often before"
+        " the hand is all the way up",
+    ),
     "arm_clearance": Column(
         "m", "least distance that the robot keeps on its way, or signed distance of what is in it"
     ),
@@ -117,8 +125,16 @@ _QUALITY = {
     "slide": Column("m", "way that the object slides in the hand until held; inf if never"),
     "epsilon": Column(PLAIN, "radius of the largest ball within the wrench space"),
     "volume": Column(PLAIN, "of the wrench space"),
-    "load_margin": Column("weights", "force that the grip bears in the worst direction"),
-    "gravity_margin": Column("weights", "force that the grip bears along gravity"),
+    "load_margin": Column(
+        "weights",
+        "force that the grip bears in the worst direction; below 1 the object's weight may"
+        " turn it in the hand, which need not be a drop",
+    ),
+    "gravity_margin": Column(
+        "weights",
+        "force that the grip bears along gravity; below 1 the object begins to turn in the"
+        " hand, which need not be a drop",
+    ),
     "contact_offset": Column("m", "distance of the centre of mass from the contacts' line"),
     "nearest": Column(TEXT, "the body that the open hand is nearest to, or overlaps"),
     "screened": Column(TEXT, "clear, or the collision of the open hand"),

@@ -46,6 +46,14 @@ def linear_light(color: ArrayLike) -> Array:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours as HTML has them, 1 to 21 (WCAG 2: text needs 4.5)."""
+    dark, light = sorted(
+        float(linear_light(_rgb(color)) @ (0.2126, 0.7152, 0.0722)) for color in (one, other)
+    )
+    return (light + 0.05) / (dark + 0.05)
+
+
 def _rgb(color: str) -> tuple[float, float, float]:
     r, g, b = (int(color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return r, g, b

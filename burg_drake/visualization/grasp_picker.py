@@ -34,6 +34,7 @@ class GraspPicker:
         width: (N,) between the pads [m].
         holder: (N,) the object of each; grasps of one follow each other.
         label: (N,) what the list says of each.
+        title: what that is.
         groups: as they are drawn.
         selected: shown when the page is opened; none if None.
     """
@@ -43,6 +44,7 @@ class GraspPicker:
     width: Array
     holder: Sequence[str]
     label: Sequence[str]
+    title: str
     groups: Sequence[GraspGroup]
     selected: int | None = None
 
@@ -62,6 +64,7 @@ class GraspPicker:
         none = element("option", "no gripper", value=-1, **self._chosen(None))
         return join(
             element("p", "click a grasp, here or in the view", class_="title"),
+            element("p", self.title),
             element("select", none, *options, id="grasps", size=ROWS, aria_label="grasps"),
         )
 

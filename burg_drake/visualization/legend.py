@@ -11,6 +11,8 @@ BAR_WIDTH, BAR_HEIGHT = 256, 12
 HISTOGRAM_HEIGHT = 34
 MARGIN = 14
 """Sizes of a colour bar [pixel]; the margin is for the numbers at its ends."""
+CHARACTER = 7
+"""Widest character of a tick's text, and the least gap between two texts [pixel]."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ class ColorBar:
         title: what the numbers are.
         colors: of the bins, lowest first, as CSS has them.
         counts: of the bins.
-        ticks: places along the bar in [0, 1], and what is written there.
+        ticks: places along the bar in [0, 1], rising from 0 to 1, and what is written there; left
+            out where a picture has no room for it, except at the ends.
         paths: Meshcat path of each bin.
         note: below the bar.
     """
@@ -86,7 +89,7 @@ class ColorBar:
                 _rect(x, HISTOGRAM_HEIGHT + 2, step, BAR_HEIGHT, color),
             ]
         foot = HISTOGRAM_HEIGHT + 2 + BAR_HEIGHT
-        for place, text in self.ticks:
+        for place, text in _with_room(self.ticks):
             at = f"{MARGIN + place * BAR_WIDTH:.1f}"
             shapes.append(element("line", x1=at, x2=at, y1=foot, y2=foot + 4))
             anchor = {0.0: "text-anchor: start", 1.0: "text-anchor: end"}.get(place)
@@ -95,6 +98,20 @@ class ColorBar:
         return element(
             "svg", *shapes, viewBox=size, width=BAR_WIDTH + 2 * MARGIN, shape_rendering="crispEdges"
         )
+
+
+def _with_room(ticks: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
+    """The ends of a bar, whose texts reach inwards, and what fits between them."""
+    first, *inner, last = ticks
+    kept = [first]
+    end = float(CHARACTER * len(first[1]))
+    for place, text in inner:
+        middle, half = place * BAR_WIDTH, CHARACTER * len(text) / 2
+        beyond = BAR_WIDTH - CHARACTER * len(last[1])
+        if middle - half >= end + CHARACTER and middle + half + CHARACTER <= beyond:
+            kept.append((place, text))
+            end = middle + half
+    return [*kept, last]
 
 
 def legend_html(legend: Sequence[LegendEntry | ColorBar]) -> Html:

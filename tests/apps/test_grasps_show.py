@@ -124,6 +124,23 @@ def test_the_list_has_the_best_first_and_any_that_is_asked_for(
     assert f"grasps.h5 has no grasp {worst[:-1]!r}; did you mean {worst!r}" in line
 
 
+def test_the_list_tells_what_is_coloured_highest_first(
+    file: Path, grasps: GraspSet, tmp_path: Path, capsys: Capture
+) -> None:
+    """The best by score stay those that are shown: the number missing, of grasp 4, comes last."""
+    page = tmp_path / "page.html"
+    columns = grasps.columns | {"margin": np.array([0, 1, 2, 3, np.nan, 9, 7, 8, 1, 3, 2, 4.0])}
+    grasps.with_columns(**columns).save(file)
+    options = ("--library", "household", "--color", "margin", "--most", 4, "--html", page)
+    shown(capsys, file, *options, "--select", str(grasps.id[3]))
+    labels, _, chosen = picker(page)
+    assert [label.split()[0] for label in labels[1:]] == [*"9873-", *"4321"]
+    assert labels[1] == f"9 {grasps.id[5]}" and chosen == labels[4] == f"3 {grasps.id[3]}"
+    text = page.read_text()
+    assert "<p>margin and identifier, highest first</p>" in text
+    assert "the best 4 of each object by score" in text
+
+
 def test_the_gripper_is_put_where_the_grasp_is(
     file: Path, grasps: GraspSet, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -18,6 +18,7 @@ from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.report.charts import Series, histogram, nice_step
 from burg_drake.evaluation.report.markup import Html, element, join
 from burg_drake.evaluation.report.outcomes import STOPPED
+from burg_drake.evaluation.report.style import STYLES, style_sheet
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import summarize
 
@@ -168,6 +169,22 @@ def test_an_unfinished_run_says_so(run: Run) -> None:
     assert "not complete: 10 of 90 grasps are judged" in text
     journal.write_bytes(b"")
     check(report_page(Run(run.path, run.document)))
+
+
+def test_numbers_stand_out_from_every_colour() -> None:
+    """Contrast of WCAG 2.2, of light and dark pages; `.part` has no colour of its own."""
+
+    def luminance(color: str) -> float:
+        parts = [int(color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b
+
+    rule = r"\.(g\d+) {[^}]*background: (#\w{6});[^}]*[^-]color: (#\w{6});"
+    rules = re.findall(rule, style_sheet())
+    assert {name for name, _, _ in rules} == set(STYLES.values())
+    for name, background, text in rules:
+        dark, light = sorted((luminance(background), luminance(text)))
+        assert (light + 0.05) / (dark + 0.05) >= 4.5, (name, background, text)
 
 
 def test_histogram_bars_hold_every_value() -> None:

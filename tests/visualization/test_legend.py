@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import pytest
@@ -53,6 +54,19 @@ def test_ticks_are_below_their_places() -> None:
         (f"{MARGIN + BAR_WIDTH / 2:.1f}", "1"),
         (f"{MARGIN + BAR_WIDTH:.1f}", "2"),
     ]
+
+
+def test_no_text_of_a_bar_meets_the_next() -> None:
+    """Digits are 7 pixel wide in the widest usual font, DejaVu Sans of 11 pixel."""
+    values = ["0.002", "0.004", "0.006", "0.008", "0.01", "0.012", "0.014"]
+    ticks = tuple((k / 6, text) for k, text in enumerate(values))
+    html = dataclasses.replace(BAR, ticks=ticks).html()
+    texts = re.findall(r'<text x="([\d.]+)" y="\d+"(?: style="text-anchor: (\w+)")?>([^<]*)<', html)
+    shift = {"start": 0.0, "": 0.5, "end": 1.0}
+    begins = [float(x) - shift[anchor] * 7 * len(text) for x, anchor, text in texts]
+    ends = [begin + 7 * len(text) for begin, (_, _, text) in zip(begins, texts, strict=True)]
+    assert all(e + 3 < b for e, b in zip(ends[:-1], begins[1:], strict=True))
+    assert [text for _, _, text in texts] == ["0.002", "0.006", "0.008", "0.01", "0.014"]
 
 
 def test_text_is_escaped_and_paths_are_there() -> None:

@@ -77,7 +77,6 @@ def best_section(run: Run) -> Html | None:
         "pad force",
         "patch",
         "others moved",
-        "score",
     ]
     rows = []
     for row in map(run.row, best):
@@ -88,7 +87,6 @@ def best_section(run: Run) -> Html | None:
             f"{row['pad_force']:.1f} N",
             "-" if math.isnan(row["patch_area"]) else f"{row['patch_area'] * 1e6:.0f} mm²",
             f"{row['others_moved'] * 1e3:.2f} mm",
-            "-" if math.isnan(row["score"]) else f"{row['score']:.2f}",
         ]
         rows.append(
             element(
@@ -101,13 +99,13 @@ def best_section(run: Run) -> Html | None:
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
     return section(
         "Best grasps",
-        f"Of each object the {BEST} lifted grasps with the most room around the open hand"
-        " (clearance), which most likely lift again when pose, mass and friction are not quite what"
-        " they are taken for; of equal ones, to 0.5 mm, those that slipped, tilted and pushed"
-        " others least. Any grasp can be watched by its id, from here or from its row of the table"
-        " alone:",
+        f"Of each object the {BEST} best. Best means: lifted, with the most room around the open"
+        " hand (clearance), and so most likely lifted again when pose, mass and friction are not"
+        " quite what they are taken for; among equal ones, to 0.5 mm, those that slipped, tilted"
+        " and pushed others least, then those with the larger contact patch. Any grasp can be"
+        " watched by its id, from here or from its row of the table alone:",
         command(line),
-        table(head, rows, numbers=(2, 3, 4, 5, 6, 7, 8)),
+        table(head, rows, numbers=(2, 3, 4, 5, 6, 7)),
     )
 
 

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from burg_drake.visualization.color_map import contrast
 from burg_drake.visualization.palette import GROUPS
 
 STYLES = {group.name: f"g{i}" for i, group in enumerate(GROUPS)}
 THEMED = {
-    "hand collides": "var(--collides)",
-    "arm has no way": "var(--no-way)",
-    "simulation failed": "var(--failed)",
+    "hand collides": ("#9aa2a9", "#6b747b"),
+    "arm has no way": ("#1a3373", "#8fa6e8"),
+    "simulation failed": ("#1d2328", "#f4f6f7"),
 }
-"""Greys, black and dark blue need another tone on a dark page."""
+"""Greys, black and dark blue need one tone on a light page and another on a dark one."""
+TEXT = ("#101418", "#ffffff")
+"""Of numbers on the colours: whichever stands out more."""
 
 
 def style_sheet() -> str:
     """All styles of the page."""
     sheet = (files("burg_drake.evaluation.report") / "style.css").read_text(encoding="utf-8")
-    colours = "".join(
-        f".{STYLES[g.name]} {{ background: {c}; fill: {c}; }}\n"
-        for g in GROUPS
-        for c in [THEMED.get(g.name, g.hex)]
-    )
-    return sheet + colours
+    light = "".join(_rule(g.name, THEMED.get(g.name, (g.hex,))[0]) for g in GROUPS)
+    dark = "".join(_rule(name, tones[1]) for name, tones in THEMED.items())
+    return f"{sheet}{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n"
+
+
+def _rule(group: str, colour: str) -> str:
+    text = max(TEXT, key=lambda text: contrast(text, colour))
+    return f".{STYLES[group]} {{ background: {colour}; fill: {colour}; color: {text}; }}\n"
