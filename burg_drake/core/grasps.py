@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
-from burg_drake.core.frames import Array, canonical_fingers, check_pose
+from burg_drake.core.frames import FARTHEST, Array, canonical_fingers, check_pose
 
 ID_DIGITS = 12
 """Hexadecimal digits of an identifier; among 100,000 grasps two share one with chance 2e-5."""
@@ -244,8 +244,8 @@ def require_sound(grasps: GraspSet) -> None:
     Grasps that are there several times, with the same identifier, object, pose and width, are fine.
 
     Raises:
-        InvalidInputError: a pose is not a finite rigid transform, a width is infinite, or grasps
-            that differ have the same identifier; the message names the first ones.
+        InvalidInputError: a pose is not a finite rigid transform, a width is negative or infinite,
+            or grasps that differ have the same identifier; the message names the first ones.
     """
     check_pose(grasps.X_OG, "X_OG")
     _require_widths(grasps.width)
@@ -265,9 +265,9 @@ def require_sound(grasps: GraspSet) -> None:
 
 
 def _require_widths(width: Array) -> None:
-    if (bad := np.isinf(width)).any():
+    if (bad := (width < 0.0) | (width > FARTHEST)).any():
         i = int(np.argmax(bad))
-        raise InvalidInputError(f"width[{i}] is {width[i]}; give metres, or NaN if unknown")
+        raise InvalidInputError(f"width[{i}] is {width[i]:g}; give metres, or NaN if unknown")
 
 
 def _column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
