@@ -7,7 +7,7 @@ import math
 import textwrap
 from typing import Any, NoReturn
 
-from burg_drake.core.errors import quoted, shown
+from burg_drake.core.errors import did_you_mean, nearest, quoted, shown
 
 DEFAULT_STATION = "panda_tabletop"
 # Kept in step with station.engine, which imports too much for a help text; a test compares them.
@@ -38,8 +38,17 @@ class Parser(argparse.ArgumentParser):
         of the whole command, whose help knows nothing of them."""
         found, unknown = super().parse_known_args(*arguments, **named)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            option = unknown[0].partition("=")[0]
+            known = self._option_string_actions if option.startswith("-") else ()
+            meant = did_you_mean(option, known)
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
         return found, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Names the nearest of the choices, of verbs among them."""
+        if action.choices is not None and value not in action.choices:
+            known = nearest(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"invalid choice: {quoted(value)}; {known}")
 
     def error(self, message: str) -> NoReturn:
         """Ends the program with exit code 2."""

@@ -86,9 +86,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
         For example `did you mean 'mug'? Known: bowl, mug`, or `known: bowl, mug`.
     """
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    beginning = f"did you mean {close[0]!r}? Known" if close else "known"
-    return f"{beginning}: {listing(names)}"
+    meant = did_you_mean(name, names)
+    return f"{meant} Known: {listing(names)}" if meant else f"known: {listing(names)}"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Such as `did you mean 'mug'?`; empty if nothing is near."""
+    close = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)
+    return f"did you mean {close[0]!r}?" if close else ""
 
 
 def listing(names: Sequence[str]) -> str:

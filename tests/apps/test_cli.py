@@ -123,6 +123,24 @@ def test_what_is_not_known_leads_to_the_help_of_its_verb(
     assert error.endswith(f"(see {verb} --help)\n")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["evalute", "a"], "'evalute'; did you mean 'evaluate'? Known: "),
+        (["scene", "setle"], "'setle'; did you mean 'settle'? Known: "),
+        (["evaluate", "a", "--engine", "standart"], "'standart'; did you mean 'standard'? Known: "),
+        (["evaluate", "a", "--grasp-per-object=5"], "=5; did you mean '--grasps-per-object'? (see"),
+        (["evaluate", "a", "--zzz"], "unrecognized arguments: --zzz (see "),
+    ],
+)
+def test_the_nearest_of_what_is_misspelt_is_named(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(arguments)
+    assert message in capsys.readouterr().err
+
+
 def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
     """Exit code of a verb that ends with an error."""
 
