@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
+import re
 import types
 import typing
 from collections.abc import Sequence
@@ -52,6 +53,11 @@ class Reader:
                     what = f"{shown(given)} cannot be read; this release reads version {current}"
                     raise self.fail(value, "version", what)
                 return
+        required = [f.name for f in dataclasses.fields(schema) if f.default is f.default_factory]
+        if required and not {key.value for key, _ in node.value}.intersection(required):
+            kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", schema.__name__).lower()
+            keys = ", ".join(["version", *required])
+            raise self.fail(node, "", f"this is no {kind}, which has keys {keys}")
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:

@@ -7,8 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from burg_drake.core.damaged import reading
+from burg_drake.core.document_text import GRASP_FILE, read_text
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.grasps import GraspSet
+from burg_drake.core.json_text import load_json
+from burg_drake.core.yaml_events import checked_events
 from burg_drake.formats.grasp_format import PANDA, GraspFormat, Gripper, Imported
 
 MODULES = {
@@ -72,16 +75,20 @@ def format_of(path: str | Path) -> GraspFormat:
     """The format of a file, by its content.
 
     Raises:
-        InvalidInputError: it is of none.
+        InvalidInputError: it is of none; of YAML and JSON that cannot be read, why.
     """
     path = Path(path)
     for format in FORMATS.values():
         if format.recognises(path):
             return format
-    tried = ", ".join(f"{name} ({' '.join(f.suffixes)})" for name, f in FORMATS.items())
+    if path.suffix in (".yaml", ".yml"):
+        for _ in checked_events(read_text(path, GRASP_FILE), str(path), GRASP_FILE):
+            pass  # says what is wrong with a file that is damaged or beyond the limits
+    if path.suffix == ".json":
+        load_json(path, GRASP_FILE)
     raise InvalidInputError(
-        f"{path} is not a file of grasps in a format that is known; tried {tried}. If it is one of"
-        " them, name that one to see what is wrong"
+        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)}); if it is, name"
+        " the format to see what is wrong"
     )
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from burg_drake.core.errors import MeshError, UnknownNameError, nearest
+from burg_drake.core.errors import DocumentError, MeshError, UnknownNameError, nearest
 from burg_drake.core.files import atomic_write
 from burg_drake.core.names import require_name, require_names
 from burg_drake.core.resources import resolve
@@ -161,6 +161,11 @@ def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibra
     """
     path = resolve(reference, "models", base)
     file = path / LIBRARY_FILE if path.is_dir() else path
+    if file is not path and not file.exists():
+        raise DocumentError(
+            f"{path} holds no library ({LIBRARY_FILE} is missing); burg-drake library build makes"
+            " libraries of meshes"
+        )
     return ObjectLibrary(load_document(file, LibraryDocument), file.parent)
 
 

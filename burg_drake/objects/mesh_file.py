@@ -152,7 +152,11 @@ def _check_file(path: Path) -> None:
     if not path.is_file():
         raise MeshError(f"{path}: the mesh file does not exist")
     if path.suffix.lower() not in FORMATS:
-        raise MeshError(f"{path}: {path.suffix or 'no suffix'} is not one of {', '.join(FORMATS)}")
+        raise MeshError(
+            f"{path}: {path.suffix} is not one of {', '.join(FORMATS)}"
+            if path.suffix
+            else f"{path}: the name has no suffix; those of meshes are {', '.join(FORMATS)}"
+        )
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the mesh file is empty")
     check_bytes(path)

@@ -108,7 +108,7 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),
-        (["--grasps", "a.npy"], "is not a file of grasps in a format that is known"),
+        (["--grasps", "a.npy"], "is not a file of grasps in a known format"),
         (
             ["--grasps", "a.npy", "--grasps-format", "graspnet"],
             "has shape (2, 3); expected (N, 17)",

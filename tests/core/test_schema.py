@@ -100,6 +100,7 @@ def test_numbers_in_every_spelling(number):
              " shading, size, tags, parts, by_name, limit"),
         ("- 1\n", "d.yaml:1: expected keys with values ('key: value' lines)"),
         ("name: a\n", "d.yaml:1: version: missing; add 'version: 1'"),
+        ("mug: 0.1\n", "d.yaml:1: this is no document, which has keys version, name"),
         ("name: a\nversion: 3\n",
          "d.yaml:2: version: 3 cannot be read; this release reads version 1"),
         ("version: [1]\n",

@@ -154,6 +154,15 @@ def test_other_files_are_of_no_format(tmp_path: Path, content: bytes) -> None:
     with pytest.raises(InvalidInputError, match=r"a\.txt is not a file of grasps") as caught:
         read_grasp_file(path)
     assert all(name in str(caught.value) for name in FORMATS)
+    assert len(str(caught.value)) < len(str(path)) + 200
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+def test_what_is_too_deep_to_be_read_is_said_to_be(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_text("[" * 70 + "]" * 70)
+    with pytest.raises(InvalidInputError, match="nested more than 64 levels deep"):
+        read_grasp_file(path)
 
 
 @pytest.mark.parametrize("name", FORMATS)

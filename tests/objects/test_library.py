@@ -80,7 +80,7 @@ def test_missing_files(library: ObjectLibrary) -> None:
 def test_missing_libraries(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="does not exist"):
         load_library(tmp_path / "none")
-    with pytest.raises(DocumentError, match="cannot read"):
+    with pytest.raises(DocumentError, match=r"holds no library \(library.yaml is missing\)"):
         load_library(tmp_path)
 
 

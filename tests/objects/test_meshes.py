@@ -155,6 +155,7 @@ def test_missing_file(tmp_path: Path) -> None:
         ("a.stl", b"\x00\x01\x02 this is no mesh", "the mesh file has no triangles"),
         ("a.glb", b"glTF but not really", "not a readable .glb mesh"),
         ("a.gltf", b"{]", "not a readable .gltf mesh"),
+        ("a", b"v", "the name has no suffix; those of meshes are .obj, .ply,"),
         ("a.dae", b"<x/>", ".dae is not one of .obj, .ply, .stl, .off, .glb, .gltf"),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 0), "the mesh"),
     ],
