@@ -244,7 +244,7 @@ def require_sound(grasps: GraspSet) -> None:
     Grasps that are there several times, with the same identifier, object, pose and width, are fine.
 
     Raises:
-        InvalidInputError: a pose is not a finite rigid transform, a width is negative or infinite,
+        InvalidInputError: a pose is not a finite rigid transform, a width is beyond all hands,
             or grasps that differ have the same identifier; the message names the first ones.
     """
     check_pose(grasps.X_OG, "X_OG")
@@ -265,7 +265,7 @@ def require_sound(grasps: GraspSet) -> None:
 
 
 def _require_widths(width: Array) -> None:
-    if (bad := (width < 0.0) | (width > FARTHEST)).any():
+    if (bad := np.abs(width) > FARTHEST).any():
         i = int(np.argmax(bad))
         raise InvalidInputError(f"width[{i}] is {width[i]:g}; give metres, or NaN if unknown")
 

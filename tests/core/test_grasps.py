@@ -326,7 +326,7 @@ ids = grasps(12).id
         ({"X_OG": spoilt(1, 0.5, 3, 3)}, r"X_OG\[1\] has a last row other than 0 0 0 1"),
         ({"X_OG": np.zeros((12, 3, 4))}, r"X_OG has shape \(12, 3, 4\); expected \(N, 4, 4\)"),
         ({"width": np.full(12, np.inf)}, r"width\[0\] is inf"),
-        ({"width": np.full(12, -0.04)}, r"width\[0\] is -0.04; give metres"),
+        ({"width": np.full(12, 1e300)}, r"width\[0\] is 1e\+300; give metres"),
         ({"width": (750_000_000,)}, r"width has shape \(\d+,\); expected \(12,\)"),
         ({"id": np.array([*ids[:9], ids[4], *ids[10:]])}, rf"id\[4\] and id\[9\] are .*{ids[4]}"),
         ({"id": np.array([""] * 12)}, r"id\[0\] and id\[1\] are both ''"),
