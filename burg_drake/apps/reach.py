@@ -183,12 +183,20 @@ def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> dict[str, GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
+    from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.evaluation.candidate_sampling import sample_scene
+    from burg_drake.evaluation.instance_names import chosen_instances
     from burg_drake.evaluation.sampling_settings import SamplingSettings
 
     settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
     count, seed = grasps_per_object(arguments), arguments.seed
-    sampled = dict(sample_scene(scene, station, count, seed, settings, arguments.only))
+    sampled = {}
+    total = len(chosen_instances(scene, arguments.only))
+    with Reporter(not arguments.quiet) as reporter:
+        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
+        for name, grasps in sample_scene(scene, station, count, seed, settings, arguments.only):
+            sampled[name] = grasps
+            pace.step(note=name)
     print_shortfalls(sampled, count)
     return sampled
 

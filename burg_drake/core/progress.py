@@ -24,6 +24,9 @@ INTERVAL = 30.0
 FORECAST = 5.0
 """A job that has been measured for so long tells how long the rest takes [s]."""
 
+STARTING = "starting"
+"""Phase in which workers are set up, which takes seconds at best."""
+
 Clock = Callable[[], float]
 """Gives the time [s], from any origin."""
 
@@ -209,7 +212,7 @@ class _Bar:
 
 class _Lines:
     """A line at each change of phase, as soon as the time left is known, every half minute from
-    then on, and at the end; none about what ends within seconds."""
+    then on, and at the end; about what ends within seconds none but that it is starting."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -222,13 +225,15 @@ class _Lines:
         known = event.remaining is not None and (
             event.left is not None or event.elapsed >= FORECAST
         )
-        if not self._spoken and not known and now - self._begun < FORECAST:
-            return
         new = event.phase != self._phase
+        starting = new and event.phase == STARTING and event.done < event.total
+        if not (self._spoken or known or starting or now - self._begun >= FORECAST):
+            return
         told = self._forecast and not new
         finished = 0 < event.total == event.done
         if new or finished or (known and not told) or now - self._last >= INTERVAL:
-            self._phase, self._last, self._spoken = event.phase, now, True
+            self._phase, self._last = event.phase, now
+            self._spoken = self._spoken or not starting
             self._forecast = told or known
             parts = (event.phase, _count(event), _pace(event), _found(event))
             print("  ".join(part for part in parts if part), file=sys.stderr, flush=True)

@@ -21,7 +21,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
-from burg_drake.core.progress import Listener, Pace, Progress, Reporter
+from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
@@ -288,7 +288,7 @@ def _judge(
     done, total = len(run.candidates) - len(open_grasps), len(run.candidates)
     again = {grasp.id for grasp in open_grasps}
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
-    pace = Pace(reporter.show, Progress("starting", done, total, outcomes=outcomes), "judging")
+    pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
     stretch = Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))

@@ -16,7 +16,7 @@ from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.names import require_name
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.progress import Listener, Pace, Progress, Reporter
+from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
@@ -128,7 +128,7 @@ def reach(
         left = [candidate for candidate in candidates if candidate.id not in verdicts]
         outcomes = Counter(v.outcome for v in verdicts.values())
         done, total = len(candidates) - len(left), len(candidates)
-        event = Progress("starting", done, total, outcomes=outcomes, good=YES)
+        event = Progress(STARTING, done, total, outcomes=outcomes, good=YES)
         pace = Pace(reporter.show, event, "judging")
         for candidate, verdict in opened.enter_context(
             closing(judge_all(left, factory, workers=workers))

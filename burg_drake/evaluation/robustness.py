@@ -16,7 +16,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.processes import default_workers
-from burg_drake.core.progress import Listener, Pace, Progress, Reporter
+from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executors import judge_all
 from burg_drake.evaluation.journal import Journal, read_journal
@@ -169,7 +169,7 @@ def _answer(
     work = sum(COST[probe.test] for probe in todo)
     expected = work * _trial_time(run, probes) / (workers or default_workers())
     begin = Progress(
-        "starting", len(probes) - len(todo), len(probes), unit="tests", left=expected or None
+        STARTING, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
     pace = Pace(reporter.show, begin, "testing", work=work)
     with closing(judge_all(todo, factory, workers=workers)) as answered:

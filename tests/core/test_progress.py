@@ -87,13 +87,20 @@ def test_without_a_terminal_there_is_a_line_every_half_minute(capsys: Capture) -
     ]
 
 
-def test_what_ends_within_seconds_says_nothing(capsys: Capture) -> None:
+def test_what_ends_within_seconds_says_that_it_is_starting(capsys: Capture) -> None:
     clock = Clock()
     with Reporter(True, clock=clock) as reporter:
         pace = Pace(reporter.show, Progress("starting", total=4), "judging", clock=clock)
         for _ in range(4):
             clock.now += 1.0
             pace.step()
+    assert capsys.readouterr().err == "starting  0/4 grasps\n"
+
+
+def test_what_is_done_already_says_nothing(capsys: Capture) -> None:
+    with Reporter(True, clock=Clock()) as reporter:
+        Pace(reporter.show, Progress("starting", 4, 4), "judging")
+        reporter.show(Progress("building", 1, 2))
     assert capsys.readouterr().err == ""
 
 
