@@ -47,6 +47,7 @@ class KnownJudge:
     """Judges by `expected`; writes a line to `log` for each grasp it is asked about.
 
     Attributes:
+        pause: before each grasp that is executed [s]: verdicts of the others come at once.
         batches: grasps that are screened at a time, by screen.
     """
 
@@ -67,7 +68,6 @@ class KnownJudge:
         return ((Stage.EXECUTED, lambda grasp, motion: self.execute(grasp)),)
 
     def clear(self, grasp: Candidate) -> Decision:
-        time.sleep(self.pause)
         if self.log is not None:
             with self.log.open("a") as file:
                 file.write(f"{grasp.id}\n")
@@ -83,6 +83,7 @@ class KnownJudge:
         return Decision(q_grasp=q, q_pregrasp=q)
 
     def execute(self, grasp: Candidate) -> Decision:
+        time.sleep(self.pause)
         n = number(grasp.id)
         outcome = expected(grasp.id)
         moved = n / 5e3 if outcome is Outcome.LIFTED_DISTURBED else 0.0

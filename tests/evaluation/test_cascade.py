@@ -91,7 +91,7 @@ def patch(name, value):
     module, _, attribute = name.rpartition(".")
     __import__(module)
     setattr(sys.modules[module], attribute, value)
-known_judge.install(patch, Path(sys.argv[2]), pause=0.1)
+known_judge.install(patch, Path(sys.argv[2]), pause=0.2)
 from burg_drake.evaluation.cascade import evaluate
 evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, blind=True, workers=2)
 """
