@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.content import content_hash
+from burg_drake.core.damaged import without_warnings
 from burg_drake.core.errors import MeshError
 from burg_drake.objects.mesh_bounds import (
     IMAGES,
@@ -175,7 +176,8 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     if not log.handlers:  # or remarks on materials would go to standard error
         log.addHandler(logging.NullHandler())
     try:
-        scene = trimesh.load_scene(path, process=False)
+        with without_warnings():  # of numbers that overflow
+            scene = trimesh.load_scene(path, process=False)
         parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
         mesh = _joined(parts) if parts else None
     except Exception as error:  # the readers raise whatever their parsing stumbles over
