@@ -10,7 +10,7 @@ from burg_drake.evaluation.run_store import load_run
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run"
-    evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=10, progress=False)
+    evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=5, progress=False)
 
     run = load_run(path)  # as one would at any later time, on any machine
     print(f"{len(run.verdicts)} grasps, judged with Drake {run.document.versions['drake']}")

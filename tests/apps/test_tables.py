@@ -46,9 +46,9 @@ def grasps(seed: int) -> GraspSet:
     rng = np.random.default_rng(seed)
     n = len(VALUES)
     return GraspSet.create(
-        make_pose(p_AB=1e6 * rng.normal(size=(n, 3))),
+        make_pose(p_AB=1e5 * rng.normal(size=(n, 3))),
         object=[NAME, "mug"] * (n // 2),
-        width=[1e-9, 1e9, math.nan] * (n // 3),
+        width=[1e-9, 1e6, math.nan] * (n // 3),
         score=[1e-9, 1e9, math.nan] * (n // 3),
         columns={
             "slide": np.array(VALUES),
