@@ -76,6 +76,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.station.check": ["check_scene"],
         "burg_drake.station.diagram": ["build_station_diagram"],
         "burg_drake.station.engine": ["ENGINES", "Engine"],
+        "burg_drake.station.grasp_motion": ["GraspMotion"],
         "burg_drake.station.station": ["load_station"],
     },
 )

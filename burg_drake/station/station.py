@@ -14,6 +14,7 @@ from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameErr
 from burg_drake.core.names import require_name, require_names
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document, plain_data
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.hand import Hand, locate_hand
 
 MODEL_NAMES = ("table", "board", "hand", "arm", "lift")
@@ -153,6 +154,7 @@ class StationDocument:
         table: the table top under the board.
         cameras: by name.
         background: fixed boxes by name.
+        motion: how the hand goes to a grasp and away from it, where nothing else is asked for.
     """
 
     version: int = 1
@@ -164,6 +166,7 @@ class StationDocument:
     table: Table = Table()
     cameras: dict[str, Camera] = field(default_factory=dict)
     background: dict[str, Obstacle] = field(default_factory=dict)
+    motion: GraspMotion = field(default_factory=GraspMotion)
 
     def __post_init__(self) -> None:
         require_name(self.name, "name")
@@ -223,9 +226,11 @@ class Station:
     @property
     def content(self) -> str:
         """Hash of the station, its hand document and the robot's model files with their meshes;
-        names and file locations do not count."""
+        names, file locations
+        and the usual motion do not count, as who asks says how the hand shall move."""
         arm = self.document.arm and replace(self.document.arm, model="")
         placed = plain_data(replace(self.document, description="", hand="", arm=arm))
+        placed.pop("motion", None)
         models = [self.hand_model, *([self.arm_model] if self.arm_model else [])]
         files = [file for model in models for file in (model, *_named_files(model))]
         return content_hash(dump_document(placed | {"name": ""}), dump_document(self.hand), files)

@@ -1,0 +1,48 @@
+"""How the hand goes to a grasp and away from it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.errors import DocumentError
+from burg_drake.core.resources import resolve
+from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.station.station import load_station
+
+
+def test_the_usual_motion_is_that_of_the_paper() -> None:
+    motion = load_station("panda_tabletop").document.motion
+    assert motion == GraspMotion(standoff=0.10, retreat=0.0, lift_height=0.30)
+    assert motion.least == 0.30 and motion.direction_W.tolist() == [0.0, 0.0, 1.0]
+
+
+def with_motion(tmp_path: Path, text: str) -> Path:
+    station = tmp_path / "own.yaml"
+    built_in = resolve("panda_tabletop", "stations").read_text()
+    station.write_text(f"{built_in}\nmotion: {text}\n")
+    return station
+
+
+def test_a_station_states_its_usual_motion(tmp_path: Path) -> None:
+    text = "{retreat: 0.05, lift_height: 0.2, least_lift: 0.02, lift_direction: [0, 3, 4]}"
+    own, usual = load_station(with_motion(tmp_path, text)), load_station("panda_tabletop")
+    assert own.document.motion.least == 0.02 and own.document.motion.standoff == 0.10
+    assert own.document.motion.direction_W == pytest.approx([0.0, 0.6, 0.8])
+    # Who asks says how the hand shall move: the station is the same one.
+    assert own.content == usual.content != replace(usual, hand_model=own.path).content
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("{lift_height: 0.1, least_lift: 0.2}", "least_lift is 0.2 m, more than lift_height, 0.1"),
+        ("{lift_height: 9}", "lift_height is 9; it must be 0 to 2"),
+        ("{lift_height: 0}", "retreat and lift together may be as short as 0 mm"),
+        ("{lift_direction: [0, 0, 0]}", r"lift_direction \[0.0, 0.0, 0.0\] has no length"),
+        ("{lift: 0.1}", "'lift'"),
+    ],
+)
+def test_motions_that_cannot_be_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(DocumentError, match=told):
+        load_station(with_motion(tmp_path, text))
