@@ -23,6 +23,7 @@ from burg_drake.motion.ik_routine import IkRoutine
 from burg_drake.motion.reach import ArmReach, Reach
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "motion"))
@@ -42,7 +43,7 @@ def main() -> None:
     panda = load_station("panda_tabletop")
     grasps = clear_grasps(scene, panda, arguments.grasps)
     swept = judge("Panda, closed form", scene, panda, grasps)
-    numeric = ReachSettings(closed_form=False)
+    numeric = ReachSettings(closed_form=False, motion=GraspMotion())
     compare(swept, judge("Panda, numeric", scene, panda, grasps, settings=numeric))
 
     ur5e = load_station("ur5e_tabletop")
@@ -96,8 +97,8 @@ def against_drake(
     arguments: argparse.Namespace,
 ) -> None:
     """Audits motions, and asks the judge by SNOPT and RRT about as many yes as no."""
-    settings = ReachSettings()
-    world = World(scene, station, settings.standoff, settings.lift_height)
+    motion = GraspMotion()
+    world = World(scene, station, motion.standoff, motion.lift_height)
     reached = [k for k, reach in enumerate(found) if reach.witness is not None]
     audited = reached[: arguments.audit]
     audit, faults = Audit(scene, station), 0

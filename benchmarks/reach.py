@@ -31,6 +31,7 @@ from burg_drake.motion.reach import ArmReach, Reach
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 STEP = 0.005
@@ -75,18 +76,18 @@ def judge(scene: Scene, station: Station, arguments: argparse.Namespace) -> None
     grasps = clear_grasps(scene, station, arguments.grasps)
     n = len(grasps.instance)
     print(f"\n{scene.name} on {station.name}: {n} grasps that the open hand is clear for")
-    exact, rate = timed("exact", scene, station, ReachSettings(), grasps)
+    exact, rate = timed("exact", scene, station, ReachSettings(motion=GraspMotion()), grasps)
     screened, _ = timed("screening", scene, station, ReachSettings(exact=False), grasps)
     compare("screening", screened, "exact", yes(exact))
     audit_motions(scene, station, grasps, exact, arguments.audit)
 
-    settings = ReachSettings()
-    world = World(scene, station, settings.standoff, settings.lift_height)
+    motion = GraspMotion()
+    world = World(scene, station, motion.standoff, motion.lift_height)
     few = slice(0, arguments.exhaustive)
     other, _ = asked("exhaustive", Exhaustive(world).check, grasps, few)
     compare("exact", exact[few], "exhaustive", other)
     few = slice(0, arguments.plain)
-    plain = Plain(PlainWorld(scene, station, settings.standoff, settings.lift_height))
+    plain = Plain(PlainWorld(scene, station, motion.standoff, motion.lift_height))
     other, plain_rate = asked("SNOPT and RRT", plain.check, grasps, few)
     compare("exact", exact[few], "SNOPT and RRT", other)
     if other:

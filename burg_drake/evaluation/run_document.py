@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
@@ -232,12 +232,15 @@ def input_of(document: Scene | Station, kind: str) -> Input:
 
 
 def numbers(settings: object) -> dict[str, float]:
-    """The numbers of a settings dataclass by name; those of a tuple are counted from 1."""
+    """The numbers of a settings dataclass by name; those of a tuple are counted from 1, those of
+    settings within settings have their own names, and what is None is left out."""
     found: dict[str, float] = {}
     for name, value in vars(settings).items():
         if isinstance(value, tuple):
             found |= {f"{name}_{k}": float(item) for k, item in enumerate(value, 1)}
-        else:
+        elif is_dataclass(value):
+            found |= numbers(value)
+        elif value is not None:
             found[name] = float(value)
     return found
 

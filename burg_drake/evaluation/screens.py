@@ -124,6 +124,7 @@ def arm_settings(settings: TrialSettings | None = None, *, exact: bool = True) -
     """How the arm is asked before a trial; see `arm_reach`."""
     from burg_drake.motion.reach_settings import ReachSettings
     from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
+    from burg_drake.station.grasp_motion import GraspMotion
 
     lift = (settings or DEFAULT_TRIAL).lift_height
-    return ReachSettings(lift_height=lift, exact=exact)
+    return ReachSettings(motion=GraspMotion(lift_height=lift), exact=exact)

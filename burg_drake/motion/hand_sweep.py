@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.errors import UnknownNameError, nearest
 from burg_drake.core.frames import Array, check_pose, make_pose
 from burg_drake.grasping.body import Body
 from burg_drake.grasping.screen import HandScreen
@@ -24,6 +24,7 @@ from burg_drake.motion.swept_shapes import swept_body, swept_shape
 from burg_drake.motion.way import deepest_on_way
 from burg_drake.scene.scene import Scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station
 
 AT_REST = 1e-3
@@ -65,35 +66,31 @@ class HandSweep:
     Args:
         scene: what stands there.
         station: whose hand it is.
-        standoff: length of the approach [m].
-        lift: length of the lift [m].
+        motion: the ways.
 
     Attributes:
         symmetric: whether the hand with its fingers swapped occupies the same space.
 
     Raises:
-        InvalidInputError: a length is not 0 or more, the diagram cannot be built, or a collision
-            geometry is of a shape that the hand's screen does not know.
+        InvalidInputError: the diagram cannot be built, or a collision geometry is of a shape that
+            the hand's screen does not know.
     """
 
-    def __init__(self, scene: Scene, station: Station, *, standoff: float, lift: float) -> None:
-        for name, length in (("standoff", standoff), ("lift", lift)):
-            if not 0.0 <= length < np.inf:
-                raise InvalidInputError(f"{name} is {length} m; give a length of 0 or more")
-        self._standoff, self._height = standoff, lift
+    def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
+        self._standoff, self._height = motion.standoff, motion.lift_height
         diagram = build_station_diagram(scene, station, robot="hand")
         self._instances = tuple(diagram.free)
         self._order = ("table", *sorted(diagram.fixed), *sorted(diagram.free))
         self._parts, self._bodies = read_hand(diagram)
         self.symmetric = is_symmetric(self._parts)
         shapes = [shape for part in self._parts for shape in part.shapes]
-        swept = [s for shape in shapes for s in swept_shape(shape, -standoff * UP)]
+        swept = [s for shape in shapes for s in swept_shape(shape, -motion.standoff * UP)]
         self._open = HandScreen(shapes, self._bodies)
         self._approach = HandScreen(swept, self._bodies)
-        self._below = {n: swept_body(body, -lift * UP) for n, body in self._bodies.items()}
-        self._lifts: dict[str, list[HandScreen]] = {}
+        self._below: dict[float, dict[str, Body]] = {}
+        self._lifts: dict[tuple[str, float], list[HandScreen]] = {}
         self._still = [HandScreen(part.shapes, self._bodies) for part in self._parts]
-        self._rises: dict[str, _Blocked | None] = {}
+        self._rises: dict[tuple[str, float], _Blocked | None] = {}
 
     def approach(self, instance: str, X_WG: Array) -> Sweep:
         """The open hand on its way from the pregrasp to the grasp, both included.
@@ -118,7 +115,7 @@ class HandSweep:
         clearance[hit] = -depth
         return Sweep(names == "", names.astype(np.str_), clearance, at)
 
-    def lift(self, instance: str, X_WG: Array, width: Array) -> Sweep:
+    def lift(self, instance: str, X_WG: Array, width: Array, height: float | None = None) -> Sweep:
         """The hand with the target in it on its way up.
 
         Hand and fingers count against all but the target, and the target against all others. The
@@ -130,14 +127,16 @@ class HandSweep:
             X_WG: (N, 4, 4) grasps in the world.
             width: (N,) distance between the pads once they hold the target [m]; the hand is open
                 where it is NaN.
+            height: how far it goes [m]; by the whole lift if None.
 
         Raises:
             UnknownNameError: there is no such instance.
             InvalidInputError: `X_WG` are not poses.
         """
         X_WG, others = self._checked(instance, X_WG), self._others(instance)
+        height = self._height if height is None else height
         placed = [part.placed(X_WG, np.asarray(width, float)) for part in self._parts]
-        moves = list(zip(self._lift_screens(instance), placed, strict=True))
+        moves = list(zip(self._lift_screens(instance, height), placed, strict=True))
         ranks = np.array([_ranks(screen.deepest(X, others)[0], others) for screen, X in moves])
         names = np.array([*others, ""], dtype=object)[ranks.min(axis=0)]
         decisive = ranks.argmin(axis=0)
@@ -148,9 +147,9 @@ class HandSweep:
             hit = np.flatnonzero((names != "") & (decisive == k))
             up_W = np.broadcast_to(UP, (len(hit), 3))
             still = self._still[k]
-            depth, at[hit] = deepest_on_way(still, X[hit], names[hit], up_W, self._height)
+            depth, at[hit] = deepest_on_way(still, X[hit], names[hit], up_W, height)
             clearance[hit] = -depth
-        if instance and (blocked := self._rise(instance)) is not None:
+        if instance and (blocked := self._rise(instance, height)) is not None:
             names[free], clearance[free], at[free] = blocked.by, -blocked.depth, blocked.at
         return Sweep(names == "", names.astype(np.str_), clearance, at)
 
@@ -165,23 +164,30 @@ class HandSweep:
         """Names of all bodies but the target, the deciding ones first; see `HandClearance`."""
         return [name for name in self._order if name in self._bodies and name != instance]
 
-    def _lift_screens(self, instance: str) -> list[HandScreen]:
-        """The parts of the hand against what the others sweep when, in place of the hand, all else
-        moves: down."""
-        if instance not in self._lifts:
-            below = {name: self._below[name] for name in self._others(instance)}
-            self._lifts[instance] = [HandScreen(part.shapes, below) for part in self._parts]
-        return self._lifts[instance]
+    def _swept_down(self, height: float) -> dict[str, Body]:
+        """All bodies, as they sweep when in place of the hand all else moves: down."""
+        if height not in self._below:
+            bodies = self._bodies.items()
+            self._below[height] = {name: swept_body(body, -height * UP) for name, body in bodies}
+        return self._below[height]
 
-    def _rise(self, instance: str) -> _Blocked | None:
+    def _lift_screens(self, instance: str, height: float) -> list[HandScreen]:
+        """The parts of the hand against what the others sweep."""
+        key = instance, height
+        if key not in self._lifts:
+            swept = self._swept_down(height)
+            below = {name: swept[name] for name in self._others(instance)}
+            self._lifts[key] = [HandScreen(part.shapes, below) for part in self._parts]
+        return self._lifts[key]
+
+    def _rise(self, instance: str, height: float) -> _Blocked | None:
         """What is in the way of the target itself, if anything."""
-        if instance not in self._rises:
-            self._rises[instance] = _rise(
-                self._bodies[instance],
-                {name: (self._bodies[name], self._below[name]) for name in self._others(instance)},
-                self._height,
-            )
-        return self._rises[instance]
+        key = instance, height
+        if key not in self._rises:
+            swept = self._swept_down(height)
+            others = {name: (self._bodies[name], swept[name]) for name in self._others(instance)}
+            self._rises[key] = _rise(self._bodies[instance], others, height)
+        return self._rises[key]
 
 
 def _ranks(names: NDArray[np.object_], order: Sequence[str]) -> NDArray[np.intp]:

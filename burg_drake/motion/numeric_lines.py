@@ -24,7 +24,7 @@ from burg_drake.motion.ik import ArmKinematics, solve_ik
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.line_search import Chain, Failure
 from burg_drake.motion.posture_failure import EXPLAINED
-from burg_drake.motion.posture_grids import START, counted, layers
+from burg_drake.motion.posture_grids import START, counted
 from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.straight_rows import JUMP, Filler, Rows, straighten
@@ -59,9 +59,7 @@ class NumericLines:
         margin, starts = settings.limit_margin, settings.starts
         self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
         self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
-        approach, lift = layers(settings.standoff), layers(settings.lift_height)
-        self.layers = np.concatenate([-approach[:0:-1], lift])
-        self.at_grasp = len(approach) - 1
+        self.layers, self.at_grasp = lines.layers, lines.at_grasp
         self.follower = Follower(
             lines, self.layers, self.at_grasp, settings.joint_travel, self.solve, self.measure
         )

@@ -12,8 +12,6 @@ from burg_drake.motion.posture_grid import Booleans, Indices, PostureGrid
 from burg_drake.motion.proximity import LIKELY, ArmProximity, ClearanceBounds
 from burg_drake.motion.reach_settings import ReachSettings
 
-LAYER = 0.05
-"""Distance between two poses at which the redundant joint is swept [m]."""
 CHANGE = 0.38
 """Most that the redundant joint may change from layer to layer [rad] ..."""
 OFFSETS = 4
@@ -43,10 +41,7 @@ class PostureGrids:
     ) -> None:
         self.ik, self.lines, self.proximity = ik, lines, proximity
         self.home, self.settings = home, settings
-        approach = layers(settings.standoff)
-        lift = layers(settings.lift_height)
-        self.layers = np.concatenate([-approach[:0:-1], lift])
-        self.at_grasp = len(approach) - 1
+        self.layers, self.at_grasp = lines.layers, lines.at_grasp
 
     def parameters(self, count: int) -> Array:
         """(count,) values of the redundant joint within its limits [rad]."""
@@ -75,11 +70,6 @@ class PostureGrids:
         lower, upper = grid.lower[where], grid.upper[where]
         lower[new], upper[new] = bounds.lower, counted(bounds, self.settings.exact)
         grid.lower[where], grid.upper[where] = lower, upper
-
-
-def layers(length: float) -> Array:
-    """Distances from the grasp, from 0 to `length` [m]; 0 alone if that is 0."""
-    return np.linspace(0.0, length, int(np.ceil(length / LAYER - 1e-9)) + 1)
 
 
 def counted(bounds: ClearanceBounds, exact: bool) -> Array:

@@ -37,6 +37,7 @@ from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.verdict import Reach as Reach
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 BATCH = 128
@@ -49,6 +50,7 @@ class ArmReach:
 
     Attributes:
         settings: how thoroughly it looks.
+        motion: the hand's straight ways to a grasp and away from it.
         kinematics: the arm on its own.
         diagram: the station diagram of the checks.
         collision: the arm in the scene, by Drake's checker.
@@ -80,6 +82,8 @@ class ArmReach:
         scene = scene if isinstance(scene, Scene) else load_scene(scene)
         station = station if isinstance(station, Station) else load_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+        self.motion = self.settings.motion or station.document.motion
+        _require_plain(self.motion)
         arm = station.document.arm
         assert arm is not None  # build_station_diagram has seen to it
         self.diagram = diagram
@@ -92,12 +96,10 @@ class ArmReach:
         lower, upper = self.kinematics.turn_around(home, self.settings.limit_margin)
         focus = postures_over_objects(diagram, self.proximity.links, home, lower, upper)
         self.tree = HomeTree(self.edges, home, lower, upper, focus=focus)
-        self._sweep = HandSweep(
-            scene, station, standoff=self.settings.standoff, lift=self.settings.lift_height
-        )
+        self._sweep = HandSweep(scene, station, self.motion)
         X_WA = arm.X_WA.matrix()
         self._X_AW = inverse(X_WA)
-        lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3])
+        lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
         self._search = _line_search(self, lines, home, ik)
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
@@ -193,6 +195,19 @@ class ArmReach:
             for k in every[(clearance[every] < 0.0).all(axis=1)]:
                 found[k] = said[int(k)]
         return found, clearance
+
+
+def _require_plain(motion: GraspMotion) -> None:
+    """Checks that a motion is straight up at once by all of its height.
+
+    Raises:
+        InvalidInputError: it is not.
+    """
+    if motion.retreat > 0.0 or motion.least < motion.lift_height or motion.direction_W[2] < 1.0:
+        raise InvalidInputError(
+            "a retreat, a least_lift below lift_height and a lift_direction other than up are not"
+            " judged by the arm yet; leave them out"
+        )
 
 
 def _both(X_WG: Array, X_AW: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.station.grasp_motion import GraspMotion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -12,8 +13,8 @@ class ReachSettings:
     """How thoroughly to look for arm configurations.
 
     Attributes:
-        standoff: distance from pregrasp to grasp along the approach direction [m].
-        lift_height: how far the hand is lifted straight up after the grasp [m].
+        motion: the hand's straight ways to a grasp and away from it; those that the station states
+            if None.
         exact: whether Drake's collision checker has the last word on every motion; without it, for
             screening, the best guess of bounds of the arm's clearance decides.
         closed_form: whether to use the closed form for arms that have one, the Panda.
@@ -34,8 +35,7 @@ class ReachSettings:
         starts_tried: ... and so many of its pregrasp postures that the arm does not get to.
     """
 
-    standoff: float = 0.10
-    lift_height: float = 0.30
+    motion: GraspMotion | None = None
     exact: bool = True
     closed_form: bool = True
     redundant: tuple[int, ...] = (32, 192)
@@ -49,10 +49,8 @@ class ReachSettings:
     starts_tried: int = 4
 
     def __post_init__(self) -> None:
-        if min(self.standoff, self.lift_height, self.limit_margin) < 0.0 or self.joint_travel <= 0:
-            raise InvalidInputError(
-                "standoff, lift_height and limit_margin must be at least 0, joint_travel above 0"
-            )
+        if self.limit_margin < 0.0 or self.joint_travel <= 0:
+            raise InvalidInputError("limit_margin must be at least 0, joint_travel above 0")
         if not self.redundant or min(self.redundant) < 1:
             raise InvalidInputError(
                 f"redundant {list(self.redundant)} must be whole numbers above 0"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import load_station
 
 DOWN = (0.0, 0.0, -1.0)
@@ -32,7 +35,7 @@ def search() -> ClosedFormLines:
     )
     ik = PandaIk.of(ArmKinematics.of(diagram))
     assert ik is not None and STATION.document.arm is not None
-    lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3))
+    lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3), GraspMotion())
     home = np.array(STATION.document.arm.home)
     settings = ReachSettings()
     return ClosedFormLines(ik.within(0.01), lines, ArmProximity(diagram), home, settings)
@@ -94,8 +97,8 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
     search: ClosedFormLines,
 ) -> None:
     """Postures with a joint beyond its limit; where no other posture is within, that is said."""
-    settings = ReachSettings(standoff=0.0, lift_height=0.0)
-    ends = ClosedFormLines(search.ik, search.lines, search.proximity, search.home, settings)
+    still = replace(search.lines, standoff=0.0, lift=0.0)
+    ends = ClosedFormLines(search.ik, still, search.proximity, search.home, search.settings)
     rng = np.random.default_rng(5)
     q = rng.uniform(search.ik.lower, search.ik.upper, (400, 7))
     excess = rng.uniform(0.1, 0.5, 400)

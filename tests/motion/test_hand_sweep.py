@@ -15,9 +15,11 @@ from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.hand_sweep import HandSweep, Sweep
 from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Obstacle, Station, load_station
 
-STANDOFF, LIFT = 0.10, 0.30
+MOTION = GraspMotion()
+STANDOFF, LIFT = MOTION.standoff, MOTION.lift_height
 CAN = Instance(name="can", object="can", X_SO=Pose((0.4, 0.0, 0.0)))
 """34 mm in radius, 102 mm high."""
 X_WG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, 0.0, 0.09))
@@ -34,7 +36,7 @@ def place(*instances: Instance, **background: Obstacle) -> tuple[Scene, Station]
 
 
 def sweep(*instances: Instance, **background: Obstacle) -> HandSweep:
-    return HandSweep(*place(*instances, **background), standoff=STANDOFF, lift=LIFT)
+    return HandSweep(*place(*instances, **background), MOTION)
 
 
 def drake(*instances: Instance, **background: Obstacle) -> HandClearance:
@@ -165,7 +167,7 @@ def shelf() -> tuple[Scene, Station]:
 
 @pytest.fixture(scope="module")
 def swept(shelf: tuple[Scene, Station]) -> HandSweep:
-    return HandSweep(*shelf, standoff=STANDOFF, lift=LIFT)
+    return HandSweep(*shelf, MOTION)
 
 
 def overlapped(clearance: HandClearance, path: Array, closed: float) -> set[str]:
@@ -214,7 +216,7 @@ def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station], swept: Han
     order = np.random.default_rng(4).permutation(len(X))
     for way in ("approach", "lift"):
         rows = (lambda i: (X[i],)) if way == "approach" else (lambda i: (X[i], width[i]))
-        ask = getattr(HandSweep(*shelf, standoff=STANDOFF, lift=LIFT), way)
+        ask = getattr(HandSweep(*shelf, MOTION), way)
         alone = [ask(name, *rows(np.array([i]))) for i in range(len(X))]
         for chosen in (np.arange(len(X)), order):
             batch = getattr(swept, way)(name, *rows(chosen))
@@ -226,11 +228,11 @@ def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station], swept: Han
 
 
 def test_ways_of_no_length_are_the_grasp_itself(shelf: tuple[Scene, Station]) -> None:
-    still = HandSweep(*shelf, standoff=0.0, lift=0.0)
+    still = HandSweep(*shelf, replace(MOTION, standoff=0.0))
     clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
     for name, X in random_grasps(*shelf, 10):
         measured = clearance.measure(name, X)
-        approach, lift = still.approach(name, X), still.lift("", X, np.full(len(X), np.nan))
+        approach, lift = still.approach(name, X), still.lift("", X, np.full(len(X), np.nan), 0.0)
         np.testing.assert_array_equal(
             approach.blocker, np.where(approach.free, "", measured.blocker)
         )
@@ -262,7 +264,7 @@ def test_swapped_fingers_and_a_turned_world(shelf: tuple[Scene, Station], swept:
     }
     X_WS = Pose.from_matrix(turn @ station.document.X_WS.matrix(), quaternion=True)
     document = replace(station.document, X_WS=X_WS, background=moved)
-    turned = HandSweep(scene, replace(station, document=document), standoff=STANDOFF, lift=LIFT)
+    turned = HandSweep(scene, replace(station, document=document), MOTION)
     for name, X in random_grasps(scene, station, 8):
         width = np.full(len(X), 0.05)
         ways = [
@@ -277,9 +279,7 @@ def test_swapped_fingers_and_a_turned_world(shelf: tuple[Scene, Station], swept:
 
 def test_bad_input() -> None:
     scene, station = place(CAN)
-    with pytest.raises(InvalidInputError, match=r"lift is -0\.1 m; give a length of 0 or more"):
-        HandSweep(scene, station, standoff=STANDOFF, lift=-0.1)
-    swept = HandSweep(scene, station, standoff=STANDOFF, lift=LIFT)
+    swept = HandSweep(scene, station, MOTION)
     with pytest.raises(UnknownNameError, match=r"there is no instance 'cam'.*'can'"):
         swept.approach("cam", X_WG[None])
     with pytest.raises(InvalidInputError, match="NaN"):

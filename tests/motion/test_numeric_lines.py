@@ -23,9 +23,11 @@ from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import load_station
 
 SETTINGS = ReachSettings()
+MOTION = GraspMotion()
 CLEARANCE = 2e-3
 """Of the hand on its way [m]; lets it be beside the straight way by half of it, but by no more than
 `SETTINGS.deviation[1]`."""
@@ -45,7 +47,7 @@ class Arm:
         self.X_HG = self.station.hand.X_HG.matrix()
         self.home = np.array(document.home)
         self.kinematics = ArmKinematics.of(self.diagram)
-        self.lines = LinePoses.of(self.X_HG, self.X_WA[:3, :3])
+        self.lines = LinePoses.of(self.X_HG, self.X_WA[:3, :3], MOTION)
         self.proximity = ArmProximity(self.diagram)
 
     def numeric(self, kinematics: ArmKinematics | None = None) -> NumericLines:
@@ -144,16 +146,16 @@ def check_straight(arm: Arm, X_AG: np.ndarray, chain: Chain) -> None:
     X = arm.kinematics.forward(np.concatenate([q, dense]))[0] @ arm.X_HG
     p = X[:, :3, 3] - X_AG[:3, 3]
     approach, up = X_AG[:3, 2], inverse(arm.X_WA)[:3, 2]
-    np.testing.assert_allclose(p[0], -SETTINGS.standoff * approach, atol=1e-5)
+    np.testing.assert_allclose(p[0], -MOTION.standoff * approach, atol=1e-5)
     np.testing.assert_allclose(p[at], 0.0, atol=1e-5)
-    np.testing.assert_allclose(p[len(q) - 1], SETTINGS.lift_height * up, atol=1e-5)
+    np.testing.assert_allclose(p[len(q) - 1], MOTION.lift_height * up, atol=1e-5)
     np.testing.assert_allclose(chain.rise[at:], p[at : len(q)] @ up, atol=1e-5)
     assert (chain.rise[: at + 1] == 0.0).all()
     off = [
         np.linalg.norm(p - np.clip(p @ axis, low, high)[:, None] * axis, axis=1)
         for axis, low, high in (
-            (approach, -SETTINGS.standoff, 0.0),
-            (up, 0.0, SETTINGS.lift_height),
+            (approach, -MOTION.standoff, 0.0),
+            (up, 0.0, MOTION.lift_height),
         )
     ]
     allowed = min(0.5 * CLEARANCE, SETTINGS.deviation[1])

@@ -25,6 +25,7 @@ from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.reach import ArmReach, Reach, ReachSettings
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Obstacle, Station, load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
@@ -44,6 +45,14 @@ LONGEST = np.hypot(0.316, 0.0825) + np.hypot(0.384, 0.0825) + np.hypot(0.088, 0.
 """The TCP is never farther from the shoulder: upper arm, forearm, wrist to TCP in a line [m]."""
 SHOULDER = np.array([0.0, 0.0, 0.333])
 DOWN = (0.0, 0.0, -1.0)
+
+
+def barely_lifted(standoff: float) -> ReachSettings:
+    """With a lift of 1 mm, the least there is."""
+    return ReachSettings(motion=GraspMotion(standoff=standoff, lift_height=1e-3))
+
+
+AT_ONCE = barely_lifted(0.0)
 
 
 def grasp_by_dh(q: np.ndarray) -> np.ndarray:
@@ -181,7 +190,7 @@ def test_configurations_are_free_in_a_fresh_diagram(
 
 
 def test_free_configurations_are_found_again(scene: Scene, station: Station) -> None:
-    arm = ArmReach(scene, station, settings=ReachSettings(standoff=0.0, lift_height=0.0))
+    arm = ArmReach(scene, station, settings=AT_ONCE)
     rng = np.random.default_rng(11)
     lower, upper = arm.kinematics.lower + 0.01, arm.kinematics.upper - 0.01
     drawn = (rng.uniform(lower, upper) for _ in range(200))
@@ -262,7 +271,7 @@ def test_pregrasp_beyond_the_arms_length(empty: Scene, station: Station) -> None
     0.72 m."""
     X_WG = grasp_from_axes((0, 1, 0), DOWN, (0.45, 0.0, 0.5))
     for standoff, outcome in ((0.0, None), (0.1, None), (0.4, Outcome.NO_IK)):
-        arm = ArmReach(empty, station, settings=ReachSettings(standoff=standoff, lift_height=0.0))
+        arm = ArmReach(empty, station, settings=barely_lifted(standoff))
         assert arm.check("", X_WG).outcome == outcome, standoff
 
 
@@ -288,10 +297,9 @@ def test_a_wall_behind_the_hand_is_in_the_way_of_the_pregrasp(
     X_WG = grasp_from_axes((0, 1, 0), (1, 0, 0), (0.6, 0.0, 0.15))
     wall = Obstacle(X_WB=Pose((0.27, 0.0, 0.1)), size=(0.02, 0.4, 0.2))
     free, blocked = changed(), changed(background={"wall": wall})
-    no_lift = ReachSettings(lift_height=0.0)
+    no_lift = barely_lifted(0.1)
     assert ArmReach(empty, free, settings=no_lift).check("", X_WG).outcome is None
-    at_once = ReachSettings(standoff=0.0, lift_height=0.0)
-    assert ArmReach(empty, blocked, settings=at_once).check("", X_WG).outcome is None
+    assert ArmReach(empty, blocked, settings=AT_ONCE).check("", X_WG).outcome is None
     found = ArmReach(empty, blocked, settings=no_lift).check("", X_WG)
     assert found.outcome is Outcome.ARM_COLLISION and found.clearance < 0.0
     assert found.blocker.startswith("panda_") and found.blocker.endswith(" vs wall")
@@ -307,9 +315,7 @@ def test_a_roof_is_in_the_way_of_the_arm_and_not_of_the_hand(
     hand = HandClearance(build_station_diagram(empty, blocked, robot="hand"))
     assert hand.check("", X_WG).outcome is None
     assert ArmReach(empty, changed()).check("", X_WG).outcome is None
-    found = ArmReach(empty, blocked, settings=ReachSettings(standoff=0.0, lift_height=0.0)).check(
-        "", X_WG
-    )
+    found = ArmReach(empty, blocked, settings=AT_ONCE).check("", X_WG)
     assert found.outcome is Outcome.ARM_COLLISION
     assert found.blocker.endswith(" vs roof")
 
@@ -348,7 +354,7 @@ def test_bad_grasps(arm: ArmReach) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        *({"standoff": -0.1}, {"joint_travel": 0.0}),
+        *({"limit_margin": -0.1}, {"joint_travel": 0.0}),
         *({"starts": ()}, {"starts": (0,)}, {"redundant": ()}, {"redundant": (32, 0)}),
     ],
 )

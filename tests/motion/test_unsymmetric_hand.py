@@ -14,6 +14,7 @@ from burg_drake.core.resources import data_root
 from burg_drake.motion.hand_sweep import HandSweep
 from burg_drake.motion.reach import ArmReach
 from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 CAMERA = """
@@ -61,9 +62,9 @@ def arm(scene: Scene, station: Station) -> ArmReach:
 
 
 def test_it_is_seen_that_the_hand_is_not_symmetric(scene: Scene, station: Station) -> None:
-    assert not HandSweep(scene, station, standoff=0.1, lift=0.3).symmetric
+    assert not HandSweep(scene, station, GraspMotion()).symmetric
     usual = load_station("panda_tabletop")
-    assert HandSweep(scene, usual, standoff=0.1, lift=0.3).symmetric
+    assert HandSweep(scene, usual, GraspMotion()).symmetric
 
 
 def test_the_arm_takes_the_way_in_which_the_camera_is_clear(arm: ArmReach) -> None:
