@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -36,7 +36,7 @@ class Line:
         rows: (K, n) joint positions along it.
         X_AH: (K, 4, 4) hand poses there.
         way: (K,) rising: how far the hand is from the first row [m].
-        kinematics: the arm.
+        kinematics: the arm, with limits that leave the margin, or reach to the rows.
     """
 
     rows: Array
@@ -45,8 +45,13 @@ class Line:
     kinematics: ArmKinematics
 
     @classmethod
-    def of(cls, rows: Array, kinematics: ArmKinematics) -> Line:
-        """Through the rows (K, n)."""
+    def of(cls, rows: Array, kinematics: ArmKinematics, limit_margin: float = 0.0) -> Line:
+        """Through the rows (K, n), with a distance to keep from the joints' limits [rad or m]."""
+        kinematics = replace(
+            kinematics,
+            lower=np.minimum(kinematics.lower + limit_margin, rows.min(axis=0)),
+            upper=np.maximum(kinematics.upper - limit_margin, rows.max(axis=0)),
+        )
         X_AH = kinematics.forward(rows)[0]
         steps = np.linalg.norm(np.diff(X_AH[:, :3, 3], axis=0), axis=1)
         return cls(rows, X_AH, np.append(0.0, np.cumsum(steps)), kinematics)
@@ -97,15 +102,28 @@ class Line:
             deviation: farthest from the rows' polyline [rad], if there is no check.
             is_free: the check, or None.
         """
-        q = path(np.linspace(0.0, self.length, BETWEEN * (len(path.x) - 1) + 1))
-        if (q < self.kinematics.lower).any() or (q > self.kinematics.upper).any():
+        low, high = extremes(path)
+        if (low < self.kinematics.lower).any() or (high > self.kinematics.upper).any():
             return False
+        q = path(np.linspace(0.0, self.length, BETWEEN * (len(path.x) - 1) + 1))
         X_AH = self.kinematics.forward(q)[0]
         if line_error(X_AH, self.X_AH[0], self.X_AH[-1]) > straightness:
             return False
         if is_free is None:
             return bool(distance_to_polyline(q, self.rows).max() <= deviation)
         return is_free(q)
+
+
+def extremes(path: CubicSpline) -> tuple[Array, Array]:
+    """(n,) smallest and (n,) largest values of n splines: at knots, or where a cubic turns."""
+    a, b, c, d = path.c
+    with np.errstate(all="ignore"):
+        s = -b - np.copysign(np.sqrt(b * b - 3.0 * a * c), b)
+        turns = np.nan_to_num([s / (3.0 * a), c / s], nan=0.0)
+    u = np.clip(turns, 0.0, np.diff(path.x)[:, None])
+    inner = d + u * (c + u * (b + u * a))
+    values = np.concatenate([path(path.x), *inner])
+    return values.min(axis=0), values.max(axis=0)
 
 
 def line_error(X_AH: Array, X_A0: Array, X_A1: Array) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,7 +92,12 @@ class Planner:
             ),
         )
         plan = time_motion(
-            witness, self.limits, self.reach.kinematics, settings=self.settings, checks=checks
+            witness,
+            self.limits,
+            self.reach.kinematics,
+            settings=self.settings,
+            checks=checks,
+            limit_margin=self.reach.settings.limit_margin,
         )
         low, high = hand.opening
         way = high - (low if np.isnan(width) else width)
@@ -100,7 +106,7 @@ class Planner:
             close_time=way / 2.0 / hand.closing_speed + GRIP_TIME,
             opening=high,
             width=width,
-            origin=self._origin(instance, witness.X_WG),
+            origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),
         )
 
     def _rise(self, instance: str, q: Array) -> Array | None:
@@ -112,7 +118,10 @@ class Planner:
         p_AH = self.reach.kinematics.forward(q)[0][:, :3, 3]
         return np.asarray(np.maximum(0.0, (p_AH - p_AH[0]) @ arm.X_WA.matrix()[2, :3]))
 
-    def _origin(self, instance: str, X_WG: Array) -> Origin:
+    @cached_property
+    def _origin(self) -> Origin:
+        """What all plans are for, but for target and grasp; to hash documents takes as long as to
+        plan."""
         diagram = self.reach.diagram
         return Origin(
             joints=tuple(joint.name() for joint in diagram.arm_joints),
@@ -121,8 +130,8 @@ class Planner:
             station_content=diagram.station.content,
             scene=diagram.scene.name,
             scene_content=diagram.scene.content,
-            instance=instance,
-            X_WG=X_WG,
+            instance="",
+            X_WG=np.eye(4),
         )
 
 

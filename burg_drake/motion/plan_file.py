@@ -22,6 +22,7 @@ import numpy as np
 
 import burg_drake
 from burg_drake.core.damaged import DAMAGED
+from burg_drake.core.decimal_text import row_texts
 from burg_drake.core.document_text import GRASP_FILE
 from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, quoted
 from burg_drake.core.files import atomic_write
@@ -47,11 +48,12 @@ def write_csv(plan: Plan, path: str | Path) -> None:
     whole, spans = plan.whole, _spans(plan)
     numbers = range(1, whole.q.shape[1] + 1)
     lines = [",".join(["t", "phase", *(f"{x}{i}" for x in "qva" for i in numbers), "width"])]
-    rows = np.hstack([whole.q, whole.v, whole.a]).tolist()
+    times = row_texts(whole.t[:, None])
+    rows = row_texts(np.hstack([whole.q, whole.v, whole.a]))
     for phase, (first, last) in spans.items():
         end = f",{_width(plan, phase)!r}"
-        for k in range(first if first == 0 else first + 1, last + 1):
-            lines.append(f"{float(whole.t[k])!r},{phase}," + ",".join(map(repr, rows[k])) + end)
+        start = first if first == 0 else first + 1
+        lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
     atomic_write(path, "\n".join(lines) + "\n")
 
 
@@ -59,26 +61,23 @@ def write_json(plan: Plan, path: str | Path) -> None:
     """Writes a plan whole, for `load_plan` and others.
 
     Raises:
-        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced.
+        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced, or
+            no finite numbers.
     """
     whole, origin, rate = plan.whole, plan.origin, plan.approach.rate
+    if not np.isfinite([whole.q, whole.v, whole.a]).all():
+        raise InvalidInputError("a plan with samples that are not finite cannot be written")
     for name, phase in plan.phases.items():
         if not np.allclose(phase.t, np.arange(len(phase.t)) / rate, rtol=0.0, atol=1.0 / NANO):
             raise InvalidInputError(f"phase {name!r} does not have {rate:g} samples a second")
     names = origin.joints if origin else [f"joint{i + 1}" for i in range(whole.q.shape[1])]
-    points = [
-        {
-            "positions": q,
-            "velocities": v,
-            "accelerations": a,
-            "time_from_start": {"sec": time // NANO, "nanosec": time % NANO},
-        }
-        for time, q, v, a in zip(
-            np.rint(whole.t * NANO).astype(int).tolist(),
-            *(x.tolist() for x in (whole.q, whole.v, whole.a)),
-            strict=True,
-        )
-    ]
+    stamps = np.rint(whole.t * NANO).astype(int).tolist()
+    rows = zip(stamps, *(row_texts(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
+    points = ", ".join(
+        f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
+        f' "time_from_start": {{"sec": {time // NANO}, "nanosec": {time % NANO}}}}}'
+        for time, q, v, a in rows
+    )
     document = {
         "format": FORMAT,
         "version": VERSION,
@@ -87,9 +86,10 @@ def write_json(plan: Plan, path: str | Path) -> None:
         "hand": {name: _number(getattr(plan, name)) for name in ("opening", "width", "close_time")},
         "rate": rate,
         "phases": {name: list(span) for name, span in _spans(plan).items()},
-        "joint_trajectory": {"joint_names": list(names), "points": points},
+        "joint_trajectory": {"joint_names": list(names), "points": []},
     }
-    atomic_write(path, json.dumps(document, allow_nan=False) + "\n")
+    text = json.dumps(document, allow_nan=False)
+    atomic_write(path, text.removesuffix("]}}") + points + "]}}\n")
 
 
 def load_plan(path: str | Path) -> Plan:

@@ -88,6 +88,7 @@ def time_line(
     settings: TimingSettings,
     *,
     is_free: IsFree | None = None,
+    limit_margin: float = 0.0,
 ) -> OnPath | Cubics:
     """Moves along a line, at rest at both ends.
 
@@ -104,8 +105,9 @@ def time_line(
         hand: limits of the hand.
         settings: tolerances.
         is_free: the check of all but the polyline of the rows.
+        limit_margin: distance to keep from the joints' limits [rad or m], where the rows do.
     """
-    line = Line.of(rows, kinematics)
+    line = Line.of(rows, kinematics, limit_margin)
     if line.length > 0.0:
         slow: list[OnPath] = []
         for path in line.paths(smoother=is_free is not None):

@@ -51,6 +51,7 @@ def time_motion(
     *,
     settings: TimingSettings | None = None,
     checks: PathChecks | None = None,
+    limit_margin: float = 0.0,
 ) -> Plan:
     """Gives the three motions of a witness their time; each begins and ends at rest.
 
@@ -87,6 +88,7 @@ def time_motion(
         slow,
         lines,
         is_free=checks.approach,
+        limit_margin=limit_margin,
     )
     lift = time_line(
         _within(witness.lift, limits, "lift"),
@@ -95,6 +97,7 @@ def time_motion(
         _lifting(_way(witness.lift, kinematics), settings),
         lines,
         is_free=checks.lift,
+        limit_margin=limit_margin,
     )
     return Plan(
         _sampled(transfer, witness.transfer, limits, settings),

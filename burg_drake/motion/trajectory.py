@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from burg_drake.core.decimal_text import on_grid
 from burg_drake.core.frames import Array
 from burg_drake.motion.limits import ArmLimits
 
@@ -49,7 +50,7 @@ class Trajectory:
 
     @classmethod
     def of(cls, motion: Motion, start: Array, end: Array, rate: float) -> Trajectory:
-        """Samples of a motion.
+        """Samples of a motion, rounded to 12 decimals, with which they are quickly written.
 
         Args:
             motion: from rest to rest; is stretched to a whole number of samples.
@@ -59,7 +60,7 @@ class Trajectory:
         count = max(1, int(np.ceil(motion.duration * rate - 1e-6)))
         t = np.arange(count + 1) / rate
         motion = motion.stretched(t[-1] / motion.duration)
-        q, v, a, _ = motion.at(t)
+        q, v, a = (on_grid(x) for x in motion.at(t)[:3])
         q[0], q[-1] = start, end
         v[[0, -1]] = a[[0, -1]] = 0.0
         return cls(t, q, v, a)
