@@ -83,9 +83,9 @@ def _words(texts: Iterable[str]) -> Words:
     return np.frombuffer("".join(texts).encode("ascii"), dtype=np.uint32)
 
 
-_WHOLE = _words(
-    f"{sign}{k}.".rjust(8, "\0") for sign in ("", "-") for k in range(GROUP)
-).reshape(-1, 2)
+_WHOLE = _words(f"{sign}{k}.".rjust(8, "\0") for sign in ("", "-") for k in range(GROUP)).reshape(
+    -1, 2
+)
 """Two words for what stands before the decimals; the first bytes are free for a separator."""
 _DECIMALS = np.stack(
     [

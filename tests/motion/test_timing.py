@@ -256,6 +256,29 @@ def test_a_path_beyond_the_limits(panda: tuple[ArmKinematics, ArmLimits]) -> Non
         time_motion(replace(given, transfer=beyond), limits, arm)
 
 
+@pytest.mark.parametrize("checks", [ANYTHING, None], ids=["checked", "unchecked"])
+def test_the_margin_to_joint_limits_is_kept_between_waypoints(
+    panda: tuple[ArmKinematics, ArmLimits], checks: PathChecks | None
+) -> None:
+    """Limits lie as tight about all waypoints as the margin allows; Drake's trajectory is looked
+    at every 0.1 ms."""
+    arm, limits = panda
+    given, margin = witness(arm, stepped=0.4), 0.01
+    waypoints = np.concatenate([given.transfer, given.approach, given.lift])
+    low, high = waypoints.min(axis=0), waypoints.max(axis=0)
+    tight = {"lower": low - margin, "upper": high + margin}
+    arm, limits = replace(arm, **tight), replace(limits, **tight)
+
+    def beyond(limit_margin: float) -> float:
+        plan = time_motion(given, limits, arm, checks=checks, limit_margin=limit_margin)
+        drake = plan.to_drake()
+        q = np.array([drake.value(t)[:, 0] for t in np.arange(0.0, plan.duration, 1e-4)])
+        return float(max((low - q).max(), (q - high).max()))
+
+    assert beyond(margin) < 1e-6  # cubic interpolation between samples
+    assert beyond(0.0) > 1e-4
+
+
 def test_what_no_time_is_enough_for(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     arm, limits = panda
     given = witness(arm)
