@@ -85,9 +85,9 @@ def gripper_for(
     if station is None:
         gripper = named_gripper(arguments.hand) if arguments.hand else _gripper_of_file(path)
     else:
-        from burg_drake.station.gripper import gripper_of
+        from burg_drake.station.gripper import station_gripper
 
-        gripper = gripper_of(station.hand, station.hand_model, station.hand_path)
+        gripper = station_gripper(station)
     return replace(gripper, body=arguments.gripper_link) if arguments.gripper_link else gripper
 
 

@@ -125,7 +125,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.grasp_source import open_source
     from burg_drake.evaluation.sampled_set import sampled_set
     from burg_drake.evaluation.sampling_settings import SamplingSettings
-    from burg_drake.station.gripper import gripper_of
+    from burg_drake.station.gripper import station_gripper
     from burg_drake.station.station import load_station
 
     output = output_of(arguments.output, arguments.target, frame="object")
@@ -151,7 +151,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
     )
     sampled_table(sampled, seconds, asked).show()
     print_shortfalls(sampled, asked)
-    output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
+    output.write(grasps, station_gripper(station))
     return 0 if len(grasps) else 1
 
 

@@ -113,7 +113,7 @@ def run_show(arguments: argparse.Namespace) -> int:
     meshcat = open_view(arguments)
     X_WG = _place(content, grasps, width, meshcat)
     draw_grasps(meshcat, X_WG, width, groups)
-    gripper = GripperView(meshcat, station.hand, station.hand_model)
+    gripper = GripperView(meshcat, station.hand, station.hand_model, station.packages)
     if selected is not None:
         gripper.put(X_WG[selected], width[selected])
     print_legend(legend)

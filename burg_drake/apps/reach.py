@@ -219,10 +219,10 @@ def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
     from burg_drake.core.references import with_told_references
     from burg_drake.evaluation.feasibility import reach_columns
     from burg_drake.evaluation.table_file import write_table
-    from burg_drake.station.gripper import gripper_of
+    from burg_drake.station.gripper import station_gripper
 
     if isinstance(output, Output):
-        output.write(grasps, gripper_of(station.hand, station.hand_model, station.hand_path))
+        output.write(grasps, station_gripper(station))
         return
     provenance = with_told_references(grasps.provenance, output.absolute().parent)
     write_table(output, reach_columns(grasps), provenance)

@@ -1,7 +1,8 @@
 """Finds the data that the package installs: `models/`, `scenes/` and `stations/`.
 
 A wheel carries them inside the package, a checkout beside it; both are found by the same
-references: `package://burg_drake/models/...` or a bare name such as `panda_tabletop`.
+references: `package://burg_drake/models/...` or a bare name such as `panda_tabletop`. Other
+packages are found by `core.packages`.
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from functools import cache
 from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.packages import NO_PACKAGES, PACKAGE_REFERENCE, Packages, package_file
 
-PACKAGE_URI = "package://burg_drake/"
+BURG_DRAKE = "burg_drake"
+"""The package that the installed data are."""
+PACKAGE_URI = f"package://{BURG_DRAKE}/"
 
 
 @cache
@@ -31,21 +35,29 @@ def data_root() -> Path:
     )
 
 
-def resolve(reference: str | Path, kind: str | None = None, base: Path | None = None) -> Path:
+def resolve(
+    reference: str | Path,
+    kind: str | None = None,
+    base: Path | None = None,
+    packages: Packages = NO_PACKAGES,
+) -> Path:
     """Path of a document, model or library folder.
 
     Args:
-        reference: `package://burg_drake/...`; or, with `kind`, the bare name of something that
-            the package installs; or a path, relative to `base` (or to the working directory).
+        reference: `package://burg_drake/...`; `package://NAME/...` of another package; or, with
+            `kind`, the bare name of something that the package installs; or a path, relative to
+            `base` (or to the working directory).
         kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or
             `models` (bare names stand for a folder).
         base: folder of the document that holds the reference.
+        packages: what a document says of other packages.
 
     Returns:
         An existing path.
 
     Raises:
-        UnknownNameError: nothing is there; the message lists the built-in names of this kind.
+        UnknownNameError: nothing is there; the message lists the built-in names of this kind, or
+            where the package was looked for.
     """
     text = str(reference)
     if text.startswith(PACKAGE_URI):
@@ -53,8 +65,8 @@ def resolve(reference: str | Path, kind: str | None = None, base: Path | None = 
         if not path.exists():
             raise UnknownNameError(f"{text} does not exist in {data_root()}")
         return path
-    if text.startswith("package://"):
-        raise UnknownNameError(f"{text}: only {PACKAGE_URI}... is known here")
+    if PACKAGE_REFERENCE.fullmatch(text):
+        return package_file(text, base, packages)
     path = expanded(text)
     if kind is not None and path.name == text and not path.suffix:
         builtin = data_root() / kind / (text if kind == "models" else f"{text}.yaml")

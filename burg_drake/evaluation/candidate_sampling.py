@@ -221,7 +221,7 @@ class _Sampler:
         from burg_drake.grasping.surface import Surface
 
         surface, friction = Surface.of(self.surface(object)), self._friction(object)
-        jaws = jaws_of(self._station.hand, self._station.hand_model)
+        jaws = jaws_of(self._station.hand, self._station.hand_model, self._station.packages)
         test = ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
         grasps = self(object, cones, test)
         told = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
@@ -271,7 +271,8 @@ def _pad(station: Station) -> tuple[float, float]:
     """From where to where the pads of the hand reach along z of G [m]."""
     from burg_drake.station.hand_check import check_hand
 
-    low, high = check_hand(station.hand, station.hand_model, station.hand_path).pad_bounds
+    hand, document = station.hand, station.hand_path
+    low, high = check_hand(hand, station.hand_model, document, station.packages).pad_bounds
     return low[2], high[2]
 
 

@@ -304,8 +304,10 @@ def require_run_folder(folder: Path) -> None:
 def portable_station(station: Station, folder: Path) -> StationDocument:
     """The station's document for a copy in `folder`: references that hold there, too."""
     document = station.document
-    hand = resolve(document.hand, "models/hands", station.path.parent)
+    hand = resolve(document.hand, "models/hands", station.path.parent, station.packages)
     arm = document.arm
     if arm is not None and station.arm_model is not None:
         arm = dataclasses.replace(arm, model=portable_reference(station.arm_model, folder))
-    return dataclasses.replace(document, hand=portable_reference(hand, folder), arm=arm)
+    stated = {n: portable_reference(path, folder) for n, path in station.packages.stated.items()}
+    hand_reference = portable_reference(hand, folder)
+    return dataclasses.replace(document, hand=hand_reference, arm=arm, packages=stated)

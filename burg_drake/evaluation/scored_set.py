@@ -78,7 +78,7 @@ def scored_set(
         raise InvalidInputError("gravity_margin needs to know where up is; give a scene")
     objects = sorted(set(grasps.object.tolist()))
     chosen = _friction(friction or {}, objects)
-    jaws = jaws_of(station.hand, station.hand_model)
+    jaws = jaws_of(station.hand, station.hand_model, station.packages)
     instance = None if scene is None else _instances(grasps, scene)
     X_WO = None if scene is None or instance is None else _placed(instance, scene, station)
     columns: dict[str, Any] = {name: np.full(len(grasps), np.nan) for name in METRICS}

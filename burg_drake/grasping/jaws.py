@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.packages import NO_PACKAGES, Packages
 
 if TYPE_CHECKING:
     from burg_drake.station.hand import Hand
@@ -60,19 +61,20 @@ PANDA_JAWS = Jaws(
 centre 0.25 mm past G; the modulus and grip force of the built-in model."""
 
 
-def jaws_of(hand: Hand, path: Path) -> Jaws:
+def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
     """Reads the jaws of a hand.
 
     Args:
         hand: the document.
         path: the hand's model file.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: the document does not fit the model.
     """
     from burg_drake.station.hand_check import check_hand
 
-    figures = check_hand(hand, path)
+    figures = check_hand(hand, path, packages=packages)
     (_, y_low, z_low), (_, y_high, z_high) = figures.pad_bounds
     return Jaws(
         opening=hand.opening,

@@ -86,7 +86,7 @@ def inspect_station(
     Raises:
         InvalidInputError: it cannot be used; one line says why.
     """
-    hand = check_hand(station.hand, station.hand_model, station.hand_path)
+    hand = check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     if scene is not None:
         require_sound_scene(scene, station)
     scene = scene or empty_scene()

@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import DocumentError, MeshError, UnknownNameError, nearest
 from burg_drake.core.files import atomic_write
+from burg_drake.core.named_files import named_files, names_elsewhere
 from burg_drake.core.names import require_name, require_names
+from burg_drake.core.packages import NO_PACKAGES
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.objects.entry import (
@@ -135,8 +138,14 @@ class ObjectLibrary:
 
     @cached_property
     def content(self) -> dict[str, str]:
-        """Build hash by object name."""
-        return {name: entry.build for name, entry in self.objects.items()}
+        """Build hash by object name, with the files of packages that an object's model names."""
+        return {name: self._content(entry) for name, entry in self.objects.items()}
+
+    def _content(self, entry: ObjectEntry) -> str:
+        model = self.root / entry.sdf
+        if not model.is_file() or not names_elsewhere(model):
+            return entry.build
+        return content_hash(entry.build, named_files(model, NO_PACKAGES))
 
     def save(self) -> None:
         """Writes `library.yaml`, and `package.xml`, by which Drake's Parser and ROS know the folder

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from burg_drake.core.errors import MeshError
+from burg_drake.core.errors import BurgError, MeshError
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.fit import coarse_note
 from burg_drake.objects.library import ObjectLibrary
@@ -171,15 +171,15 @@ def drake_complaint(sdf: Path) -> str:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    from burg_drake.station.model_file import held_remarks  # imports Drake
+    from burg_drake.station.model_file import add_models, held_remarks  # imports Drake
 
     plant, graph = MultibodyPlant(0.001), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(graph)
     with held_remarks() as remarks:
         try:
-            Parser(plant).AddModels(str(sdf))
+            add_models(Parser(plant), sdf)
             plant.Finalize()
-        except (RuntimeError, ValueError, SystemExit) as error:
+        except (RuntimeError, ValueError, SystemExit, BurgError) as error:
             return " ".join(str(error).split())
     doubts = [record.getMessage() for record in remarks if record.levelno >= logging.WARNING]
     return " ".join(doubts[0].split()) if doubts else ""

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
@@ -36,14 +37,14 @@ from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
-from burg_drake.core.resources import data_root
+from burg_drake.core.packages import Packages
 from burg_drake.objects.entry import MassProperties
 from burg_drake.objects.sdf import LINK
 from burg_drake.scene.scene import Scene
 from burg_drake.station.cameras import add_cameras
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.hollow import is_mesh, sdf_by_pieces
-from burg_drake.station.model_file import add_models, held_remarks
+from burg_drake.station.model_file import add_models, held_remarks, set_packages
 from burg_drake.station.robot import (
     ROBOT_MODELS,
     Robot,
@@ -163,17 +164,15 @@ def build_station_diagram(
         raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
     builder = RobotDiagramBuilder(time_step=engine.time_step)
     plant = builder.plant()
-    # Models name their files relative to themselves or in this package; Drake's own models would
-    # be fetched from the network.
-    builder.parser().package_map().Remove("drake_models")
-    builder.parser().package_map().Add("burg_drake", str(data_root()))
+    set_packages(builder.parser(), {})
     builder.parser().SetAutoRenaming(True)
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
     add_board(plant, scene.board, station, markers=cameras or meshcat is not None)
-    free = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.instances}
-    fixed = {name: _add_instance(builder, scene, name, weld_objects) for name in scene.background}
+    add = partial(_add_instance, builder, scene, station.packages, by_pieces=weld_objects)
+    free = {name: add(name) for name in scene.instances}
+    fixed = {name: add(name) for name in scene.background}
     for name, body in fixed.items():
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
@@ -230,7 +229,7 @@ def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
 
 
 def _add_instance(
-    builder: RobotDiagramBuilder, scene: Scene, name: str, by_pieces: bool
+    builder: RobotDiagramBuilder, scene: Scene, packages: Packages, name: str, *, by_pieces: bool
 ) -> RigidBody:
     """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
     plant, parser = builder.plant(), builder.parser()
@@ -244,7 +243,7 @@ def _add_instance(
             if by_pieces and is_mesh(scene, name):
                 (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
             else:
-                (model,) = add_models(parser, path)
+                (model,) = add_models(parser, path, packages)
             body = plant.GetBodyByName(LINK, model)
             _require_inertia(body, scene.entry(name).mass_properties)
     except (RuntimeError, ValueError) as error:

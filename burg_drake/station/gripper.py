@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.formats.grasp_format import Gripper, GripperJoint
 from burg_drake.station.hand import Hand
 from burg_drake.station.hand_check import check_hand
+from burg_drake.station.station import Station
 
 
-def gripper_of(hand: Hand, path: Path, document: Path | None = None) -> Gripper:
+def gripper_of(
+    hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
+) -> Gripper:
     """A hand as `formats` knows it; its tips are where the pads of its model end.
 
     Args:
         hand: the document.
         path: the model file.
         document: the document's file, for messages.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: the document does not fit the model.
     """
-    figures = check_hand(hand, path, document)
+    figures = check_hand(hand, path, document, packages)
     return Gripper(
         name=hand.name,
         body=hand.body,
@@ -29,3 +34,8 @@ def gripper_of(hand: Hand, path: Path, document: Path | None = None) -> Gripper:
         opening=hand.opening,
         joints=tuple(GripperJoint(f.joint, f.closed, f.open) for f in hand.fingers),
     )
+
+
+def station_gripper(station: Station) -> Gripper:
+    """The hand of a station; see `gripper_of`."""
+    return gripper_of(station.hand, station.hand_model, station.hand_path, station.packages)

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from burg_drake.core.errors import FieldError, UnknownNameError
 from burg_drake.core.frames import Array, inverse
+from burg_drake.core.named_files import named_packages
 from burg_drake.core.names import require_name
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, load_document
 
@@ -117,19 +119,28 @@ def load_hand(reference: str, base: Path | None = None) -> Hand:
     return load_document(resolve(reference, "models/hands", base), Hand)
 
 
-def locate_hand(reference: str, base: Path | None = None) -> tuple[Hand, Path, Path]:
+def locate_hand(
+    reference: str, base: Path | None = None, packages: Packages = NO_PACKAGES
+) -> tuple[Hand, Path, Path]:
     """Loads a hand document and finds the model file that it names.
+
+    Args:
+        reference: built-in name or path, relative to `base`.
+        base: folder of the document that names it.
+        packages: what a station says of packages.
 
     Returns:
         The hand, its model file, and the document's file.
 
     Raises:
-        UnknownNameError: no such hand or model.
+        UnknownNameError: no such hand, model, or package that the model names.
         DocumentError: the file does not fit the schema.
     """
-    path = resolve(reference, "models/hands", base)
+    path = resolve(reference, "models/hands", base, packages)
     hand = load_document(path, Hand)
     try:
-        return hand, resolve(hand.model, base=path.parent), path
+        model = resolve(hand.model, base=path.parent, packages=packages)
+        named_packages(model, packages)
+        return hand, model, path
     except UnknownNameError as error:
         raise UnknownNameError(f"{path}: model: {error}") from error

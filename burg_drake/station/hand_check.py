@@ -19,7 +19,8 @@ from pydrake.systems.analysis import Simulator
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, transform_points
-from burg_drake.core.resources import data_root
+from burg_drake.core.named_files import named_files, named_packages
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.station.hand import Hand
 from burg_drake.station.hand_model import add_hand, find_hand
 
@@ -57,19 +58,23 @@ class HandFigures:
         return x1 - x0, y1 - y0, z1 - z0
 
 
-def check_hand(hand: Hand, path: Path, document: Path | None = None) -> HandFigures:
+def check_hand(
+    hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
+) -> HandFigures:
     """Holds a hand document against its model file; a pair that was found right is remembered.
 
     Args:
         hand: the document.
         path: the model file.
         document: the document's file, for messages.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: they do not fit; one line says where.
     """
     try:
-        return _check(hand, path, content_hash(path))
+        found = tuple(sorted(named_packages(path, packages).items()))
+        return _check(hand, path, content_hash([path, *named_files(path, packages)]), found)
     except InvalidInputError as error:
         if document is None:
             raise
@@ -77,8 +82,10 @@ def check_hand(hand: Hand, path: Path, document: Path | None = None) -> HandFigu
 
 
 @lru_cache(maxsize=16)
-def _check(hand: Hand, path: Path, content: str) -> HandFigures:
-    bench = _Bench(hand, path)
+def _check(
+    hand: Hand, path: Path, content: str, found: tuple[tuple[str, Path], ...]
+) -> HandFigures:
+    bench = _Bench(hand, path, Packages(dict(found)))
     bench.check_limits()
     bench.check_pads()
     bench.check_closing_direction()
@@ -93,14 +100,12 @@ def _check(hand: Hand, path: Path, content: str) -> HandFigures:
 class _Bench:
     """The hand alone, its body held fast, without gravity."""
 
-    def __init__(self, hand: Hand, path: Path) -> None:
+    def __init__(self, hand: Hand, path: Path, packages: Packages) -> None:
         self._hand = hand
         builder = RobotDiagramBuilder(time_step=TIME_STEP)
-        builder.parser().package_map().Remove("drake_models")
-        builder.parser().package_map().Add("burg_drake", str(data_root()))
         self._plant = plant = builder.plant()
         with _silence():  # what the parser warns of is said when the hand is added to a scene
-            instance = add_hand(builder, hand, path).instance
+            instance = add_hand(builder, hand, path, packages).instance
         body = plant.GetBodyByName(hand.body, instance)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform())
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])

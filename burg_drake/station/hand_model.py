@@ -18,6 +18,7 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError, nearest
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.station.hand import Finger, Hand
 from burg_drake.station.model_file import add_models
 
@@ -44,13 +45,16 @@ class HandModel:
     pads: tuple[GeometryId, GeometryId]
 
 
-def add_hand(builder: RobotDiagramBuilder, hand: Hand, path: Path) -> HandModel:
+def add_hand(
+    builder: RobotDiagramBuilder, hand: Hand, path: Path, packages: Packages = NO_PACKAGES
+) -> HandModel:
     """Adds a hand with its servos.
 
     Args:
         builder: its plant is not finalized.
         hand: the document.
         path: the model file.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: the model cannot be loaded, lacks what the document names, or is weaker
@@ -59,7 +63,7 @@ def add_hand(builder: RobotDiagramBuilder, hand: Hand, path: Path) -> HandModel:
     plant = builder.plant()
     constraints = plant.num_constraints()
     try:
-        (instance,) = add_models(builder.parser(), path)
+        (instance,) = add_models(builder.parser(), path, packages)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"

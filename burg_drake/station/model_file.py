@@ -1,4 +1,4 @@
-"""Adds models of SDF files to a plant.
+"""Adds models of SDF and URDF files to a plant, with the packages that they name.
 
 Drake's parser reads SDFormat's own description again for each file that it opens, which takes 25 ms
 (drake 1.51), but only once for texts. So files are handed over as texts.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from xml.sax.saxutils import escape
@@ -17,18 +17,31 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from burg_drake.core.document_text import DOCUMENT, read_bytes
+from burg_drake.core.named_files import named_packages
+from burg_drake.core.packages import DRAKE_MODELS, NO_PACKAGES, Packages
+from burg_drake.core.resources import BURG_DRAKE, data_root
 
 PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
 """A file that is named by its path, from the folder of the model on if it is not absolute."""
 
 
-def add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    """As `parser.AddModels(path)`, sooner.
+def add_models(
+    parser: Parser, path: Path, packages: Packages = NO_PACKAGES
+) -> list[ModelInstanceIndex]:
+    """As `parser.AddModels(path)`, sooner, and with the packages that `core.packages` finds.
+
+    Args:
+        parser: from now on it knows the packages that this model names, in place of others of the
+            same names, and no model that would be fetched from the network.
+        path: SDF or URDF file.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: it cannot be read, or is too large.
+        UnknownNameError: it names a package that is nowhere.
         RuntimeError, ValueError: those of `AddModels`.
     """
+    set_packages(parser, named_packages(path, packages))
     try:
         text = read_bytes(path, DOCUMENT.size).decode()
     except UnicodeDecodeError:
@@ -41,6 +54,17 @@ def add_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
         return list(parser.AddModelsFromString(whole, "sdf"))
     except (RuntimeError, ValueError) as error:
         raise type(error)(str(error).replace("<literal-string>.sdf", str(path))) from error
+
+
+def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
+    """Lets a parser know packages by their folders, and that of the installed data; it forgets
+    Drake's own models, which it would fetch from the network."""
+    known = parser.package_map()
+    for name in {DRAKE_MODELS, *found}:
+        if known.Contains(name):
+            known.Remove(name)
+    for name, folder in {**found, BURG_DRAKE: data_root()}.items():
+        known.Add(name, str(folder))
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.station.hand_check import check_hand
 from burg_drake.station.hand_model import add_hand
+from burg_drake.station.model_file import add_models
 from burg_drake.station.station import Station
 
 Robot = Literal["arm", "hand", "none"]
@@ -56,9 +57,9 @@ def add_robot(
     """
     if robot == "none":
         return {}
-    check_hand(station.hand, station.hand_model, station.hand_path)
+    check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     plant = builder.plant()
-    added = add_hand(builder, station.hand, station.hand_model)
+    added = add_hand(builder, station.hand, station.hand_model, station.packages)
     plant.RenameModelInstance(added.instance, "hand")
     models = {"hand": added.instance}
     if robot == "hand":
@@ -96,9 +97,10 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
             f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section,"
             " or use the hand alone"
         )
+    assert station.arm_model is not None
     plant = builder.plant()
     try:
-        (model,) = builder.parser().AddModels(str(station.arm_model))
+        (model,) = add_models(builder.parser(), station.arm_model, station.packages)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"

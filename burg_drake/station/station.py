@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.document_text import DOCUMENT, read_bytes
 from burg_drake.core.errors import FieldError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.named_files import named_files, named_packages
 from burg_drake.core.names import require_name, require_names
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document, plain_data
 from burg_drake.station.grasp_motion import GraspMotion
@@ -20,8 +20,6 @@ from burg_drake.station.hand import Hand, locate_hand
 MODEL_NAMES = ("table", "board", "hand", "arm", "lift")
 """What every station's own models are called; no instance of a scene may be called so."""
 
-FILE_REFERENCE = re.compile(r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']""")
-"""A mesh in SDF, or in URDF."""
 HALF_PIXEL = 0.5
 """From OpenCV's image coordinates, with pixel centres at integers, to those of Drake's cameras,
 which have pixel edges there [pixels]."""
@@ -155,6 +153,8 @@ class StationDocument:
         cameras: by name.
         background: fixed boxes by name.
         motion: how the hand goes to a grasp and away from it, where nothing else is asked for.
+        packages: folders of packages, by name, that models name in `package://NAME/...`, where
+            `core.packages` does not find them by itself.
     """
 
     version: int = 1
@@ -167,6 +167,7 @@ class StationDocument:
     cameras: dict[str, Camera] = field(default_factory=dict)
     background: dict[str, Obstacle] = field(default_factory=dict)
     motion: GraspMotion = field(default_factory=GraspMotion)
+    packages: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_name(self.name, "name")
@@ -195,6 +196,7 @@ class Station:
         arm_model: the arm's model file, if there is an arm.
         path: the station file.
         hand_path: the hand's document, for messages; None if it is not from a file.
+        packages: where packages that models name are looked for.
     """
 
     document: StationDocument
@@ -203,6 +205,7 @@ class Station:
     arm_model: Path | None
     path: Path
     hand_path: Path | None = None
+    packages: Packages = NO_PACKAGES
 
     @property
     def name(self) -> str:
@@ -226,25 +229,15 @@ class Station:
     @property
     def content(self) -> str:
         """Hash of the station, its hand document and the robot's model files with their meshes;
-        names, file locations
-        and the usual motion do not count, as who asks says how the hand shall move."""
+        names, file locations and the usual motion do not count, as who asks says how the hand shall
+        move."""
         arm = self.document.arm and replace(self.document.arm, model="")
         placed = plain_data(replace(self.document, description="", hand="", arm=arm))
-        placed.pop("motion", None)
+        for name in ("motion", "packages"):
+            placed.pop(name, None)
         models = [self.hand_model, *([self.arm_model] if self.arm_model else [])]
-        files = [file for model in models for file in (model, *_named_files(model))]
+        files = [file for model in models for file in (model, *named_files(model, self.packages))]
         return content_hash(dump_document(placed | {"name": ""}), dump_document(self.hand), files)
-
-
-def _named_files(model: Path) -> list[Path]:
-    """The files that an SDF or URDF file names, as far as they are beside it or installed."""
-    text = read_bytes(model, DOCUMENT.size).decode(errors="replace")
-    named = dict.fromkeys(uri or name for uri, name in FILE_REFERENCE.findall(text))
-    files = []
-    for reference in named:
-        with contextlib.suppress(UnknownNameError):
-            files.append(resolve(reference, base=model.parent))
-    return [file for file in files if file.is_file()]
 
 
 def load_station(reference: str | Path) -> Station:
@@ -254,18 +247,35 @@ def load_station(reference: str | Path) -> Station:
         reference: path of a station file, or the bare name of a built-in station.
 
     Raises:
-        UnknownNameError: no such station, hand or model.
+        UnknownNameError: no such station, hand or model, or no such package; the message tells
+            where it was looked for.
         DocumentError: the file does not fit the schema.
     """
     path = resolve(reference, "stations")
     document = load_document(path, StationDocument)
+    packages = Packages(_stated(document, path), path)
     with _named(path, "hand"):
-        hand, hand_model, hand_path = locate_hand(document.hand, path.parent)
+        hand, hand_model, hand_path = locate_hand(document.hand, path.parent, packages)
     arm_model = None
     if document.arm is not None:
         with _named(path, "arm.model"):
-            arm_model = resolve(document.arm.model, base=path.parent)
-    return Station(document, hand, hand_model, arm_model, path, hand_path)
+            arm_model = resolve(document.arm.model, base=path.parent, packages=packages)
+            named_packages(arm_model, packages)
+    return Station(document, hand, hand_model, arm_model, path, hand_path, packages)
+
+
+def _stated(document: StationDocument, path: Path) -> dict[str, Path]:
+    """The folders that a station states, by the names of packages."""
+    found = {}
+    for name, reference in document.packages.items():
+        with _named(path, f"packages.{name}"):
+            found[name] = resolve(reference, base=path.parent)
+        if not found[name].is_dir():
+            raise InvalidInputError(
+                f"{path}: packages.{name}: {reference} is no folder; give the one that"
+                f" package://{name}/... is relative to"
+            )
+    return found
 
 
 @contextlib.contextmanager

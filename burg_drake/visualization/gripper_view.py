@@ -12,6 +12,7 @@ from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform
 
 from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.station.hand import Hand
 from burg_drake.visualization.hand_visuals import hand_visuals
 
@@ -25,6 +26,7 @@ class GripperView:
         meshcat: where to draw it.
         hand: the document.
         model: the model file.
+        packages: what a station says of packages.
 
     Attributes:
         hand: the document.
@@ -36,12 +38,14 @@ class GripperView:
         InvalidInputError: the model cannot be loaded.
     """
 
-    def __init__(self, meshcat: Meshcat, hand: Hand, model: Path) -> None:
+    def __init__(
+        self, meshcat: Meshcat, hand: Hand, model: Path, packages: Packages = NO_PACKAGES
+    ) -> None:
         self.hand = hand
         self.slides: dict[str, Array] = {}
         self._meshcat = meshcat
         paths: dict[tuple[float, ...], str] = {}
-        for k, visual in enumerate(hand_visuals(hand, model)):
+        for k, visual in enumerate(hand_visuals(hand, model, packages=packages)):
             part = paths.setdefault(tuple(visual.slide), f"{GRIPPER_PATH}/{len(paths)}")
             self.slides[part] = visual.slide
             meshcat.SetObject(f"{part}/{k}", visual.shape, visual.color)

@@ -21,7 +21,7 @@ from pydrake.math import RigidTransform
 from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.frames import Array
-from burg_drake.core.resources import data_root
+from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.station.hand import Hand
 from burg_drake.station.hand_model import add_hand
 from burg_drake.visualization.gltf import gltf_mesh
@@ -48,23 +48,23 @@ class HandVisual:
     corners: Array
 
 
-def hand_visuals(hand: Hand, model: Path, *, opacity: float = 1.0) -> tuple[HandVisual, ...]:
+def hand_visuals(
+    hand: Hand, model: Path, *, opacity: float = 1.0, packages: Packages = NO_PACKAGES
+) -> tuple[HandVisual, ...]:
     """The visual geometries of an open hand.
 
     Args:
         hand: the document.
         model: the model file.
         opacity: 0 to 1.
+        packages: what a station says of packages.
 
     Raises:
         InvalidInputError: the model cannot be loaded.
     """
     builder = RobotDiagramBuilder()
-    # Drake's own models would be fetched from the network.
-    builder.parser().package_map().Remove("drake_models")
-    builder.parser().package_map().Add("burg_drake", str(data_root()))
     plant = builder.plant()
-    added = add_hand(builder, hand, model)
+    added = add_hand(builder, hand, model, packages)
     plant.WeldFrames(plant.world_frame(), added.body.body_frame(), RigidTransform())
     plant.Finalize()
     for finger, joint in zip(hand.fingers, added.joints, strict=True):

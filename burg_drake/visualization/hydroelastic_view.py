@@ -18,8 +18,8 @@ from pydrake.systems.framework import DiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, transform_points
-from burg_drake.core.resources import data_root
 from burg_drake.objects.library import ObjectLibrary
+from burg_drake.station.model_file import add_models
 
 LOW_PRESSURE = np.array([0.55, 0.72, 0.90])
 HIGH_PRESSURE = np.array([0.90, 0.10, 0.08])
@@ -65,15 +65,12 @@ def hydroelastic_meshes(
     """
     plant, scene_graph = AddMultibodyPlantSceneGraph(DiagramBuilder(), 1e-3)
     parser = Parser(plant)
-    # Drake's own models would be fetched from the network.
-    parser.package_map().Remove("drake_models")
-    parser.package_map().Add("burg_drake", str(data_root()))
     parser.SetAutoRenaming(True)
     found = {}
     for name in names:
         path = library.path(library.entry(name).sdf)
         try:
-            (model,) = parser.AddModels(str(path))
+            (model,) = add_models(parser, path)
         except RuntimeError as error:
             raise InvalidInputError(
                 f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"

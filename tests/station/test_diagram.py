@@ -306,13 +306,16 @@ def test_no_arm(scene: Scene, station: Station) -> None:
     assert build_station_diagram(scene, changed, robot="hand").robot == "hand"
 
 
-def test_models_of_drake_are_not_fetched(scene: Scene, station: Station, tmp_path: Path) -> None:
+def test_models_of_drake_are_not_fetched(
+    scene: Scene, station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A model that refers to the package drake_models fails at once, without the network."""
     text = station.hand_model.read_text(encoding="utf-8")
     text = text.replace("meshes/hand.obj", "package://drake_models/ycb/meshes/004_sugar_box.obj")
     (tmp_path / "hand.sdf").write_text(text, encoding="utf-8")
     changed = replace(station, hand_model=tmp_path / "hand.sdf")
-    with pytest.raises(InvalidInputError, match="refers to unknown package 'drake_models'"):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(UnknownNameError, match=r"package 'drake_models' is not found in .* cache"):
         build_station_diagram(scene, changed, robot="hand")
 
 
