@@ -40,6 +40,13 @@ def row_texts(values: Array, separator: str = ",") -> list[str]:
         values: on the grid, see `on_grid`, for the most part: others take longer.
         separator: of the numbers of a row, one or two characters.
     """
+    bits = np.ascontiguousarray(values).view(np.int64)
+    new = np.append(np.ones(min(1, len(bits)), bool), (bits[1:] != bits[:-1]).any(axis=1))
+    texts = _texts(values[new], separator)
+    return [texts[k] for k in (np.cumsum(new) - 1).tolist()]  # what rests is written once
+
+
+def _texts(values: Array, separator: str) -> list[str]:
     units = np.rint(np.where(np.abs(values) <= LARGEST, values, np.nan) * 10.0**PLACES)
     exact = units / 10.0**PLACES == values
     exact &= (values != 0.0) | ~np.signbit(values)

@@ -25,6 +25,10 @@ What bounds a displacement counts every joint by itself: 0.53 m for 10 cm of a P
 approach."""
 
 
+SHARED = 8
+"""From so many segments a polyline on it pays to look at shared corners first, and once."""
+
+
 class Edges:
     """Judges straight joint segments of one arm in one scene.
 
@@ -137,6 +141,8 @@ class Edges:
             height[:] = given  # that of a single corner counts at both ends
         counts = [len(q) - 1 for q in corners]
         path = np.repeat(np.arange(len(paths)), counts)
+        if lower is None and sum(counts) >= SHARED * len(paths):
+            lower = self._lower_at_corners(corners, hand)
         known = None
         if lower is not None:
             bounds = [c if len(c) > 1 else np.repeat(c, 2) for c in lower]
@@ -161,6 +167,14 @@ class Edges:
             )
             for k in range(len(paths))
         ]
+
+    def _lower_at_corners(self, corners: Sequence[Array], hand: bool) -> list[Array] | None:
+        """Lower bounds at the corners of paths, each looked at once; None if something speaks
+        against one, for then the segments have to know."""
+        bounds = self.proximity.bounds(np.concatenate(corners), hand=hand)
+        if bounds.blocked.any() or not bounds.likely_free.all():
+            return None
+        return np.split(bounds.lower, np.cumsum([len(q) for q in corners])[:-1])
 
     def _first_blocked(
         self,
@@ -196,10 +210,11 @@ def _rows(screened: Screened, first: int, count: int) -> Iterator[tuple[int, flo
     segment and share of it, in order. A corner is asked about as the start of a segment."""
     end = first + count
     since = np.inf
-    for edge in range(first, end):
-        length = screened.length[edge]
+    begin, stop = np.searchsorted(screened.open_edge, (first, end))
+    undecided = set(screened.open_edge[begin:stop].tolist())
+    for edge, length in enumerate(screened.length[first:end].tolist(), first):
         pieces = max(1, math.ceil(length / ROWS))
-        shares = set(screened.open_shares(edge).tolist())
+        shares = set(screened.open_shares(edge).tolist()) if edge in undecided else set()
         shares.update(k / pieces for k in range(1, pieces))
         if since + length > ROWS:
             shares.add(0.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import solveh_banded
 
 from burg_drake.core.frames import Array
 from burg_drake.motion.corners import IsFree, distance_to_polyline
@@ -82,9 +83,7 @@ class Line:
         X_AH[:, :3, 3] += share * (self.X_AH[-1, :3, 3] - self.X_AH[0, :3, 3])
         knots = straight.copy()
         if np.isfinite(weight):
-            bend = np.diff(np.eye(count), 2, axis=0)
-            A = np.eye(count) + weight * bend.T @ bend
-            knots[1:-1] += np.linalg.solve(A[1:-1, 1:-1], (near - straight)[1:-1])
+            knots[1:-1] += _bent_less((near - straight)[1:-1], weight)
         knots[0], knots[-1] = self.rows[0], self.rows[-1]
         knots[1:-1], met = solve_ik(
             self.kinematics, X_AH[1:-1], knots[1:-1], iterations=ITERATIONS, tolerance=TOLERANCE
@@ -112,6 +111,18 @@ class Line:
         if is_free is None:
             return bool(distance_to_polyline(q, self.rows).max() <= deviation)
         return is_free(q)
+
+
+def _bent_less(offset: Array, weight: float) -> Array:
+    """(count, n) points between two fixed ones at 0, with less of second differences: least
+    squares, by a matrix with two diagonals to either side."""
+    if weight == 0.0:
+        return offset
+    count = len(offset)
+    bend = np.diff(np.eye(count + 2), 2, axis=0)[:, 1:-1]
+    A = np.eye(count) + weight * bend.T @ bend
+    upper = [np.pad(np.diag(A, k), (k, 0)) for k in (2, 1, 0)]
+    return np.asarray(solveh_banded(upper, offset))
 
 
 def extremes(path: CubicSpline) -> tuple[Array, Array]:

@@ -31,7 +31,9 @@ def shortcut(edges: Edges, path: Array, scale: Array) -> Array:
     Returns:
         (L, n) corners of a free way with the same ends, at most as long as `path`.
     """
-    for _ in range(ROUNDS if _length(path, scale) > 0.0 else 0):
+    if len(path) > 2 and edges.is_free(path[0], path[-1]):
+        return np.asarray(path[[0, -1]])
+    for _ in range(ROUNDS if len(path) > 2 and _length(path, scale) > 0.0 else 0):
         other = _through_points(edges, _points(path, scale), scale)
         gain = _length(path, scale) - _length(other, scale)
         if gain >= 0.0:

@@ -21,7 +21,9 @@ POLYLINE_DEVIATION = 0.002
 TRIES = 5
 """Top speeds of the hand that are tried where the joints cannot follow."""
 SLACK = 0.998
-"""Share of the limits that is used, as peaks are looked for at single times."""
+"""Share of the limits that is used, as peaks are looked for at single times ..."""
+COARSER = 4
+"""... this many times as far apart as the samples of a plan, which are looked at again."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def time_line(
     if line.length > 0.0:
         slow: list[OnPath] = []
         for path in line.paths(smoother=is_free is not None):
-            motion, full = _fastest(path, hand, limits, settings.rate)
+            motion, full = _fastest(path, hand, limits, settings.rate / COARSER)
             if not full:
                 slow.append(motion)
             elif line.is_good(path, settings.straightness, settings.line_deviation, is_free):
