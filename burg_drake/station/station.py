@@ -44,6 +44,8 @@ class Arm:
         home: joint positions of the home posture [rad].
         velocity, acceleration, jerk: limits of each joint [rad/s, rad/s^2, rad/s^3], in place of
             those that `motion.limits` finds in the model or knows of the Panda.
+        stands_in: `table` and fixed boxes that the base's own collision shapes may be in, as a
+            base plate is in the table that it is let into; links that move still collide with them.
     """
 
     model: str = "package://burg_drake/models/panda/panda_arm.sdf"
@@ -55,6 +57,7 @@ class Arm:
     velocity: tuple[float, ...] | None = None
     acceleration: tuple[float, ...] | None = None
     jerk: tuple[float, ...] | None = None
+    stands_in: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("velocity", "acceleration", "jerk"):
@@ -175,12 +178,20 @@ class StationDocument:
         require_names(self.background, "background")
         if self.arm is None:
             return
+        known = ("table", *self.background)
+        for i, name in enumerate(self.arm.stands_in):
+            if name not in known:
+                raise FieldError(
+                    f"{name!r} is neither the table nor in background; {nearest(name, known)}",
+                    *("arm", "stands_in", i),
+                )
         x, y, z = self.arm.X_WA.translation
         (cx, cy), (sx, sy, _) = self.table.center, self.table.size
-        if z < 0.0 and abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2:
+        over_table = abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2
+        if z < 0.0 and over_table and "table" not in self.arm.stands_in:
             raise FieldError(
                 f"arm.X_WA puts the arm's base {-1e3 * z:.0f} mm deep into 'table'; move the base"
-                " or what is in its place",
+                " or what is in its place, or write arm.stands_in: [table] if it is let in",
                 *("arm", "X_WA"),
             )
 

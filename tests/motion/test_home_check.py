@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
@@ -32,15 +34,52 @@ def built(station: Station) -> StationDiagram:
 def test_a_box_that_cuts_into_the_base() -> None:
     """Link 0 reaches 71 mm to the front of its axis."""
     diagram = built(with_box("post", 0.15, 0.1, (0.2, 0.1, 0.2)))
-    assert set(base_overlaps(diagram)) == {"post"}
+    assert {overlap.name for overlap in base_overlaps(diagram)} == {"post"}
     with pytest.raises(InvalidInputError) as error:
         require_free_home(diagram, ArmCollision(diagram))
-    depth = 1e3 * base_overlaps(diagram)["post"]
-    assert str(error.value) == (
-        f"{diagram.station.path}: arm.X_WA puts the arm's base {depth:.0f} mm deep into 'post';"
-        " move the base or what is in its place"
+    depth = 1e3 * base_overlaps(diagram)[0].depth
+    assert str(error.value).startswith(
+        f"{diagram.station.path}: arm.X_WA puts the arm's base {depth:.0f} mm deep into 'post' by"
+        " its collision shapes (panda_link0 '"
     )
-    assert base_overlaps(built(with_box("post", 0.25, 0.1, (0.2, 0.1, 0.2)))) == {}
+    assert str(error.value).endswith(
+        "); move the base or what is in its place, or write arm.stands_in: [post] if it is let in"
+    )
+    assert base_overlaps(built(with_box("post", 0.25, 0.1, (0.2, 0.1, 0.2)))) == ()
+
+
+def test_a_base_plate_that_dips_below_the_table(tmp_path: Path) -> None:
+    """A plate of 40 mm about the base's origin is 20 mm in the table: raised by that much, or
+    allowed to be let in, it can be used, and what may move still collides with the table."""
+    usual = load_station("panda_tabletop")
+    assert usual.arm_model is not None and usual.document.arm is not None
+    folder = usual.arm_model.parent
+    text = usual.arm_model.read_text().replace("<uri>meshes/", f"<uri>{folder}/meshes/")
+    plate = "<collision name='dip'><geometry><box><size>0.3 0.3 0.04</size></box></geometry>"
+    model = tmp_path / "arm.sdf"
+    link = '<link name="panda_link0">'
+    assert link in text
+    model.write_text(text.replace(link, f"{link}{plate}</collision>"))
+    usual = replace(usual, arm_model=model)
+
+    def with_arm(**changed: object) -> StationDiagram:
+        arm = replace(usual.document.arm, **changed)
+        return built(replace(usual, document=replace(usual.document, arm=arm)))
+
+    sunk = with_arm()
+    with pytest.raises(InvalidInputError) as error:
+        require_free_home(sunk, ArmCollision(sunk))
+    assert str(error.value) == (
+        f"{usual.path}: arm.X_WA puts the arm's base 20 mm deep into 'table' by its collision"
+        " shapes (panda_link0 'dip' 20 mm); raise the base by 20 mm (arm.X_WA.translation:"
+        " [0, 0, 0.02]), or write arm.stands_in: [table] if it is let in"
+    )
+    for good in (with_arm(X_WA=Pose((0.0, 0.0, 0.02))), with_arm(stands_in=("table",))):
+        require_free_home(good, ArmCollision(good))
+    lying = np.array([0.0, 1.7, 0.0, -0.1, 0.0, 1.6, 0.785])
+    pairs = {(o.link, o.other) for o in ArmCollision(good).overlaps(lying)}
+    assert any(other == "table" for _, other in pairs)
+    assert all(link != "panda_link0" for link, _ in pairs)
 
 
 def test_what_collides_at_home_is_named() -> None:
