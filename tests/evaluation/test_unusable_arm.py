@@ -50,8 +50,7 @@ UNUSABLE = {
     ),
     "base": (
         with_box(0.15, 0.1, (0.2, 0.1, 0.2)),
-        "arm.X_WA puts the arm's base 21 mm deep into 'post'; move the base or what is in its"
-        " place",
+        "arm.X_WA puts the arm's base 21 mm deep into 'post' by its collision shapes (panda_link0",
     ),
     "board": (
         moved_back(3.0),
