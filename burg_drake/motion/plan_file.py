@@ -22,7 +22,7 @@ import numpy as np
 
 import burg_drake
 from burg_drake.core.damaged import DAMAGED
-from burg_drake.core.decimal_text import on_grid, row_texts
+from burg_drake.core.decimal_text import row_texts
 from burg_drake.core.document_text import GRASP_FILE
 from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, quoted
 from burg_drake.core.files import atomic_write
@@ -48,7 +48,7 @@ def write_csv(plan: Plan, path: str | Path) -> None:
     whole, spans = plan.whole, _spans(plan)
     numbers = range(1, whole.q.shape[1] + 1)
     lines = [",".join(["t", "phase", *(f"{x}{i}" for x in "qva" for i in numbers), "width"])]
-    times = row_texts(on_grid(whole.t)[:, None])
+    times = row_texts(whole.t[:, None])
     rows = row_texts(np.hstack([whole.q, whole.v, whole.a]))
     for phase, (first, last) in spans.items():
         end = f",{_width(plan, phase)!r}"

@@ -77,7 +77,7 @@ class Trajectory:
         """One after the other; where one ends and the next begins there is one row."""
         t, rows = [parts[0].t], [slice(None)] + [slice(1, None)] * (len(parts) - 1)
         for part in parts[1:]:
-            t.append(t[-1][-1] + part.t[1:])
+            t.append(on_grid(t[-1][-1] + part.t[1:]))
         q, v, a = (
             np.concatenate([getattr(p, name)[row] for p, row in zip(parts, rows, strict=True)])
             for name in ("q", "v", "a")
