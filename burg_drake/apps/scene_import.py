@@ -85,23 +85,20 @@ def _propose_station(scene: Scene, output: str | None) -> None:
     from pathlib import Path
 
     from burg_drake.core.schema import save_document
-    from burg_drake.motion.station_proposal import propose_station
+    from burg_drake.motion.station_proposal import find_built_in, propose_station
 
-    try:
-        proposal = propose_station(scene, Path(output or f"{scene.path.stem}_station.yaml"))
-    except InvalidInputError as error:
-        if output is not None:
-            raise
-        print(f"no station fits: {error}")
-        return
-    for name, reason in proposal.misfits.items():
-        print(f"station {name} does not fit: {reason}")
-    if proposal.source:
-        print(f"station {proposal.source} fits: --station {proposal.source}")
-    elif output is None:
-        print("no built-in station fits; --station-out FILE writes one that does")
     if output is None:
+        try:
+            fitting, misfits = find_built_in(scene)
+        except InvalidInputError as error:
+            print(f"no station fits: {error}")
+            return
+        _tell_fits(fitting.name if fitting else "", misfits)
+        if fitting is None:
+            print("no built-in station fits; --station-out FILE lays one out around the scene")
         return
+    proposal = propose_station(scene, Path(output))
+    _tell_fits(proposal.source, proposal.misfits)
     save_document(proposal.document, output)
     arm = proposal.document.arm
     where = (
@@ -113,3 +110,10 @@ def _propose_station(scene: Scene, output: str | None) -> None:
     print(f"wrote {output}: a table of {width:g} x {depth:g} m, {where}")
     for warning in proposal.warnings:
         print(f"burg-drake: warning: {output}: {warning}", file=sys.stderr)
+
+
+def _tell_fits(fitting: str, misfits: dict[str, str]) -> None:
+    for name, reason in misfits.items():
+        print(f"station {name} does not fit: {reason}")
+    if fitting:
+        print(f"station {fitting} fits: --station {fitting}")

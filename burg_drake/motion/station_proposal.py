@@ -89,15 +89,11 @@ def propose_station(scene: Scene, path: Path) -> Proposal:
     Raises:
         InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
     """
+    fitting, misfits = find_built_in(scene)
+    if fitting is not None:
+        document = replace(fitting.document, name=name_from(path.stem))
+        return Proposal(document, fitting.name, misfits)
     bare = _without_arm(scene, path)
-    require_sound_scene(scene, bare)
-    misfits: dict[str, str] = {}
-    for name in sorted(builtin_names("stations"), key=lambda name: name != "panda_tabletop"):
-        station = load_station(name)
-        reason = misfit(scene, station)
-        if not reason:
-            return Proposal(replace(station.document, name=name_from(path.stem)), name, misfits)
-        misfits[name] = reason
     found: list[tuple[Station, tuple[str, ...]]] = []
     settings = _coarse(scene)
     for station in itertools.islice(_with_arms(scene, bare), TRIES):
@@ -111,6 +107,26 @@ def propose_station(scene: Scene, path: Path) -> Proposal:
     nowhere = (bare, ("no place was found for an arm: it has the hand alone",))
     station, warnings = min(found, key=lambda item: len(item[1]), default=nowhere)
     return Proposal(station.document, "", misfits, warnings)
+
+
+def find_built_in(scene: Scene) -> tuple[Station | None, dict[str, str]]:
+    """The first built-in station with an arm that a scene fits on; None if there is none.
+
+    Returns:
+        The station, and why each of those that were tried before does not fit, by name.
+
+    Raises:
+        InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
+    """
+    require_sound_scene(scene, _without_arm(scene, Path("station.yaml")))
+    misfits: dict[str, str] = {}
+    for name in sorted(builtin_names("stations"), key=lambda name: name != "panda_tabletop"):
+        station = load_station(name)
+        reason = misfit(scene, station)
+        if not reason:
+            return station, misfits
+        misfits[name] = reason
+    return None, misfits
 
 
 def misfit(scene: Scene, station: Station) -> str:
