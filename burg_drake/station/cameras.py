@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from pydrake.geometry import (
     ClippingRange,
@@ -14,8 +16,9 @@ from pydrake.geometry import (
     RenderEngineVtkParams,
 )
 from pydrake.math import RigidTransform
+from pydrake.perception import BaseField, DepthImageToPointCloud
 from pydrake.planning import RobotDiagramBuilder
-from pydrake.systems.sensors import CameraInfo, RgbdSensor
+from pydrake.systems.sensors import CameraInfo, PixelType, RgbdSensor
 
 from burg_drake.core.errors import MissingDependencyError
 from burg_drake.station.area_camera import AreaCamera, finer
@@ -45,12 +48,22 @@ def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera
     return ColorRenderCamera(core, False), DepthRenderCamera(core, DepthRange(near, far))
 
 
-def add_cameras(builder: RobotDiagramBuilder, station: Station) -> None:
+def add_cameras(
+    builder: RobotDiagramBuilder, station: Station, names: Iterable[str] | None = None
+) -> None:
     """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
 
+    Args:
+        builder: of the diagram.
+        station: has the cameras.
+        names: those to add; all if not given.
+
     Raises:
+        UnknownNameError: the station has no such camera.
         MissingDependencyError: a system library of the renderer is missing (it would crash).
     """
+    names = station.document.cameras if names is None else names
+    cameras = {name: station.camera(name) for name in names}
     missing = missing_render_libraries()
     if missing:
         raise MissingDependencyError(
@@ -58,7 +71,7 @@ def add_cameras(builder: RobotDiagramBuilder, station: Station) -> None:
         )
     scene_graph, system = builder.scene_graph(), builder.builder()
     scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams(lights=LIGHTS)))
-    for name, camera in station.document.cameras.items():
+    for name, camera in cameras.items():
         color, depth = render_cameras(camera)
         sensor = system.AddSystem(
             RgbdSensor(
@@ -85,3 +98,20 @@ def add_cameras(builder: RobotDiagramBuilder, station: Station) -> None:
             (sensor.label_image_output_port(), "label_image"),
         ):
             system.ExportOutput(port, f"camera.{name}.{image}")
+        X_WC = sensor.body_pose_in_world_output_port()
+        cloud = system.AddNamedSystem(f"camera.{name}.cloud", _point_cloud(camera))
+        system.Connect(sensor.depth_image_32F_output_port(), cloud.depth_image_input_port())
+        system.Connect(color_image, cloud.color_image_input_port())
+        system.Connect(X_WC, cloud.camera_pose_input_port())
+        system.ExportOutput(X_WC, f"camera.{name}.pose")
+        system.ExportOutput(cloud.point_cloud_output_port(), f"camera.{name}.point_cloud")
+
+
+def _point_cloud(camera: Camera) -> DepthImageToPointCloud:
+    """Makes coloured points of the depth image. It takes pixels by their indices, which are
+    OpenCV's coordinates of their centres: with Drake's principal point all would be half a pixel
+    aside."""
+    info = CameraInfo(camera.width, camera.height, *camera.focal, *camera.principal_point)
+    return DepthImageToPointCloud(
+        info, PixelType.kDepth32F, fields=int(BaseField.kXYZs) | int(BaseField.kRGBs)
+    )

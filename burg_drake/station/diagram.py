@@ -1,52 +1,61 @@
 """The one place that builds Drake diagrams: a scene on a station, with a hand, an arm or neither.
 
-Ports of the diagram (MODEL is `hand`, `arm` or `lift`):
+Ports of the diagram (MODEL is `hand`, `arm` or `lift`; n joints of the arm):
 
     inputs   MODEL.desired_state      positions and velocities for the joint servos
              MODEL.feedforward        what the servos add to it [Nm, N]; nothing if not connected
              applied_forces           list of ExternallyAppliedSpatialForce
     outputs  MODEL.actuation          what the joints got, within the model's effort limits [Nm, N]
              MODEL.state, state, contact_results, body_poses, geometry_query,
-             camera.NAME.color_image, .depth_image, .label_image (with cameras=True)
+             camera.NAME.color_image, .depth_image, .label_image, .pose, .point_cloud (with cameras)
 
 Connect the `desired_state` of all models, or of none, which leaves the joints without actuation:
-with some of them, Drake ends the process. The other inputs may be left out. Gravity does not pull
-the robot: a real one compensates its own weight.
+with some of them, Drake ends the process.
+
+With `drivers=True` arm and hand are commanded as Drake's stations are, and measure as they do:
+
+    inputs   arm.position (n), or arm.desired_state (2 n), or a plan
+             hand.position            distance of the pads [m]; or hand.desired_state, or a plan
+             hand.force_limit         of each pad [N]; the document's force if not connected
+             plan, plan.start_time    a `Plan` to play, and from when on [s]; 0 if not connected
+    outputs  arm.position_commanded, .position_measured, .velocity_estimated (n), .estimated_state
+             arm.torque_commanded, .torque_measured, .external_torque (n) [Nm]
+             hand.state_measured      distance between the pads and its rate [m, m/s]
+             hand.force_measured      of a pad [N]
+             wrist.force_torque       of the hand on the arm, in H: torque, then force [Nm, N]
+             reaction_forces          of all joints
+
+All inputs may be left out then: what nobody commands holds still. docs/diagram.md says what each
+means. Gravity does not pull the robot, as a real one compensates its own weight, unless the station
+gives its arm an inverse-dynamics controller (`ArmControl`).
 """
 
 from __future__ import annotations
 
-import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, get_args
 
-import numpy as np
 from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
 from pydrake.multibody.tree import (
     BodyIndex,
-    FixedOffsetFrame,
     Joint,
-    ModelInstanceIndex,
-    PrismaticJoint,
-    RigidBody,
 )
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
-from burg_drake.core.packages import Packages
-from burg_drake.objects.entry import MassProperties
-from burg_drake.objects.sdf import LINK
 from burg_drake.scene.scene import Scene
 from burg_drake.station.cameras import add_cameras
 from burg_drake.station.engine import ENGINES, Engine
-from burg_drake.station.hollow import is_mesh, sdf_by_pieces
-from burg_drake.station.model_file import add_models, held_remarks, set_packages
+from burg_drake.station.instances import RISE as RISE
+from burg_drake.station.instances import add_instance, add_rise
+from burg_drake.station.model_file import set_packages
+from burg_drake.station.ports import export_driven_ports, export_ports
 from burg_drake.station.robot import (
-    ROBOT_MODELS,
     Robot,
     add_robot,
     joint_actuators,
@@ -57,12 +66,6 @@ from burg_drake.station.surroundings import add_board, add_obstacles, add_table
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, SceneGraph
-
-SAME_INERTIA = 1e-6
-"""Masses and moments may differ by this share: Drake shifts moments to the origin and back."""
-
-RISE = "rise"
-"""The joint of an object that can only be lifted off [m], see `build_station_diagram`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +133,8 @@ def build_station_diagram(
     robot: Robot = "arm",
     engine: Engine = ENGINES["standard"],
     meshcat: Meshcat | None = None,
-    cameras: bool = False,
+    drivers: bool = False,
+    cameras: bool | Sequence[str] = False,
     weld_objects: bool = False,
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
@@ -144,8 +148,11 @@ def build_station_diagram(
             the hand is above the board, pointing down. `none` leaves the robot out.
         engine: time step and contact settings.
         meshcat: where to show the diagram live, if anywhere.
-        cameras: add the station's cameras; needs the renderer's system libraries. The board's
-            markers are drawn with cameras or `meshcat` only; it is plain where nobody looks.
+        drivers: let positions, widths or a plan command the robot, and measure what it feels; see
+            the ports above. Needs an arm.
+        cameras: add the station's cameras, all or those named; needs the renderer's system
+            libraries. The board's markers are drawn with cameras or `meshcat` only; it is plain
+            where nobody looks.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
             stands where it is placed, and can only be lifted off, by a joint `RISE` of its model
             along world z; rigid meshes are replaced by pieces (see `station.hollow`).
@@ -155,11 +162,13 @@ def build_station_diagram(
         the arm is in its home posture.
 
     Raises:
-        UnknownNameError: no such `robot`.
+        UnknownNameError: no such `robot` or camera.
         InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station,
             a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
+    if drivers and (robot != "arm" or weld_objects):
+        raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if robot not in get_args(Robot):
         raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
     builder = RobotDiagramBuilder(time_step=engine.time_step)
@@ -169,15 +178,15 @@ def build_station_diagram(
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
-    add_board(plant, scene.board, station, markers=cameras or meshcat is not None)
-    add = partial(_add_instance, builder, scene, station.packages, by_pieces=weld_objects)
+    add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
+    add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
     free = {name: add(name) for name in scene.instances}
     fixed = {name: add(name) for name in scene.background}
     for name, body in fixed.items():
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
     for name, body in (free if weld_objects else {}).items():
-        _add_rise(plant, body, RigidTransform(instance_pose(scene, station, name)))
+        add_rise(plant, body, RigidTransform(instance_pose(scene, station, name)))
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot)
 
@@ -187,9 +196,12 @@ def build_station_diagram(
         plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform(X_WO))
     set_default_posture(plant, station, models)
 
-    _export_ports(builder, models)
+    if drivers:
+        export_driven_ports(builder, scene, station, models)
+    else:
+        export_ports(builder, station, models, controlled=not weld_objects)
     if cameras:
-        add_cameras(builder, station)
+        add_cameras(builder, station, None if cameras is True else cameras)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder.builder(), builder.scene_graph(), meshcat)
     return StationDiagram(
@@ -226,70 +238,3 @@ def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
             "triangle": HydroelasticContactRepresentation.kTriangle,
         }[engine.contact_surface]
     )
-
-
-def _add_instance(
-    builder: RobotDiagramBuilder, scene: Scene, packages: Packages, name: str, *, by_pieces: bool
-) -> RigidBody:
-    """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
-    plant, parser = builder.plant(), builder.parser()
-    if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-        raise InvalidInputError(
-            f"{scene.path}: instance name {name!r} is taken by the station; choose another"
-        )
-    path = scene.library.path(scene.entry(name).sdf)
-    try:
-        with held_remarks() as remarks:
-            if by_pieces and is_mesh(scene, name):
-                (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
-            else:
-                (model,) = add_models(parser, path, packages)
-            body = plant.GetBodyByName(LINK, model)
-            _require_inertia(body, scene.entry(name).mass_properties)
-    except (RuntimeError, ValueError) as error:
-        raise InvalidInputError(
-            f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"
-            f" {scene.library.name!r} again"
-        ) from error
-    for remark in remarks:
-        logging.getLogger("drake").handle(remark)
-    plant.RenameModelInstance(model, name)
-    return body
-
-
-def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
-    """Checks that a body weighs what the library says: where no body can have the mass or inertia
-    of an SDF, Drake's parser warns, and takes others.
-
-    Raises:
-        ValueError: it does not.
-    """
-    inertia = body.default_spatial_inertia()
-    about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
-    moments = [*about_com.get_moments(), *about_com.get_products()]
-    if abs(inertia.get_mass() - listed.mass) > SAME_INERTIA * listed.mass:
-        raise ValueError(f"its mass is not {listed.mass:g} kg, as library.yaml says")
-    if not np.allclose(moments, listed.inertia, rtol=0.0, atol=SAME_INERTIA * max(moments)):
-        raise ValueError("its inertia is not what library.yaml says")
-
-
-def _add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
-    """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
-    model = body.model_instance()
-    place = plant.AddFrame(FixedOffsetFrame("place", plant.world_frame(), X_WO, model))
-    up_O = X_WO.rotation().matrix()[2]
-    plant.AddJoint(PrismaticJoint(RISE, place, body.body_frame(), up_O))
-
-
-def _export_ports(builder: RobotDiagramBuilder, models: dict[str, ModelInstanceIndex]) -> None:
-    plant, system = builder.plant(), builder.builder()
-    for role, model in models.items():
-        system.ExportInput(plant.get_desired_state_input_port(model), f"{role}.desired_state")
-        system.ExportInput(plant.get_actuation_input_port(model), f"{role}.feedforward")
-        system.ExportOutput(plant.get_state_output_port(model), f"{role}.state")
-        system.ExportOutput(plant.get_net_actuation_output_port(model), f"{role}.actuation")
-    system.ExportInput(plant.get_applied_spatial_force_input_port(), "applied_forces")
-    system.ExportOutput(plant.get_state_output_port(), "state")
-    system.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
-    system.ExportOutput(plant.get_body_poses_output_port(), "body_poses")
-    system.ExportOutput(builder.scene_graph().get_query_output_port(), "geometry_query")

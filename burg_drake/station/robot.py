@@ -31,11 +31,6 @@ ROBOT_MODELS = ("hand", "arm", "lift")
 """Names of the robot's model instances in every plant."""
 LIFT_DAMPING = 1e6
 """Velocity gain of the floating hand's lift joint [N s/m]; holds a speed to 1e-5 m/s."""
-ARM_STIFFNESS = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
-"""Position gains of an arm's joints [Nm/rad]: the joint impedance to which libfranka's examples set
-a Panda (`setJointImpedance` in examples_common.cpp)."""
-ARM_DAMPING_TIME = 0.05
-"""Velocity gain over position gain [s]."""
 JOINT_FRAMES = ("_parent", "_child")
 """Endings of frames that Drake's parser adds to a model for each joint."""
 HOVER = 0.5
@@ -45,7 +40,10 @@ HOVER = 0.5
 def add_robot(
     builder: RobotDiagramBuilder, station: Station, robot: Robot
 ) -> dict[str, ModelInstanceIndex]:
-    """Adds hand and arm with their servos and without gravity.
+    """Adds hand and arm with their servos.
+
+    Gravity does not pull them, unless an inverse-dynamics controller will carry the arm's weight;
+    see `ArmControl`.
 
     Returns:
         Model instances by role: `hand`, and `arm` or `lift`.
@@ -67,8 +65,14 @@ def add_robot(
     else:
         models["arm"] = _add_arm(builder, station, added.body)
     for model in models.values():
-        plant.set_gravity_enabled(model, False)
+        plant.set_gravity_enabled(model, robot == "arm" and inverse_dynamics(station))
     return models
+
+
+def inverse_dynamics(station: Station) -> bool:
+    """Whether the station's arm has an inverse-dynamics controller."""
+    arm = station.document.arm
+    return arm is not None and arm.control.kind == "inverse_dynamics"
 
 
 def _hover(station: Station) -> Array:
@@ -128,9 +132,10 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
             f"{station.path}: arm.home has {len(arm.home)} joint angles; the arm has"
             f" {len(actuators)} joints"
         )
-    stiffness = np.resize(ARM_STIFFNESS, len(actuators))
-    for actuator, p in zip(actuators, stiffness, strict=True):
-        actuator.set_controller_gains(PdControllerGains(p=p, d=ARM_DAMPING_TIME * p))
+    if arm.control.kind == "impedance":
+        gains = arm.control.gains(len(actuators), f"{station.path}: arm.control")
+        for actuator, p, d in zip(actuators, *gains, strict=True):
+            actuator.set_controller_gains(PdControllerGains(p=p, d=d))
     return model
 
 

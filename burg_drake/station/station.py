@@ -14,6 +14,7 @@ from burg_drake.core.names import require_name, require_names
 from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, Vector3, dump_document, load_document, plain_data
+from burg_drake.station.arm_control import ArmControl
 from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.hand import Hand, locate_hand
 
@@ -46,6 +47,7 @@ class Arm:
             those that `motion.limits` finds in the model or knows of the Panda.
         stands_in: `table` and fixed boxes that the base's own collision shapes may be in, as a
             base plate is in the table that it is let into; links that move still collide with them.
+        control: how it follows its command.
     """
 
     model: str = "package://burg_drake/models/panda/panda_arm.sdf"
@@ -58,6 +60,7 @@ class Arm:
     acceleration: tuple[float, ...] | None = None
     jerk: tuple[float, ...] | None = None
     stands_in: tuple[str, ...] = ()
+    control: ArmControl = ArmControl()
 
     def __post_init__(self) -> None:
         for name in ("velocity", "acceleration", "jerk"):

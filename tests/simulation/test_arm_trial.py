@@ -25,9 +25,9 @@ from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import TrialResult
 from burg_drake.simulation.touches import Touches
+from burg_drake.station.arm_control import ARM_STIFFNESS
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.engine import ENGINES
-from burg_drake.station.robot import ARM_STIFFNESS
 from burg_drake.station.station import Obstacle
 
 WHOLE = replace(ENGINES["standard"], whole_trial=True)

@@ -94,9 +94,9 @@ def test_every_camera_of_the_built_in_station(empty: Scene) -> None:
     ports = built.diagram.num_output_ports()
     names = [built.diagram.get_output_port(i).get_name() for i in range(ports)]
     assert [name for name in names if name.startswith("camera.")] == [
-        f"camera.{camera}.{kind}_image"
+        f"camera.{camera}.{kind}"
         for camera in ("overview", "board")
-        for kind in ("color", "depth", "label")
+        for kind in ("color_image", "depth_image", "label_image", "pose", "point_cloud")
     ]
     for name in station.document.cameras:
         color = image(built, name, "color")

@@ -93,6 +93,29 @@ def test_ports(built: dict[str, StationDiagram], robot: str, models: list[str]) 
         diagram.GetOutputPort(port).Eval(context)
 
 
+def test_ports_with_drivers(scene: Scene, station: Station) -> None:
+    """Those without drivers, and more; all can be read before anything is connected."""
+    diagram = build_station_diagram(scene, station, drivers=True).diagram
+    inputs = {diagram.get_input_port(i).get_name() for i in range(diagram.num_input_ports())}
+    outputs = {diagram.get_output_port(i).get_name() for i in range(diagram.num_output_ports())}
+    assert inputs == {
+        *(f"arm.{name}" for name in ("position", "desired_state", "feedforward")),
+        *(f"hand.{name}" for name in ("position", "force_limit", "desired_state", "feedforward")),
+        *("plan", "plan.start_time", "applied_forces"),
+    }
+    assert outputs == {
+        *(f"arm.{name}" for name in ("state", "actuation", "position_commanded")),
+        *(f"arm.{name}" for name in ("position_measured", "velocity_estimated", "estimated_state")),
+        *(f"arm.{name}" for name in ("torque_commanded", "torque_measured", "external_torque")),
+        *(f"hand.{name}" for name in ("state", "actuation", "state_measured", "force_measured")),
+        *("wrist.force_torque", "reaction_forces"),
+        *("state", "contact_results", "body_poses", "geometry_query"),
+    }
+    context = diagram.CreateDefaultContext()
+    for port in outputs:
+        diagram.GetOutputPort(port).Eval(context)
+
+
 @pytest.mark.parametrize("robot", ["arm", "hand", "none"])
 def test_objects_stand_where_the_documents_place_them(
     built: dict[str, StationDiagram], robot: str, scene: Scene, station: Station

@@ -1,0 +1,79 @@
+"""Objects of a scene as bodies of a plant."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RigidBody
+from pydrake.planning import RobotDiagramBuilder
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.packages import Packages
+from burg_drake.objects.entry import MassProperties
+from burg_drake.objects.sdf import LINK
+from burg_drake.scene.scene import Scene
+from burg_drake.station.hollow import is_mesh, sdf_by_pieces
+from burg_drake.station.model_file import add_models, held_remarks
+from burg_drake.station.robot import ROBOT_MODELS
+
+SAME_INERTIA = 1e-6
+"""Masses and moments may differ by this share: Drake shifts moments to the origin and back."""
+
+RISE = "rise"
+"""The joint of an object that can only be lifted off [m], for a plant that is not simulated."""
+
+
+def add_instance(
+    builder: RobotDiagramBuilder, scene: Scene, packages: Packages, name: str, *, by_pieces: bool
+) -> RigidBody:
+    """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
+    plant, parser = builder.plant(), builder.parser()
+    if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
+        raise InvalidInputError(
+            f"{scene.path}: instance name {name!r} is taken by the station; choose another"
+        )
+    path = scene.library.path(scene.entry(name).sdf)
+    try:
+        with held_remarks() as remarks:
+            if by_pieces and is_mesh(scene, name):
+                (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
+            else:
+                (model,) = add_models(parser, path, packages)
+            body = plant.GetBodyByName(LINK, model)
+            _require_inertia(body, scene.entry(name).mass_properties)
+    except (RuntimeError, ValueError) as error:
+        raise InvalidInputError(
+            f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"
+            f" {scene.library.name!r} again"
+        ) from error
+    for remark in remarks:
+        logging.getLogger("drake").handle(remark)
+    plant.RenameModelInstance(model, name)
+    return body
+
+
+def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
+    """Checks that a body weighs what the library says: where no body can have the mass or inertia
+    of an SDF, Drake's parser warns, and takes others.
+
+    Raises:
+        ValueError: it does not.
+    """
+    inertia = body.default_spatial_inertia()
+    about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
+    moments = [*about_com.get_moments(), *about_com.get_products()]
+    if abs(inertia.get_mass() - listed.mass) > SAME_INERTIA * listed.mass:
+        raise ValueError(f"its mass is not {listed.mass:g} kg, as library.yaml says")
+    if not np.allclose(moments, listed.inertia, rtol=0.0, atol=SAME_INERTIA * max(moments)):
+        raise ValueError("its inertia is not what library.yaml says")
+
+
+def add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
+    """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
+    model = body.model_instance()
+    place = plant.AddFrame(FixedOffsetFrame("place", plant.world_frame(), X_WO, model))
+    up_O = X_WO.rotation().matrix()[2]
+    plant.AddJoint(PrismaticJoint(RISE, place, body.body_frame(), up_O))

@@ -1,0 +1,217 @@
+"""A driven arm that holds and lifts things: what it feels of them, and plans that it plays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_world import HOME, LIFT, make_arm_station, straight_plan
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.analysis import Simulator
+from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.motion.limits import ArmLimits
+from burg_drake.motion.trajectory import Origin, Plan
+from burg_drake.scene.scene import Scene
+from burg_drake.simulation.arm_trial import ArmTrial
+from burg_drake.station.arm_control import ArmControl
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.engine import ENGINES
+from burg_drake.station.mounted_hand import MountedHand
+from burg_drake.station.station import Station
+
+MakeScene = Callable[..., Scene]
+ASIDE, BELOW = 0.015, 0.02
+"""Where the box's middle is, from between the pads: across the closing direction, and along the
+approach [m]."""
+
+
+@pytest.fixture(scope="module")
+def scene(make_scene: MakeScene) -> Scene:
+    return make_scene(("box", 0.3, 0.2, 0.0))
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return make_arm_station()
+
+
+@pytest.fixture(scope="module")
+def built(scene: Scene, station: Station) -> StationDiagram:
+    return build_station_diagram(scene, station, drivers=True)
+
+
+@pytest.fixture(scope="module")
+def plan(scene: Scene, station: Station) -> Plan:
+    """To the box, up with it; for this scene and station."""
+    trial = ArmTrial(scene, station)
+    found = straight_plan(trial, trial.X_WG("box", CENTRE))
+    joints = tuple(joint.name() for joint in trial.diagram.arm_joints)
+    ones = np.ones(7)
+    limits = ArmLimits(-3.0 * ones, 3.0 * ones, ones, ones, ones, ones)
+    origin = Origin(
+        joints, limits, station.name, station.content, scene.name, scene.content, "box", np.eye(4)
+    )
+    return replace(found, close_time=0.6, opening=0.08, origin=origin)
+
+
+def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram) -> None:
+    """Its weight and lever arm at the wrist, and by virtual work in every joint."""
+    context = built.diagram.CreateDefaultContext()
+    plant, hand = built.plant, MountedHand(built)
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    hand.place(plant_context, np.array(HOME), closed=0.24)
+    box = plant.get_body(built.free["box"])
+    X_GO = np.eye(4)
+    X_GO[:3, :3] = np.diag([1.0, -1.0, -1.0])
+    X_GO[:3, 3] = (0.0, ASIDE, BELOW + 0.04)
+    X_WO = RigidTransform(hand.X_WG(plant_context) @ X_GO)
+    plant.SetFreeBodyPose(plant_context, box, X_WO)
+    built.diagram.GetInputPort("hand.position").FixValue(context, [0.0])
+    Simulator(built.diagram, context).AdvanceTo(0.6)
+
+    p_WCo = plant.EvalBodyPoseInWorld(plant_context, box).multiply(box.default_com())
+    assert p_WCo == pytest.approx(X_WO.multiply(box.default_com()), abs=5e-3)
+    weight_W = np.array([0.0, 0.0, -BOX_MASS * GRAVITY])
+    X_WH = hand.X_WH(plant_context)
+    p_HCo, weight_H = X_WH[:3, :3].T @ (p_WCo - X_WH[:3, 3]), X_WH[:3, :3].T @ weight_W
+    wrist = built.diagram.GetOutputPort("wrist.force_torque").Eval(context)
+    assert wrist[3:] == pytest.approx(weight_H, abs=0.01 * BOX_MASS * GRAVITY)
+    moment = np.cross(p_HCo, weight_H)
+    assert np.linalg.norm(moment) == pytest.approx(BOX_MASS * GRAVITY * ASIDE, rel=0.1)
+    assert wrist[:3] == pytest.approx(moment, abs=0.01 * np.linalg.norm(moment))
+
+    world = plant.world_frame()
+    J = plant.CalcJacobianTranslationalVelocity(
+        plant_context, JacobianWrtVariable.kV, hand.body.body_frame(), p_HCo, world, world
+    )
+    columns = [joint.velocity_start() for joint in built.arm_joints]
+    expected = weight_W @ J[:, columns]
+    assert np.abs(expected).max() > 1.0
+    torque = built.diagram.GetOutputPort("arm.external_torque").Eval(context)
+    assert torque == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
+    force = built.diagram.GetOutputPort("hand.force_measured").Eval(context)
+    assert force == pytest.approx(FORCE, rel=0.01)
+
+
+@pytest.mark.parametrize(("kind", "lag"), [("impedance", 2e-3), ("inverse_dynamics", 4e-3)])
+def test_a_plan_is_played_and_lifts_the_box(
+    scene: Scene, station: Station, plan: Plan, kind: str, lag: float
+) -> None:
+    """From its start time on; with a phase that this project does not know, in between."""
+    arm = replace(station.document.arm, control=ArmControl(kind=kind))  # type: ignore[arg-type, type-var]
+    controlled = replace(station, document=replace(station.document, arm=arm))
+    built = build_station_diagram(scene, controlled, drivers=True, engine=ENGINES["screening"])
+    start, phases = 0.3, dict(plan.phases)
+    pause = replace(phases["close"], t=phases["close"].t / 4.0)
+    phases = {"transfer": phases["transfer"], "pause": _at(pause, plan.transfer), **phases}
+
+    class Longer:
+        """A plan of another make."""
+
+        opening, origin = 0.07, None
+
+        def __init__(self) -> None:
+            self.phases = phases
+
+    context = built.diagram.CreateDefaultContext()
+    plant_context = built.plant.GetMyContextFromRoot(context)
+    built.diagram.GetInputPort("plan").FixValue(context, Longer())
+    built.diagram.GetInputPort("plan.start_time").FixValue(context, [start])
+    simulator = Simulator(built.diagram, context)
+    simulator.AdvanceTo(start)
+    assert built.diagram.GetOutputPort("arm.position_measured").Eval(context) == pytest.approx(HOME)
+    distance = []
+    for name, phase in phases.items():
+        for part in (0.25, 0.5, 0.75, 1.0):
+            simulator.AdvanceTo(start + part * phase.duration)
+            q = built.diagram.GetOutputPort("arm.position_measured").Eval(context)
+            assert q == pytest.approx(phase.at(part * phase.duration), abs=lag), (name, part)
+        start += phase.duration
+        distance.append(built.diagram.GetOutputPort("hand.state_measured").Eval(context)[0])
+    assert distance[:3] == pytest.approx([0.07] * 3, abs=1e-4)
+    assert distance[3:] == pytest.approx([0.06] * 2, abs=1e-3)
+    simulator.AdvanceTo(start + 0.1)
+    box = built.plant.get_body(built.free["box"])
+    height = built.plant.EvalBodyPoseInWorld(plant_context, box).translation()[2]
+    assert height == pytest.approx(LIFT, abs=2e-3)
+
+
+def _at(pause, transfer):
+    """A pause where a motion ends."""
+    return replace(pause, q=np.repeat(transfer.q[-1:], len(pause.t), axis=0))
+
+
+def test_a_plan_for_this_arm_and_scene_starts_at_once(built: StationDiagram, plan: Plan) -> None:
+    context = built.diagram.CreateDefaultContext()
+    built.diagram.GetInputPort("plan").FixValue(context, plan)
+    Simulator(built.diagram, context).AdvanceTo(0.4)
+    # The command is what is wanted at the end of the next step.
+    commanded = built.diagram.GetOutputPort("arm.position_commanded").Eval(context)
+    assert commanded == pytest.approx(plan.transfer.at(0.4 + built.engine.time_step), abs=1e-6)
+
+
+def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
+    origin = plan.origin
+    assert origin is not None
+
+    def message(plan: object, start: float = 0.0, **commands: object) -> str:
+        context = built.diagram.CreateDefaultContext()
+        built.diagram.GetInputPort("plan").FixValue(context, plan)
+        built.diagram.GetInputPort("plan.start_time").FixValue(context, [start])
+        for name, value in commands.items():
+            built.diagram.GetInputPort(name.replace("__", ".")).FixValue(context, value)
+        with pytest.raises(InvalidInputError) as error:
+            Simulator(built.diagram, context).AdvanceTo(0.01)
+        return str(error.value)
+
+    other = replace(origin, joints=tuple(f"elbow{i}" for i in range(7)))
+    assert message(replace(plan, origin=other)) == (
+        "the plan moves the joints elbow0, elbow1, elbow2, elbow3, elbow4, elbow5, elbow6; the arm"
+        " of station 'test' has panda_joint1, panda_joint2, panda_joint3, panda_joint4,"
+        " panda_joint5, panda_joint6, panda_joint7"
+    )
+    other = replace(origin, scene="kitchen", scene_content="1")
+    assert message(replace(plan, origin=other)) == (
+        "the plan was made for scene 'kitchen', not for scene 'test' of this diagram; plan the"
+        " grasp again here"
+    )
+    other = replace(origin, station_content="1")
+    assert "made for another state of station 'test', not for" in message(
+        replace(plan, origin=other)
+    )
+    assert "the port 'plan' got a Trajectory; it takes a burg_drake Plan" in message(plan.lift)
+    six = replace(plan.transfer, q=plan.transfer.q[:, :6], v=plan.transfer.v[:, :6])
+    assert "the plan's transfer moves 6 joints; the arm has 7" in message(
+        replace(plan, transfer=six, origin=None)
+    )
+    away = replace(plan.lift, q=plan.lift.q + 0.01)
+    assert "the plan's lift begins 0.01 rad from where its close ends" in message(
+        replace(plan, lift=away)
+    )
+    assert "rad from where the arm is; bring the arm to where the plan begins" in message(
+        plan, start=-1.0
+    )
+    assert message(plan, arm__position=HOME) == (
+        "arm.position and plan are both connected; an arm follows one of them"
+    )
+    assert message(plan, hand__position=[0.0]) == (
+        "hand.position and plan are both connected; a hand follows one of them"
+    )
+
+
+def test_trials_follow_an_inverse_dynamics_controller(
+    scene: Scene, station: Station, plan: Plan
+) -> None:
+    """One after the other with the same bits, and within its tracking error."""
+    arm = replace(station.document.arm, control=ArmControl(kind="inverse_dynamics"))  # type: ignore[type-var]
+    controlled = replace(station, document=replace(station.document, arm=arm))
+    trial = ArmTrial(scene, controlled)
+    first = trial.run("box", CENTRE, plan)
+    assert first.outcome == "lifted"
+    assert first.margins.tracking_error < 5e-3
+    assert trial.run("box", CENTRE, plan) == first
