@@ -84,8 +84,9 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument(
         "--plan-format",
-        choices=("csv", "json"),
-        help="of these: a table, or what load_plan in Python reads (default: csv)",
+        choices=("json", "csv"),
+        help="of these: JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python"
+        " reads both (default: json)",
     )
     parser.add_argument(
         "--screening",
@@ -134,7 +135,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         grasps,
         exact=not arguments.screening,
         plans=arguments.plans,
-        plan_format=arguments.plan_format or "csv",
+        plan_format=arguments.plan_format or "json",
         retry_failed=arguments.retry_failed,
         workers=arguments.workers,
         progress=not arguments.quiet,

@@ -2,7 +2,7 @@
 
 plans.yaml                   what was asked: documents, grasps, settings, versions
 journal.jsonl                one line a judged grasp, as it came; times of computation are in it
-INSTANCE-GRASP.csv or .json  the timed motion of each grasp that the arm can execute
+INSTANCE-GRASP.json or .csv  the timed motion of each grasp that the arm can execute
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.run_document import HASH_DIGITS, Input, differences, software_versions
 
-PlanFormat = Literal["csv", "json"]
+PlanFormat = Literal["json", "csv"]
 DOCUMENT_FILE = "plans.yaml"
 HEADER = "Record of the plans in this folder; written by the program."
 

@@ -13,12 +13,12 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
-from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.columns import describe
+from burg_drake.core.csv_web import csv_metadata, metadata_path
 from burg_drake.core.damaged import reason
 from burg_drake.core.document_text import TABLE, read_rows
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError, quoted
@@ -41,10 +41,6 @@ DATATYPES = {"U": "string", "f": "double", "i": "integer", "u": "integer", "O": 
 
 METADATA_KEY = b"burg_drake.run"
 """Parquet files carry the contents of run.yaml as JSON under this key of their metadata."""
-
-
-METADATA_SUFFIX = "-metadata.json"
-"""Of the file beside a CSV file: where the standard has readers look for it."""
 
 
 def require_writer(table: str) -> None:
@@ -79,7 +75,7 @@ def require_table(path: Path) -> None:
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
-    Beside a CSV file `csv_metadata` goes to a file whose name has `METADATA_SUFFIX` behind it.
+    Beside a CSV file what its columns are goes to a file, see `core.csv_web`.
 
     Args:
         path: the file.
@@ -93,37 +89,9 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
     if path.suffix == ".parquet":
         atomic_write(path, _parquet_bytes(columns, metadata or {}))
     else:
-        description = json.dumps(csv_metadata(path.name, columns), indent=1) + "\n"
-        beside = path.with_name(path.name + METADATA_SUFFIX)
-        atomic_write_all({beside: description, path: _csv_text(columns)})
-
-
-def csv_metadata(name: str, columns: Columns) -> dict[str, Any]:
-    """JSON values that describe a CSV file by the standard of CSV on the Web.
-
-    Args:
-        name: of the file.
-        columns: as for `write_table`. The standard restricts the names of columns, so that those
-            of the file are among the titles as they are, and their signs encoded in the names.
-    """
-    described = []
-    for title, values in columns.items():
-        column = describe(title)
-        entry = {
-            "name": quote(title, safe="").replace("-", "%2D").replace("~", "%7E"),
-            "titles": title,
-            "datatype": DATATYPES[values.dtype.kind],
-        }
-        if column is not None:
-            entry["dc:description"] = column.description
-            if column.unit:
-                entry["schema:unitText"] = column.unit
-        described.append(entry)
-    return {
-        "@context": ["http://www.w3.org/ns/csvw", {"@language": "en"}],
-        "url": name,
-        "tableSchema": {"columns": described},
-    }
+        meant = {n: (DATATYPES[v.dtype.kind], describe(n)) for n, v in columns.items()}
+        description = json.dumps(csv_metadata(path.name, meant), indent=1) + "\n"
+        atomic_write_all({metadata_path(path): description, path: _csv_text(columns)})
 
 
 def read_table(path: Path) -> Columns:

@@ -10,14 +10,21 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from burg_drake.core.decimal_text import on_grid
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.motion.limits import ArmLimits
 
 if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
 
+    from burg_drake.scene.scene import Scene
+    from burg_drake.station.station import Station
+
 PHASES = ("transfer", "approach", "close", "lift")
 """What happens one after the other; while the hand closes the arm rests."""
+
+DIGITS = 12
+"""Of a content hash, in messages."""
 
 
 class Motion(Protocol):
@@ -194,9 +201,40 @@ class Plan:
         """`whole` for Drake's `TrajectorySource`."""
         return self.whole.to_drake()
 
+    def require_for(
+        self,
+        scene: Scene | None = None,
+        station: Station | None = None,
+        *,
+        name: str = "the plan",
+    ) -> None:
+        """Refuses a plan for another scene or station, by their contents.
+
+        Args:
+            scene, station: what it has to be for; None does not matter.
+            name: what to call the plan.
+
+        Raises:
+            InvalidInputError: it is for another one, or does not tell what it is for.
+        """
+        wanted = [(kind, x) for kind, x in (("station", station), ("scene", scene)) if x]
+        if wanted and self.origin is None:
+            raise InvalidInputError(
+                f"{name} does not tell which scene and arm it is for; of a CSV that is in the file"
+                " NAME.csv-metadata.json beside it"
+            )
+        for kind, here in wanted:
+            there = getattr(self.origin, kind), getattr(self.origin, f"{kind}_content")
+            if there[1] != here.content:
+                changed = "as it was before a change" if there[0] == here.name else f"{there[0]!r}"
+                raise InvalidInputError(
+                    f"{name} is for {kind} {changed} (content {str(there[1])[:DIGITS]}), not"
+                    f" for {here.name!r} (content {here.content[:DIGITS]}); plan its grasp here"
+                )
+
     def to_csv(self, path: str | Path) -> None:
-        """Writes a table; see `motion.plan_file`."""
-        from burg_drake.motion.plan_file import write_csv
+        """Writes a table that `load_plan` reads; see `motion.plan_csv`."""
+        from burg_drake.motion.plan_csv import write_csv
 
         write_csv(self, path)
 

@@ -118,8 +118,8 @@ class ArmTrial(Trial):
 
         Raises:
             InvalidInputError: `X_OG` is not a pose, `instance` cannot be grasped, friction is below
-                0, or the mass is not above 0; the plan is of another arm, has gaps, or leads
-                elsewhere.
+                0, or the mass is not above 0; the plan is for another scene or arm, has gaps, or
+                leads elsewhere.
         """
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
@@ -178,11 +178,14 @@ class ArmTrial(Trial):
         return self._rises[target]
 
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
-        """Whether a plan is one for this arm and grasp.
+        """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
+        the grasp are all that can be told.
 
         Raises:
             InvalidInputError: it is not.
         """
+        if plan.origin is not None:
+            plan.require_for(self.diagram.scene, self.diagram.station)
         joints = len(self.diagram.arm_joints)
         parts = {"approach": plan.approach, "lift": plan.lift}
         parts = {"transfer": plan.transfer, **parts} if self._transfer else parts

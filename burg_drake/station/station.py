@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from burg_drake.core.content import content_hash
@@ -240,7 +241,7 @@ class Station:
             )
         return known[name]
 
-    @property
+    @cached_property
     def content(self) -> str:
         """Hash of the station, its hand document and the robot's model files with their meshes;
         names, file locations and the usual motion do not count, as who asks says how the hand shall

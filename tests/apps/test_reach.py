@@ -43,7 +43,7 @@ def test_a_table_and_plans(grasps: Path, tmp_path: Path, capsys: Capture) -> Non
     assert "clear grasps per CPU second" in out and f"1 plans are in {plans}" in out
     found = read_table(table)
     assert found["outcome"].tolist() == ["reachable", "collision_target"]
-    assert [path.name for path in plans.glob("*.csv")] == [f"{found['id'][0]}.csv"]
+    assert [path.name for path in plans.glob("*-*.json")] == [f"{found['id'][0]}.json"]
     before = {path: path.read_bytes() for path in (table, *plans.iterdir())}
     assert reach(grasps, "-o", str(table), "--plans", str(plans)) == 0
     assert {path: path.read_bytes() for path in (table, *plans.iterdir())} == before
@@ -71,10 +71,10 @@ def test_plans_that_cannot_be_written_are_counted(
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, usual)
     captured = capsys.readouterr()
-    assert f"0 plans are in {plans}" in captured.out and not any(plans.glob("*.csv*"))
+    assert f"0 plans are in {plans}" in captured.out and not any(plans.glob("*-*"))
     found = read_table(table)
     assert found["outcome"].tolist() == ["reachable", "collision_target"]
-    name = plans / f"{found['id'][0]}.csv"
+    name = plans / f"{found['id'][0]}.json"
     assert captured.err == (
         f"burg-drake: 1 of 1 grasps have no plan, such as {found['id'][0]}: InvalidInputError:"
         f" cannot write {name}: File too large; choose a writable place\n"

@@ -141,7 +141,7 @@ def test_plans_go_to_a_folder_of_their_own(
     before = contents(plans)
     given = GraspSet.create(GRASPS[:2], object="box", width=0.06)
     with pytest.raises(InvalidInputError) as error:
-        reach(scene, station, given, exact=False, plans=plans)
+        reach(scene, station, given, exact=False, plans=plans, plan_format="csv")
     assert re.fullmatch(
         rf"folder {plans} has plans of something else \(grasps is 4, content \w+ there, 2, content"
         r" \w+ here; check is exact there, screening here; format is json there, csv here\);"
@@ -224,7 +224,7 @@ def test_a_plan_that_fails_leaves_the_answer(
     judged: GraspSet, scene: Scene, station: Station, tmp_path: Path
 ) -> None:
     """Where the first plan is to be written, somebody has made a folder."""
-    taken = tmp_path / f"box-{judged.id[0]}.csv"
+    taken = tmp_path / f"box-{judged.id[0]}.json"
 
     def take(event: Progress) -> None:
         taken.mkdir(exist_ok=True)

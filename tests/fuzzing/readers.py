@@ -18,6 +18,7 @@ from burg_drake.cameras.intrinsics_file import load_intrinsics
 from burg_drake.cameras.placement_depth_file import read_depth
 from burg_drake.cameras.placement_document import load_placement
 from burg_drake.cameras.recorded_poses import read_poses as read_recorded_poses
+from burg_drake.core.csv_web import METADATA_SUFFIX
 from burg_drake.core.errors import BurgError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
@@ -36,6 +37,9 @@ from burg_drake.formats.grasp_files import FORMATS, format_of, read_grasp_file
 from burg_drake.formats.grasp_format import PANDA
 from burg_drake.formats.one_object import description_of
 from burg_drake.formats.pose_file import read_poses
+from burg_drake.motion.limits import ArmLimits
+from burg_drake.motion.plan_file import load_plan
+from burg_drake.motion.trajectory import Origin, Plan, Trajectory
 from burg_drake.objects.library import load_library
 from burg_drake.objects.mesh_file import read_mesh
 from burg_drake.pipeline.recipe import load_recipe
@@ -130,6 +134,24 @@ def _write_image(path: Path) -> None:
     cv2.imwrite(str(path), np.arange(192, dtype=np.uint8).reshape(8, 8, 3))
 
 
+def _plan(path: Path) -> Path:
+    """Beside a CSV is what it is for."""
+    parts = [Trajectory.rest(np.array([0.1, -0.2]), 0.01, 500.0) for _ in range(3)]
+    limits = ArmLimits(*(np.full(2, x) for x in (-3.0, 3.0, 1.0, 4.0, 80.0, np.inf)))
+    origin = Origin(("a", "b"), limits, "st", "12", "sc", "34", "mug", np.eye(4))
+    plan = Plan(*parts, close_time=0.01, opening=0.08, width=0.03, origin=origin)
+    (plan.to_csv if path.suffix == ".csv" else plan.to_json)(path)
+    return path
+
+
+def _plan_beside(path: Path) -> None:
+    _plan(path.with_name(path.name.removesuffix(METADATA_SUFFIX)))
+
+
+def _load_plan_beside(path: Path) -> None:
+    load_plan(path.with_name(path.name.removesuffix(METADATA_SUFFIX)))
+
+
 READERS: tuple[Reader, ...] = (
     *(
         Reader(
@@ -168,6 +190,9 @@ READERS: tuple[Reader, ...] = (
     Reader("results", "a.csv", _read_rows, _example("results.csv")),
     Reader("parquet", "a.parquet", _read_rows,
            lambda path: write_table(path, read_table(EXAMPLES / "results.csv"), {"a": 1})),
+    Reader("plan", "a.json", load_plan, _plan, 0.5),
+    Reader("plan csv", "a.csv", load_plan, _plan, 0.5),
+    Reader("plan beside", f"a.csv{METADATA_SUFFIX}", _load_plan_beside, _plan_beside, 0.5),
     Reader("journal", "a.jsonl", read_journal, _example("journal.jsonl")),
     Reader("burg library", "a.yaml", read_burg_library, _example("burg_library.yaml")),
     Reader("burg scene", "a.yaml", read_burg_scene, _example("burg_scene.yaml")),

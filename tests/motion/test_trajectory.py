@@ -17,6 +17,8 @@ from burg_drake.motion.cubics import DoubleS
 from burg_drake.motion.limits import ArmLimits
 from burg_drake.motion.plan_file import load_plan
 from burg_drake.motion.trajectory import PHASES, Origin, Plan, Trajectory
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.station import load_station
 
 LIMITS = ArmLimits(
     np.full(2, -3.0),
@@ -107,11 +109,19 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
         np.testing.assert_array_equal(getattr(a, field.name), getattr(b, field.name))
 
 
-@pytest.mark.parametrize("changes", [{}, {"width": np.nan}, {"origin": None}])
-def test_json_brings_it_back_bit_by_bit(plan: Plan, tmp_path: Path, changes: dict) -> None:
+def written(plan: Plan, folder: Path, suffix: str) -> Path:
+    path = folder / f"plan.{suffix}"
+    (plan.to_csv if suffix == "csv" else plan.to_json)(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["json", "csv"])
+@pytest.mark.parametrize("changes", [{}, {"width": np.nan, "opening": np.nan}, {"origin": None}])
+def test_files_bring_it_back_bit_by_bit(
+    plan: Plan, tmp_path: Path, changes: dict, suffix: str
+) -> None:
     plan = replace(plan, **changes)
-    plan.to_json(tmp_path / "plan.json")
-    back = load_plan(tmp_path / "plan.json")
+    back = load_plan(written(plan, tmp_path, suffix))
     for name in ("transfer", "approach", "lift"):
         assert_same(getattr(back, name), getattr(plan, name))
     for name in ("close_time", "opening", "width"):
@@ -143,15 +153,82 @@ def test_csv_has_a_row_for_each_sample(plan: Plan, tmp_path: Path) -> None:
     plan.to_csv(tmp_path / "plan.csv")
     with open(tmp_path / "plan.csv", newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert list(rows[0]) == ["t", "phase", "q1", "q2", "v1", "v2", "a1", "a2", "width"]
+    titles = ["t", "phase", "q_a", "q_b", "v_a", "v_b", "a_a", "a_b", "width"]
+    assert list(rows[0]) == titles
     whole = plan.whole
-    for name, column in (("t", whole.t), ("q2", whole.q[:, 1]), ("a1", whole.a[:, 0])):
+    for name, column in (("t", whole.t), ("q_b", whole.q[:, 1]), ("a_a", whole.a[:, 0])):
         np.testing.assert_array_equal([float(row[name]) for row in rows], column)
     times = {p: sum(row["phase"] == p for row in rows) / 1000.0 for p in PHASES}
     for name, phase in plan.phases.items():
         assert times[name] == pytest.approx(phase.duration, abs=0.0015)
     assert {row["width"] for row in rows if row["phase"] in ("close", "lift")} == {"0.031"}
     assert {row["width"] for row in rows if row["phase"] in ("transfer", "approach")} == {"0.08"}
+
+
+def test_beside_a_csv_are_units_and_what_it_is_for(plan: Plan, tmp_path: Path) -> None:
+    assert plan.origin is not None
+    path = written(plan, tmp_path, "csv")
+    beside = json.loads(Path(f"{path}-metadata.json").read_text())
+    assert beside["url"] == "plan.csv"
+    units = {c["titles"]: c.get("schema:unitText") for c in beside["tableSchema"]["columns"]}
+    assert list(units) == path.read_text().partition("\n")[0].split(",")
+    assert units | {"phase": None} == {
+        name: {"t": "s", "w": "m", "q": "rad", "v": "rad/s", "a": "rad/s2", "p": None}[name[0]]
+        for name in units
+    }
+    (notes,) = beside["notes"]
+    for name in ("scene", "scene_content", "station", "station_content", "instance"):
+        assert notes["origin"][name] == getattr(plan.origin, name)
+    assert notes["origin"]["X_WG"] == plan.origin.X_WG.tolist()
+
+
+def test_a_csv_alone_is_the_motion(plan: Plan, tmp_path: Path) -> None:
+    """Without the file beside it all is there but what it is for."""
+    path = written(plan, tmp_path, "csv")
+    Path(f"{path}-metadata.json").unlink()
+    back = load_plan(path)
+    assert back.origin is None and (back.opening, back.width) == (plan.opening, plan.width)
+    assert back.close_time == pytest.approx(plan.close_time, abs=1e-3)
+    assert_same(back.whole, plan.whole)
+    scene = load_scene("tabletop_six")
+    with pytest.raises(InvalidInputError) as error:
+        load_plan(path, scene=scene)
+    assert str(error.value) == (
+        f"{path} does not tell which scene and arm it is for; of a CSV that is in the file"
+        " NAME.csv-metadata.json beside it"
+    )
+
+
+@pytest.mark.parametrize("suffix", ["json", "csv"])
+def test_a_plan_for_another_scene_or_arm_is_refused(
+    plan: Plan, tmp_path: Path, suffix: str
+) -> None:
+    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    other_scene, other_station = load_scene("tabletop_close"), load_station("ur5e_tabletop")
+    assert plan.origin is not None
+    origin = replace(
+        plan.origin,
+        scene=scene.name,
+        scene_content=scene.content,
+        station=station.name,
+        station_content=station.content,
+    )
+    path = written(replace(plan, origin=origin), tmp_path, suffix)
+    load_plan(path, scene=scene, station=station)
+    moved = replace(scene, document=replace(scene.document, instances=()))
+    for here, what in (
+        ({"scene": other_scene}, "scene 'tabletop_six'"),
+        ({"station": other_station}, "station 'panda_tabletop'"),
+        ({"scene": moved}, "scene as it was before a change"),
+    ):
+        ((kind, document),) = here.items()
+        with pytest.raises(InvalidInputError) as error:
+            load_plan(path, **here)
+        content = getattr(origin, f"{kind}_content")
+        assert str(error.value) == (
+            f"{path} is for {what} (content {content[:12]}), not for {document.name!r} (content"
+            f" {document.content[:12]}); plan its grasp here"
+        )
 
 
 def test_an_unknown_width_is_commanded_as_closed(plan: Plan, tmp_path: Path) -> None:
@@ -161,7 +238,7 @@ def test_an_unknown_width_is_commanded_as_closed(plan: Plan, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("rate", [300.0, 49.0, 333.3, 997.0])
-def test_json_keeps_the_times_of_other_rates(tmp_path: Path, rate: float) -> None:
+def test_files_keep_the_times_of_other_rates(tmp_path: Path, rate: float) -> None:
     way = replace(DoubleS.of(1.0, 4.0, 80.0).over(np.array([0.9, -0.4])))
     there = Trajectory.of(way, np.zeros(2), np.array([0.9, -0.4]), rate)
     rest = Trajectory.rest(np.array([0.9, -0.4]), 0.7, rate)
@@ -171,6 +248,10 @@ def test_json_keeps_the_times_of_other_rates(tmp_path: Path, rate: float) -> Non
     assert json.loads((tmp_path / "plan.json").read_text())["rate"] == rate
     assert_same(back.whole, plan.whole)
     assert back.duration == plan.duration
+    path = written(plan, tmp_path, "csv")
+    assert_same(load_plan(path).whole, plan.whole)
+    Path(f"{path}-metadata.json").unlink()
+    assert_same(load_plan(path).whole, plan.whole)
 
 
 def test_uneven_samples_are_not_written(plan: Plan, tmp_path: Path) -> None:
@@ -179,6 +260,8 @@ def test_uneven_samples_are_not_written(plan: Plan, tmp_path: Path) -> None:
     plan = replace(plan, lift=replace(plan.lift, t=uneven))
     with pytest.raises(InvalidInputError, match=r"^phase 'lift' does not have 1000 samples a seco"):
         plan.to_json(tmp_path / "plan.json")
+    with pytest.raises(InvalidInputError, match=r"^phase 'lift' does not have 1000 samples a seco"):
+        plan.to_csv(tmp_path / "plan.csv")
 
 
 def test_files_that_are_no_plans(plan: Plan, tmp_path: Path) -> None:
@@ -209,13 +292,14 @@ def points(document: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 DAMAGES: list[tuple[Spoil, str]] = [
-    (lambda d: d.pop("rate"), "'rate' is not as Plan.to_json writes it"),
-    (lambda d: d.update(rate=0), "'rate' is not as Plan.to_json writes it"),
-    (lambda d: d.update(hand=3), "'hand' is not as Plan.to_json writes it"),
-    (lambda d: d.update(phases={}), "'phases' is not as Plan.to_json writes it"),
-    (lambda d: d.update(origin=3), "'origin' is not as Plan.to_json writes it"),
-    (lambda d: d["origin"].update(foo=3), "'origin' is not as Plan.to_json writes it"),
-    (lambda d: d["origin"].update(limits=3), "'origin' is not as Plan.to_json writes it"),
+    (lambda d: d.pop("rate"), "'rate' is not as it was written"),
+    (lambda d: d.update(rate=0), "'rate' is not as it was written"),
+    (lambda d: d.update(hand=3), "'hand' is not as it was written"),
+    (lambda d: d.update(phases=3), "'phases' is not as it was written"),
+    (lambda d: d.update(phases={}), "phase 'transfer' is missing"),
+    (lambda d: d.update(origin=3), "'origin' is not as it was written"),
+    (lambda d: d["origin"].update(foo=3), "'origin' is not as it was written"),
+    (lambda d: d["origin"].update(limits=3), "'origin' is not as it was written"),
     (
         lambda d: d["origin"]["limits"].update(torque=[1.0]),
         "the limits in 'origin' are not those of 2 joints",
@@ -232,7 +316,7 @@ DAMAGES: list[tuple[Spoil, str]] = [
     ),
     (
         lambda d: points(d)[7].update(positions=[0.0, "x"]),
-        "'joint_trajectory' is not as Plan.to_json writes it",
+        "'joint_trajectory' is not as it was written",
     ),
     (
         lambda d: points(d)[7].update(positions=[0.0, 50.0]),
@@ -271,6 +355,50 @@ def test_a_damaged_plan_is_refused(plan: Plan, tmp_path: Path, spoil: Spoil, wha
     with pytest.raises(InvalidInputError) as error:
         load_plan(path)
     assert str(error.value) == f"{path}: the plan is damaged: {what}; write it again"
+
+
+CSV_DAMAGES: list[tuple[int, str, str, str]] = [
+    (0, "t,phase", "phase,t", ""),
+    (7, ",transfer,", ",transfr,", "row 8 has phase 'transfr', not one of"),
+    (7, ",transfer,", ",lift,", "phase 'transfer' begins again in row 9"),
+    (7, ",transfer,", ",transfer,,", "row 8 has 10 cells, not 9"),
+    (7, ",transfer,", ",transfer,nan", "q_a in row 8 is 'nan"),
+    (7, "0.007,", "0.0071,", "the time of point 7 is not that of 1000 samples a second"),
+    (7, "0.007,", "soon,", "t in row 8 is 'soon', no number"),
+    (7, ",transfer,", ",transfer,5", "point 7 has joint 'a' at 50."),
+]
+"""Line, what stands there, what takes its place, and what is said."""
+
+
+@pytest.mark.parametrize(("line", "old", "new", "what"), CSV_DAMAGES)
+def test_a_damaged_csv_is_refused(
+    plan: Plan, tmp_path: Path, line: int, old: str, new: str, what: str
+) -> None:
+    path = written(plan, tmp_path, "csv")
+    lines = path.read_text().splitlines()
+    assert old in lines[line + (line > 0)]
+    lines[line + (line > 0)] = lines[line + (line > 0)].replace(old, new, 1)
+    path.write_text("\n".join(lines))
+    with pytest.raises(InvalidInputError) as error:
+        load_plan(path)
+    text = str(error.value)
+    assert text.startswith(f"{path}: the plan is damaged: {what}" if what else f"{path} is no plan")
+    assert "\n" not in text
+
+
+def test_a_damaged_file_beside_a_csv_is_named(plan: Plan, tmp_path: Path) -> None:
+    path = written(plan, tmp_path, "csv")
+    beside = Path(f"{path}-metadata.json")
+    text = beside.read_text()
+    for old, new, message in (
+        ('"notes"', '"note"', "has no notes on a plan; write it again"),
+        ("q_a", "q_c", "is of a table with other columns; write it again"),
+        ("burg_drake plan", "plan", "is no plan: it lacks format 'burg_drake plan'"),
+        ("{", "", "not valid JSON"),
+    ):
+        beside.write_text(text.replace(old, new))
+        with pytest.raises(InvalidInputError, match=f"^{beside}.*{message}"):
+            load_plan(path)
 
 
 def test_phases_cover_all_points(plan: Plan, tmp_path: Path) -> None:

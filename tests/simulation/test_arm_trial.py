@@ -17,7 +17,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
-from burg_drake.motion.trajectory import Plan
+from burg_drake.motion.limits import ArmLimits
+from burg_drake.motion.trajectory import Origin, Plan
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.arm_trial import ArmTrial
 from burg_drake.simulation.contacts import Contact
@@ -402,6 +403,23 @@ def test_a_plan_for_something_else_is_refused(arm_trial: ArmTrial) -> None:
     short = replace(plan.lift, q=plan.lift.q[:, :6], v=plan.lift.v[:, :6], a=plan.lift.a[:, :6])
     with pytest.raises(InvalidInputError, match=r"lift moves 6 joints; the arm .* has 7"):
         arm_trial.run("box", CENTRE, replace(plan, lift=short))
+    scene, station = arm_trial.diagram.scene, arm_trial.diagram.station
+    origin = Origin(
+        joints=tuple(joint.name() for joint in arm_trial.diagram.arm_joints),
+        limits=ArmLimits(*(np.full(7, limit) for limit in (-9.0, 9.0, 9.0, 9.0, 9.0, 9.0))),
+        station=station.name,
+        station_content=station.content,
+        scene="elsewhere",
+        scene_content="12ab",
+        instance="box",
+        X_WG=arm_trial.X_WG("box", CENTRE),
+    )
+    with pytest.raises(InvalidInputError) as error:
+        arm_trial.run("box", CENTRE, replace(plan, origin=origin))
+    assert str(error.value) == (
+        f"the plan is for scene 'elsewhere' (content 12ab), not for {scene.name!r} (content"
+        f" {scene.content[:12]}); plan its grasp here"
+    )
 
 
 def test_a_station_without_an_arm_is_refused(box_scene: Scene) -> None:
