@@ -37,7 +37,7 @@ def test_every_block_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     exec(compile(code, str(README), "exec"), names)
-    assert isinstance(names["plan"], burg.Plan) and (tmp_path / "plan.csv").exists()
+    assert isinstance(names["plan"], burg.Plan) and (tmp_path / "plan.json").exists()
     assert names["result"].outcome in set(burg.Outcome)  # type: ignore[attr-defined]
     assert len(names["judged"].column("blocker")) == 8  # type: ignore[attr-defined]
     assert all(load_run(tmp_path / "runs" / name).complete for name in ("python", "best"))
