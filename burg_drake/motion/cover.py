@@ -8,6 +8,7 @@ edges, of which a ball covers one if it covers the corners; a greedy set cover t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,10 @@ from burg_drake.grasping.polytope import Polytope
 CELL = 1.8
 """Size of a cell over the overshoot. Up to 2.7 the ball about the middle of a cube in a corner of a
 box covers it: half its diagonal is half its side plus the overshoot."""
+MOST_CELLS = 2_000
+"""Of a shape; that of a larger one is cut more coarsely, as time and memory grow with the square."""
+COARSER = 1.1
+"""Factor by which the overshoot rises until there are few enough."""
 ROUNDING = 1e-9
 """Far above the rounding of a distance [m]."""
 
@@ -70,8 +75,8 @@ def cover_body(
     Args:
         inspector: of the scene graph.
         geometries: of one body.
-        overshoot: how far balls should stick out [m]. Of a convex mesh the box around it is
-            covered.
+        overshoot: how far balls should stick out [m]; those of shapes of some decimetres stick out
+            farther. Of a convex mesh the box around it is covered.
 
     Raises:
         InvalidInputError: a geometry is of a shape that cannot be covered.
@@ -118,8 +123,15 @@ def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
     return Balls(np.column_stack([0 * z, 0 * z, z]), np.full(count, outer), np.full(count, radius))
 
 
+def _affordable(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
+    """(3,) numbers of cells along a shape, and the overshoot that goes with them [m]."""
+    while np.prod(count := cells(overshoot)) > MOST_CELLS:
+        overshoot *= COARSER
+    return count.astype(int), overshoot
+
+
 def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
-    count = np.ceil(2.0 * half / (CELL * overshoot)).astype(int)
+    count, overshoot = _affordable(lambda s: np.ceil(2.0 * half / (CELL * s)), overshoot)
     ticks = [np.linspace(-h, h, 2 * n + 1) for h, n in zip(half, count, strict=True)]
     lattice = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
     centers = _middles_and_inner_corners(lattice)
@@ -129,9 +141,11 @@ def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
 
 def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: Balls) -> Balls:
     """Cells are sectors, whose outer corners lie outside, on a polygon about the circle."""
-    cell = CELL * overshoot
-    sectors = max(8, int(np.ceil(2.0 * np.pi * radius / cell)))
-    rings, layers = (int(np.ceil(x / cell)) for x in (radius, 2.0 * half_length))
+    sides = np.array([2.0 * np.pi * radius, radius, 2.0 * half_length])
+    least = np.array([8, 1, 1])  # sectors, rings, layers
+    (sectors, rings, layers), overshoot = _affordable(
+        lambda s: np.maximum(least, np.ceil(sides / (CELL * s))), overshoot
+    )
     angle = np.pi * np.arange(2 * sectors + 1) / sectors
     rho = radius / np.cos(np.pi / sectors) * np.linspace(0.0, 1.0, 2 * rings + 1)
     z = np.linspace(-half_length, half_length, 2 * layers + 1)

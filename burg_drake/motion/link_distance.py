@@ -91,7 +91,7 @@ class LinkDistance:
             ceiling + self._balls[pair],
         )
         found = of_cores - self._balls[pair]
-        return np.asarray(found.reshape(len(positions), -1).min(axis=1))
+        return np.asarray(found.reshape(len(positions), len(self._balls)).min(axis=1))
 
 
 def _cores(station_diagram: StationDiagram, links: ArmLinks, bodies: Sequence[BodyIndex]) -> Cores:
