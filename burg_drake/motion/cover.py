@@ -35,6 +35,9 @@ MOST_CELLS = 2_000
 """Of a shape; that of a larger one is cut more coarsely, as time and memory grow with the square."""
 COARSER = 1.1
 """Factor by which the overshoot rises until there are few enough."""
+DEEPEST = 0.08
+"""Radius of the largest balls inside a shape [m]: distances from the scene are not known much
+farther out than that."""
 ROUNDING = 1e-9
 """Far above the rounding of a distance [m]."""
 
@@ -187,6 +190,7 @@ def _chosen(centers: Array, depth: Array, nodes: Array, overshoot: float, given:
         given: balls that are there already.
     """
     cells = _corners(nodes)
+    depth = np.minimum(depth, DEEPEST)
     outer = depth + overshoot
     reach = np.linalg.norm(cells - centers[: cells.shape[1]], axis=-1).max(axis=0)
     outer[: len(reach)] = np.maximum(outer[: len(reach)], reach + ROUNDING)

@@ -29,6 +29,9 @@ from burg_drake.grasping.poses import Poses
 from burg_drake.motion.links import ArmLinks
 from burg_drake.station.diagram import StationDiagram
 
+BLOCK = 2**16
+"""Pairs of shapes that are looked at together, for the sake of memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Core:
@@ -79,9 +82,20 @@ class LinkDistance:
             (C,) distances. Of bodies that overlap it is 0 or less: they do so at least as deeply,
             as far as that is known.
         """
+        size = max(1, BLOCK // self.pairs)
+        blocks = [positions[start : start + size] for start in range(0, len(positions), size)]
+        found = [self._at(block, ceiling) for block in blocks]
+        return np.concatenate([np.empty(0), *found])
+
+    @property
+    def pairs(self) -> int:
+        """Pairs of shapes of which each configuration takes the least distance."""
+        return len(self._balls)
+
+    def _at(self, positions: Array, ceiling: float) -> Array:
         X = Poses.of(self._links.between(self._joints, positions))
-        pair = np.tile(np.arange(len(self._balls)), len(positions))
-        which = np.repeat(np.arange(len(positions)), len(self._balls))
+        pair = np.tile(np.arange(self.pairs), len(positions))
+        which = np.repeat(np.arange(len(positions)), self.pairs)
         of_cores = distances(
             replace(self._one, ball=np.zeros_like(self._one.ball)),
             self._shape[pair],
@@ -91,7 +105,7 @@ class LinkDistance:
             ceiling + self._balls[pair],
         )
         found = of_cores - self._balls[pair]
-        return np.asarray(found.reshape(len(positions), len(self._balls)).min(axis=1))
+        return np.asarray(found.reshape(len(positions), self.pairs).min(axis=1))
 
 
 def _cores(station_diagram: StationDiagram, links: ArmLinks, bodies: Sequence[BodyIndex]) -> Cores:

@@ -8,7 +8,7 @@ most, also the negative one of links that overlap. Cells are as large as that al
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -29,6 +29,9 @@ FINER = 2
 """How many times more they are halved to see whether links can meet."""
 MOST_CELLS = 200_000
 """Above this many there is no table."""
+MOST_DISTANCES = 500_000
+"""Distances of shapes at the smallest cells above which there is none either, nor a closer look
+whether links can meet: some seconds."""
 KNOWN = 0.03
 """Up to this distance [m] they are known well; beyond, they are bounded by about that."""
 SHARE = 0.5
@@ -152,7 +155,8 @@ class PairTable:
 
 
 def may_meet(grid: Grid, distance: LinkDistance) -> bool:
-    """Whether two bodies overlap anywhere in the grid, or come so close that it is not sure."""
+    """Whether two bodies overlap anywhere in the grid, or come so close that it is not sure, or
+    would take too long to find out."""
     cells = _lattice(grid.count // 2**LEVELS)
     for level in range(LEVELS, -FINER - 1, -1):
         slack = float(grid.step @ grid.lever) * 2**level / 2 + ACCURACY
@@ -162,12 +166,20 @@ def may_meet(grid: Grid, distance: LinkDistance) -> bool:
         cells = _halved(cells[found <= slack])
         if not len(cells):
             return False
+        if len(cells) * distance.pairs > MOST_DISTANCES:
+            return True
     return True
+
+
+def is_affordable(grid: Grid, distance: LinkDistance) -> bool:
+    """Whether a table of these distances is made in seconds."""
+    return bool(np.prod(grid.count) * distance.pairs <= MOST_DISTANCES)
 
 
 def _lattice(counts: Iterable[int]) -> Indices:
     """(C, m) all the cells of a grid with m counts; one if m is 0."""
-    return np.array(list(itertools.product(*map(range, counts))), dtype=np.intp)
+    sizes = tuple(int(count) for count in counts)
+    return np.asarray(np.indices(sizes, dtype=np.intp).reshape(len(sizes), math.prod(sizes)).T)
 
 
 def _halved(cells: Indices) -> Indices:

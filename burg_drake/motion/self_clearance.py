@@ -15,7 +15,7 @@ from burg_drake.core.frames import Array
 from burg_drake.motion.balls import BallTrees
 from burg_drake.motion.link_distance import LinkDistance
 from burg_drake.motion.links import ArmLinks, Indices, LinkPoses, Single
-from burg_drake.motion.pair_table import Grid, PairTable, may_meet
+from burg_drake.motion.pair_table import Grid, PairTable, is_affordable, may_meet
 from burg_drake.station.diagram import StationDiagram
 
 Pair = tuple[int, int]
@@ -180,7 +180,10 @@ def _tables(
         grid = Grid.over(links, a, others, limits)
         assert grid is not None
         distance = LinkDistance(station_diagram, links, a.body, [b.body for b in others])
-        tables.append((PairTable.of(grid, distance), tuple((i, j) for j in several)))
+        if is_affordable(grid, distance):
+            tables.append((PairTable.of(grid, distance), tuple((i, j) for j in several)))
+        else:
+            left += [(i, j) for j in several]
     return tables, left
 
 

@@ -77,6 +77,23 @@ def test_balls_cover_the_shape_and_stick_out_little(shape: Shape, overshoot: flo
     assert np.all(balls.outer <= depth + overshoot + 1e-6)
 
 
+@pytest.mark.parametrize("shape", [Box(0.5, 0.4, 0.5), Cylinder(0.3, 1.2), Box(1.6, 3.6, 0.04)])
+def test_large_shapes_take_few_balls_of_limited_size(shape: Shape) -> None:
+    """A mobile base covered as finely as a finger would take tens of gigabytes."""
+    _graph, inspector, geometry = one_geometry(shape)
+    balls = cover_body(inspector, [geometry], 0.008)
+    assert len(balls.outer) <= 2000 and balls.inner.max() <= 0.08 + 1e-9
+    p = np.random.default_rng(0).uniform(-1.8, 1.8, (40_000, 3)) * (0.3, 1.0, 0.4)
+    p = p[distance(shape, p) <= 0.0]
+    assert len(p) > 150
+    p_B = X_BP.multiply(p.T).T
+    for part in np.array_split(p_B, 20):
+        gap = np.linalg.norm(part[:, None] - balls.center, axis=2) - balls.outer
+        assert gap.min(axis=1).max() <= 1e-9
+    centers = X_BP.inverse().multiply(balls.center.T).T
+    assert np.all(balls.inner <= -distance(shape, centers) + 1e-9)
+
+
 def test_unknown_shapes_are_named() -> None:
     _graph, inspector, geometry = one_geometry(Ellipsoid(0.1, 0.2, 0.3))
     with pytest.raises(InvalidInputError, match="'shape' of the robot is a Ellipsoid; known are"):
