@@ -16,7 +16,8 @@ the longest step."""
 
 
 class ArmDriver(LeafSystem):
-    """Follows a position, a desired state or a plan; without any, holds what was commanded last.
+    """Follows a plan that has begun, else a position or a desired state; without any of them it
+    holds what was commanded last.
 
     The velocity that goes with a position is its difference from that of one step before: 0 in the
     first step, as in Drake's `StateInterpolatorWithDiscreteDerivative`.
@@ -61,7 +62,7 @@ class ArmDriver(LeafSystem):
 
     def _remember(self, context: Context, values: DiscreteValues) -> None:
         q = self._command.Eval(context)[: len(self._joints)]
-        if self._plan.HasValue(context):
+        if self._planned(context) is not None:
             self._check_jump(q - context.get_discrete_state(self._last).value()[:-1])
         values.set_value(self._last, np.append(q, 1.0))
 
@@ -76,28 +77,30 @@ class ArmDriver(LeafSystem):
     def _calc(self, context: Context, output: BasicVector) -> None:
         last = context.get_discrete_state(self._last).value()
         q, v = last[:-1], np.zeros(len(self._joints))
-        ports = (self._position, self._desired_state, self._plan)
-        given = [port for port in ports if port.HasValue(context)]
-        if len(given) > 1:
-            names = {self._plan: "plan"}
-            one, other = (names.get(p, f"arm.{p.get_name()}") for p in given[:2])
+        position, desired_state = (
+            port.HasValue(context) for port in (self._position, self._desired_state)
+        )
+        if position and desired_state:
             raise InvalidInputError(
-                f"{one} and {other} are both connected; an arm follows one of them"
+                "arm.position and arm.desired_state are both connected; an arm follows one of them"
             )
-        if self._position in given:
+        planned = self._planned(context)
+        if planned is not None:
+            q, v = planned.q, planned.v
+        elif desired_state:
+            q, v = np.split(self._desired_state.Eval(context), 2)
+        elif position:
             before, q = q, self._position.Eval(context)
             v = (q - before) / self._period if last[-1] else v
-        elif self._desired_state in given:
-            q, v = np.split(self._desired_state.Eval(context), 2)
-        elif self._plan in given and (planned := self.planned(context)) is not None:
-            q, v = planned.q, planned.v
         command = np.concatenate([q, v])
         if not np.isfinite(command).all():
             raise InvalidInputError(f"the arm is commanded to {q.tolist()}, which is no posture")
         output.SetFromVector(command)
 
-    def planned(self, context: Context) -> PlannedCommand | None:
-        """What the plan wants now; None before it starts."""
+    def _planned(self, context: Context) -> PlannedCommand | None:
+        """What the plan wants now; None without one, and before it starts."""
+        if not self._plan.HasValue(context):
+            return None
         start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
         time = context.get_time() - start
         ahead = self._ahead if time >= 0.0 else 0.0

@@ -14,10 +14,11 @@ with some of them, Drake ends the process.
 
 With `drivers=True` arm and hand are commanded as Drake's stations are, and measure as they do:
 
-    inputs   arm.position (n), or arm.desired_state (2 n), or a plan
-             hand.position            distance of the pads [m]; or hand.desired_state, or a plan
+    inputs   arm.position (n), or arm.desired_state (2 n), but not both
+             hand.position            distance between the pads [m]; or hand.desired_state
              hand.force_limit         of each pad [N]; the document's force if not connected
-             plan, plan.start_time    a `Plan` to play, and from when on [s]; 0 if not connected
+             plan, plan.start_time    a `Plan` to play, and from when on [s]; 0 if not connected.
+                                      Once it has begun, it goes before the other commands
     outputs  arm.position_commanded, .position_measured, .velocity_estimated (n), .estimated_state
              arm.torque_commanded, .torque_measured, .external_torque (n) [Nm]
              hand.state_measured      distance between the pads and its rate [m, m/s]

@@ -14,7 +14,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.station.hand import Hand
 from burg_drake.station.hand_model import STALL
-from burg_drake.station.plan_player import PlanPlayer
+from burg_drake.station.plan_player import PlannedCommand, PlanPlayer
 from burg_drake.station.robot import joint_actuators
 
 FOLLOWING = 50.0
@@ -86,7 +86,8 @@ class _Wanted:
 
 
 class HandDriver(LeafSystem):
-    """Follows a distance between the pads, a desired state or a plan; without any, holds still.
+    """Follows a plan that has begun, else a distance between the pads or a desired state; without
+    any of them it holds what was commanded last.
 
     The fingers' servos follow a velocity with the document's force at most. A limit below that is
     kept by a force against the motion that makes up the difference, and that the servos are told
@@ -159,29 +160,33 @@ class HandDriver(LeafSystem):
         return np.asarray(-np.sign(speed) * (most - limit))
 
     def _wanted(self, context: Context) -> _Wanted:
-        ports = (self._position, self._desired_state, self._plan)
-        given = [port for port in ports if port.HasValue(context)]
-        if len(given) > 1:
-            names = {self._plan: "plan"}
-            one, other = (names.get(p, f"hand.{p.get_name()}") for p in given[:2])
+        position, desired_state = (
+            port.HasValue(context) for port in (self._position, self._desired_state)
+        )
+        if position and desired_state:
             raise InvalidInputError(
-                f"{one} and {other} are both connected; a hand follows one of them"
+                "hand.position and hand.desired_state are both connected; a hand follows one of"
+                " them"
             )
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
-        q = self._state.Eval(context)[fingers.q]
-        if self._desired_state in given:
+        q, planned = self._state.Eval(context)[self._fingers.q], self._planned(context)
+        if planned is not None and planned.closed:
+            return _Wanted(fingers.closed, fingers.towards_closed * fastest)
+        if planned is None and desired_state:
             return _Wanted(q, self._desired_state.Eval(context)[2:])
         goal = context.get_discrete_state(self._held).value()
-        if self._position in given:
+        if planned is not None:
+            goal = fingers.at(planned.opening)
+        elif position:
             goal = fingers.at(self._distance(float(self._position.Eval(context)[0])))
-        elif self._plan in given:
-            start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
-            time = context.get_time() - start
-            planned = self._player.command(self._plan.Eval(context), time)
-            if planned is not None and planned.closed:
-                return _Wanted(fingers.closed, fingers.towards_closed * fastest)
-            goal = goal if planned is None else fingers.at(planned.opening)
         return _Wanted(goal, np.clip(FOLLOWING * (goal - q), -fastest, fastest))
+
+    def _planned(self, context: Context) -> PlannedCommand | None:
+        """What the plan wants now; None without one, and before it starts."""
+        if not self._plan.HasValue(context):
+            return None
+        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
+        return self._player.command(self._plan.Eval(context), context.get_time() - start)
 
     def _distance(self, wanted: float) -> float:
         low, high = self._fingers.hand.opening

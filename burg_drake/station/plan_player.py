@@ -93,15 +93,18 @@ class PlanPlayer:
         """What arm and hand are to do.
 
         Args:
-            plan: a `PlayablePlan`.
+            plan: a `PlayablePlan`, or None.
             time: since its start [s].
 
         Returns:
-            The command; None before the start. After its end a plan stays where it ends.
+            The command; None without a plan and before its start. After its end a plan stays where
+            it ends.
 
         Raises:
             InvalidInputError: it is no plan, or one for another arm, scene or station.
         """
+        if plan is None:
+            return None
         if self._course is None or plan is not self._plan:
             self._course, self._plan = self._checked(plan), plan
         if time < 0.0:
