@@ -18,6 +18,7 @@ SMALL = {
     "scene, station, 50, ": "scene, station, 8, ",
     "scene, station, 500)": "scene, station, 1)",
     "burg.reach(scene, station, grasps)": "burg.reach(scene, station, grasps, workers=1)",
+    "AdvanceTo(plan.duration)": "AdvanceTo(0.1)",
     '"runs/best", grasps=best)': '"runs/best", grasps=best, engine="screening", workers=1)',
 }
 """What makes it quick."""
