@@ -15,7 +15,6 @@ from burg_drake.core.frames import Array
 from burg_drake.station.hand import Hand
 from burg_drake.station.hand_model import STALL
 from burg_drake.station.plan_player import PlannedCommand, PlanPlayer
-from burg_drake.station.robot import joint_actuators
 
 FOLLOWING = 50.0
 """Speed of a finger over its distance from where it is to be [1/s]."""
@@ -44,7 +43,8 @@ class Fingers:
     @classmethod
     def of(cls, plant: MultibodyPlant, model: ModelInstanceIndex, hand: Hand) -> Fingers:
         """Finds them in a finalized plant."""
-        joints = [actuator.joint() for actuator in joint_actuators(plant, model)]
+        actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(model))
+        joints = [actuator.joint() for actuator in actuators]
         by_name = {finger.joint: finger for finger in hand.fingers}
         fingers = [by_name[joint.name()] for joint in joints]
         positions = plant.GetPositionsFromArray(model, np.arange(plant.num_positions()))

@@ -11,6 +11,7 @@ from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.framework import DiagramBuilder, InputPort, OutputPort
 from pydrake.systems.primitives import Demultiplexer
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.scene import Scene
 from burg_drake.station.arm_driver import ArmDriver
 from burg_drake.station.hand_driver import Fingers, HandDriver
@@ -68,11 +69,14 @@ def export_driven_ports(
         builder: of the diagram; its plant is finalized.
         scene, station: what plans have to be for.
         models: arm and hand.
+
+    Raises:
+        InvalidInputError: the arm's model has joints and actuators in different orders.
     """
     plant, system = builder.plant(), builder.builder()
     arm = station.document.arm
     assert arm is not None
-    joints = tuple(a.joint().name() for a in joint_actuators(plant, models["arm"]))
+    joints = _arm_joints(plant, station, models["arm"])
     player = PlanPlayer(joints, scene, station)
     servo = _arm_servo(builder, station, models)
     # Joint servos are part of a step, so that they are told what is wanted at its end.
@@ -117,6 +121,21 @@ def export_driven_ports(
     _export_plant(builder)
 
 
+def _arm_joints(
+    plant: MultibodyPlant, station: Station, model: ModelInstanceIndex
+) -> tuple[str, ...]:
+    """Names of the arm's joints, which states and commands have in the same order."""
+    commanded = [plant.get_joint_actuator(i).joint() for i in plant.GetJointActuatorIndices(model)]
+    names = [joint.name() for joint in commanded]
+    measured = [joint.name() for joint in sorted(commanded, key=lambda j: j.position_start())]
+    if names != measured:
+        raise InvalidInputError(
+            f"{station.arm_model} has actuators for {', '.join(names)}, and joints in another order"
+            f" from base to hand; write them as {', '.join(measured)}"
+        )
+    return tuple(names)
+
+
 def _arm_servo(builder: RobotDiagramBuilder, station: Station, models: Models) -> _Servo:
     plant, arm = builder.plant(), models["arm"]
     if not inverse_dynamics(station):
@@ -125,6 +144,7 @@ def _arm_servo(builder: RobotDiagramBuilder, station: Station, models: Models) -
             feedforward=plant.get_actuation_input_port(arm),
             commanded=plant.get_net_actuation_output_port(arm),
         )
+    _arm_joints(plant, station, arm)
     system, actuators = builder.builder(), joint_actuators(plant, arm)
     control = make_inverse_dynamics(plant, station, models, actuators)
     system.AddNamedSystem("arm.control", control)

@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array
@@ -18,7 +19,7 @@ from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Scene, SceneDocument, load_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.mounted_hand import MountedHand
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.station.station import Arm, Obstacle, Station, load_station
 
 BLOCK = 0.04
 """Width of a fixed block between the pads at home [m]."""
@@ -75,7 +76,7 @@ class Run:
         return np.asarray(self.built.diagram.GetOutputPort(port).Eval(self.context))
 
     @property
-    def plant_context(self):
+    def plant_context(self) -> Context:
         return self.built.plant.GetMyMutableContextFromRoot(self.context)
 
 
@@ -134,22 +135,31 @@ def test_the_desired_state_goes_to_the_servos_as_it_is(free: StationDiagram) -> 
         assert runs[0].read(port).tolist() == runs[1].read(port).tolist(), port
 
 
-def test_the_hand_goes_to_a_distance(free: StationDiagram) -> None:
+@pytest.mark.parametrize("reference", ["panda_tabletop", "panda_wsg"])
+def test_the_hand_goes_to_a_distance(empty: Scene, reference: str) -> None:
+    free = build_station_diagram(empty, load_station(reference), drivers=True)
     hand = free.station.hand
     run = Run(free, hand__position=[0.03])
+    before = between_fingers(free, run)
     run.to(0.25)
     distance, rate = run.read("hand.state_measured")
     assert rate == pytest.approx(-2.0 * hand.closing_speed, rel=1e-3)
-    assert distance == pytest.approx(0.08 - 0.25 * 2.0 * hand.closing_speed, abs=1e-3)
+    assert distance == pytest.approx(hand.opening[1] - 0.25 * 2.0 * hand.closing_speed, abs=1e-3)
     run.to(1.0)
     assert run.read("hand.state_measured") == pytest.approx([0.03, 0.0], abs=1e-5)
-    left, right = (
-        free.plant.EvalBodyPoseInWorld(run.plant_context, free.plant.get_body(finger))
-        for finger in MountedHand(free).fingers
-    )
-    assert np.linalg.norm(left.translation() - right.translation()) == pytest.approx(0.03, abs=1e-5)
+    closer = before - between_fingers(free, run)
+    assert closer == pytest.approx(hand.opening[1] - 0.03, abs=1e-5)
     run.give(hand__position=[0.08])
     assert run.to(2.0).read("hand.state_measured") == pytest.approx([0.08, 0.0], abs=1e-5)
+
+
+def between_fingers(built: StationDiagram, run: Run) -> float:
+    """Distance between the origins of the two fingers [m]."""
+    left, right = (
+        built.plant.EvalBodyPoseInWorld(run.plant_context, built.plant.get_body(finger))
+        for finger in MountedHand(built).fingers
+    )
+    return float(np.linalg.norm(left.translation() - right.translation()))
 
 
 # --- measurements -------------------------------------------------------------------------------
@@ -250,3 +260,31 @@ def test_wrong_sizes_and_unknown_cameras(free: StationDiagram) -> None:
         build_station_diagram(free.scene, free.station, cameras=["boards"])
     with pytest.raises(InvalidInputError, match="drivers need robot='arm'"):
         build_station_diagram(free.scene, free.station, robot="hand", drivers=True)
+
+
+LINK = """<link name="{0}"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/>
+<axis xyz="0 0 1"/><limit effort="5" lower="-1" upper="1" velocity="1"/></joint>"""
+DRIVE = """<transmission><type>transmission_interface/SimpleTransmission</type>
+<joint name="{0}"/><actuator name="{0}_drive"/></transmission>"""
+
+
+def test_an_arm_with_actuators_in_another_order(empty: Scene, tmp_path: Path) -> None:
+    """States and commands would not belong together."""
+    parts = [LINK.format(name) for name in ("base", "upper", "fore")]
+    parts += [JOINT.format("elbow", "upper", "fore"), JOINT.format("shoulder", "base", "upper")]
+    parts += [DRIVE.format(name) for name in ("elbow", "shoulder")]
+    model = tmp_path / "arm.urdf"
+    model.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
+    station = load_station("panda_tabletop")
+    arm = Arm(base="base", flange="fore", home=(0.0, 0.0), X_WA=Pose((0.0, 0.0, 0.5)))
+    document = replace(station.document, arm=arm)
+    with pytest.raises(
+        InvalidInputError,
+        match=r"arm.urdf has actuators for elbow, shoulder, and joints in another order .* write"
+        r" them as shoulder, elbow$",
+    ):
+        build_station_diagram(
+            empty, replace(station, document=document, arm_model=model), drivers=True
+        )
