@@ -49,8 +49,8 @@ BOX_MASS, BAR_MASS, LEVER, RADIUS = 0.3, 0.2, 0.05, 0.03
 LEVEL = np.deg2rad(2.5)
 """A bar that tilts by less is held; one that is not stays on the table with its far end."""
 
-SLOW = TrialSettings(lift_height=0.01, lift_time=1.0, hold_time=0.3)
-STEEP = TrialSettings(lift_height=0.02, lift_time=1.4, hold_time=0.1)
+SLOW = TrialSettings(motion=burg.GraspMotion(lift_height=0.01), lift_time=5.48, hold_time=0.3)
+STEEP = TrialSettings(motion=burg.GraspMotion(lift_height=0.02), lift_time=5.42, hold_time=0.1)
 """Both accelerate by 0.04 m/s^2 only."""
 
 TIME_STEPS = (0.0005, 0.001, 0.002, 0.005, 0.01)

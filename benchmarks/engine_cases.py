@@ -156,7 +156,7 @@ def overrides(
     """Friction and mass [kg] of a case."""
     entry = trial.diagram.scene.entry("target")
     settings, force = trial.settings, trial.diagram.station.hand.force
-    load = GRAVITY + 4.0 * settings.lift_height / settings.lift_time**2  # of 1 kg, at most [N]
+    load = GRAVITY + settings.acceleration  # of 1 kg, at most [N]
     load *= float(np.hypot(1.0, lever(trial, X_OG) / PAD_LEVER))
     share = log_uniform(rng, SHARES)
     if kind == "heavy":

@@ -126,5 +126,5 @@ def arm_settings(settings: TrialSettings | None = None, *, exact: bool = True) -
     from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
     from burg_drake.station.grasp_motion import GraspMotion
 
-    lift = (settings or DEFAULT_TRIAL).lift_height
-    return ReachSettings(motion=GraspMotion(lift_height=lift), exact=exact)
+    motion = (settings or DEFAULT_TRIAL).motion or GraspMotion()
+    return ReachSettings(standoff=motion.standoff, lift_height=motion.lift_height, exact=exact)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core.frames import Array
+from burg_drake.simulation.carrier import Segment
 from burg_drake.simulation.contacts import Contact
 from burg_drake.simulation.course import Course
 from burg_drake.simulation.touches import Touches
@@ -20,6 +22,8 @@ SPACING = 0.01
 """Hand's way between two looks along the rest of the lift [m]."""
 LITTLE = 0.01
 """Relative difference of loads that does not count."""
+DIGITS = 3
+"""Of directions: a plan may leave its straight way by half a millimetre."""
 
 
 class ArmCarrier:
@@ -33,26 +37,31 @@ class ArmCarrier:
         trial: a trial that has been brought to its start.
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
-        lift: from there on.
+        ways: from there on, at least one; the hand goes straight on each.
     """
 
-    def __init__(self, trial: ArmTrial, target: BodyIndex, approach: Course, lift: Course) -> None:
+    def __init__(
+        self, trial: ArmTrial, target: BodyIndex, approach: Course, ways: Sequence[Course]
+    ) -> None:
         diagram = trial.diagram
         self._trial = trial
         self._target = target
         self._step = diagram.engine.time_step
         self._plant_context = diagram.plant.GetMyMutableContextFromRoot(trial.context)
         self._port = diagram.diagram.GetInputPort("arm.desired_state")
-        self._approach, self._lift = approach, lift
-        self._loads = _loads(lift.p_WG, trial.look, trial.gravity)
+        self._approach, self._ways = approach, tuple(ways)
+        self._loads = _loads(ways[-1].p_WG, trial.look, trial.gravity)
+        speed = np.linalg.norm(np.diff(ways[-1].p_WG, axis=0), axis=1)
+        self._fastest = int(speed.argmax())
         self._touches = Touches(trial.diagram, trial.hand.links, target)
         self._course: Course | None = None
+        self._number = 0
         self._start = 0
         self._arrived = False
-        self.approach_looks, self.lift_looks = approach.looks, lift.looks
+        self.approach_looks = approach.looks
         self.approach_steps = approach.steps_a_look
-        self.lift_time = lift.looks * trial.look
-        self.lift_height = float(lift.p_WG[-1, 2] - lift.p_WG[0, 2])
+        self.segments = tuple(_segment(way) for way in ways)
+        self.lift_time = sum(way.looks for way in ways) * trial.look
         self.tracking_error = self.tracking_distance = math.nan
 
     @property
@@ -76,13 +85,14 @@ class ArmCarrier:
             trial.hand.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
             trial.simulator.Initialize()
 
-    def lift(self, look: int) -> None:
-        """Follows the way up."""
+    def lift(self, number: int, look: int) -> None:
+        """Follows one of the ways."""
         if look == 0:
-            self._follow(self._lift)
+            self._number = number
+            self._follow(self._ways[number])
 
     def stop(self) -> None:
-        """Stays where the way up ends."""
+        """Stays where the last way ends."""
         self._follow(None)
 
     def advance_to(self, time: float) -> None:
@@ -102,25 +112,33 @@ class ArmCarrier:
             self._track(self._course)
         return self._touches.look(contacts, self._arrived)
 
-    def risen(self) -> float:
-        """Of the grasp frame since the beginning of the lift as it was commanded [m]."""
+    def gone(self) -> float:
+        """Of the grasp frame since the beginning of a way as it was commanded [m]."""
         p_WG = self._trial.hand.X_WG(self._plant_context)[:3, 3]
-        return float(p_WG[2] - self._lift.p_WG[0, 2])
+        p_GG_W = p_WG - self._ways[self._number].p_WG[0]
+        return float(p_GG_W @ self.segments[self._number].direction_W)
 
     def bears_the_most(self, look: int) -> bool:
-        """Compares what gravity and acceleration of the planned motion have loaded and will."""
-        window = self._loads[max(0, look + 1 - self._trial.settings.steady_polls) : look + 1]
-        ahead = np.append(self._loads[look + 1 :], self._trial.gravity).max()
-        return bool(ahead <= (1.0 + LITTLE) * window.max())
+        """Compares what gravity and acceleration of the planned motion have loaded and will.
 
-    def is_free_above(self) -> bool:
+        Not straight up, the load when the hand brakes is another one than when it accelerates, and
+        both count.
+        """
+        polls = self._trial.settings.steady_polls
+        window = self._loads[max(0, look + 1 - polls) : look + 1]
+        ahead = np.append(self._loads[look + 1 :], self._trial.gravity).max()
+        brakes = self.segments[-1].is_straight_up or look >= self._fastest + polls
+        return bool(brakes and ahead <= (1.0 + LITTLE) * window.max())
+
+    def is_free_ahead(self) -> bool:
         """Looks along the planned motion."""
-        look = self._looks_done(self._lift)
-        p_WG = self._lift.p_WG[look:]
+        course = self._ways[-1]
+        look = self._looks_done(course)
+        p_WG = course.p_WG[look:]
         gone = np.append(0.0, np.linalg.norm(np.diff(p_WG, axis=0), axis=1).cumsum())
         marks = np.append(np.arange(SPACING, gone[-1], SPACING), gone[-1])
         rows = look + np.searchsorted(gone, marks - 1e-9)
-        q = np.array([self._lift.q_at_look(row) for row in rows])
+        q = np.array([course.q_at_look(row) for row in rows])
         positions = self._trial.diagram.plant.GetPositions(self._plant_context)
         return self._trial.rise(self._target).is_free(positions, q)
 
@@ -145,6 +163,14 @@ class ArmCarrier:
         distance = float(np.linalg.norm(p_WG - course.p_WG[look]))
         self.tracking_error = float(np.fmax(self.tracking_error, error))
         self.tracking_distance = float(np.fmax(self.tracking_distance, distance))
+
+
+def _segment(course: Course) -> Segment:
+    """The straight way along which a course leads the hand."""
+    p_GG_W = course.p_WG[-1] - course.p_WG[0]
+    direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), DIGITS)
+    direction_W /= np.linalg.norm(direction_W)
+    return Segment(direction_W, float(p_GG_W @ direction_W), course.looks)
 
 
 def _loads(p_WG: Array, interval: float, gravity: float) -> Array:

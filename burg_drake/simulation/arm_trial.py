@@ -48,8 +48,8 @@ class ArmTrial(Trial):
         scene: the scene.
         station: a station with an arm.
         engine: time step and contact settings.
-        settings: phases of a trial; the way up is the plan's, so that `lift_height` and `lift_time`
-            do not count.
+        settings: phases of a trial; all ways are the plan's, so that `motion` and `lift_time` do
+            not count.
         transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
             its contacts are looked at after every step up to the grasp, and not only at `poll`.
         clearance: the screen of the open hand in this scene, if there is one already.
@@ -163,13 +163,13 @@ class ArmTrial(Trial):
         steps = 1 if self._transfer else self._steps_a_look
         rest = max(1, round(REST / (steps * step)))
         approach = Course(to_grasp, step, steps, self._p_WG, rest)
-        lift = Course([plan.lift], step, self._steps_a_look, self._p_WG)
+        ways = [Course([part], step, self._steps_a_look, self._p_WG) for part in (plan.lift,)]
         plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
         self.hand.place(plant_context, approach.q_at_look(0))
         self.command("arm", approach.at(0))
         self.command("hand", self.hand.opening_command())
         self.simulator.Initialize()
-        return Execution(self, target, moving, ArmCarrier(self, target, approach, lift))
+        return Execution(self, target, moving, ArmCarrier(self, target, approach, ways))
 
     def rise(self, target: BodyIndex) -> ArmRise:
         """Looks along the way up with a target in the hand."""

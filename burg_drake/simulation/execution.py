@@ -11,7 +11,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core.frames import Array, inverse, rotation_angle
 from burg_drake.core.outcome import Outcome
-from burg_drake.simulation.carrier import Carrier
+from burg_drake.simulation.carrier import Carrier, Segment
 from burg_drake.simulation.contacts import (
     NO_CONTACT,
     Contact,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from burg_drake.simulation.trial import Trial
 
 MINIMUM_LIFT = 0.5
-"""Share of the lift height that the target must rise by to count as lifted."""
+"""Share of the hand's way that the target must go with it to count as lifted."""
 LEVER = 0.01
 """Turning counts as the motion of a point so far from the grasp [m], which is at a pad's rim."""
 
@@ -41,7 +41,7 @@ class Execution:
         trial: the trial.
         target: the grasped body.
         moving: the free objects that are not locked.
-        carrier: what brings the hand to the grasp and raises it.
+        carrier: what brings the hand to the grasp and away from it.
 
     Attributes:
         contact: of the fingers with the target at the last look.
@@ -63,7 +63,10 @@ class Execution:
         self._others = {name: index for name, index in diagram.free.items() if index != target}
         self._still = set(diagram.free.values()) - moving
         self._robot = set(diagram.robot_bodies)
-        self._height_start = self._center()[2]
+        self._way = sum(segment.length for segment in carrier.segments)
+        self._direction = carrier.segments[0].direction_W
+        self._center_start = self._center()
+        self._followed = 0.0
         self._moved = self._displacements(self._others.values())
         self._pushed: dict[str, float] = {}
         self.contact = NO_CONTACT
@@ -76,7 +79,7 @@ class Execution:
         self._creep: list[float] = []
         self._in_free_air = 0.0
         self._way_blocked = False
-        self._left_to_rise = 0.0
+        self._left_to_go = 0.0
 
     def run(self) -> TrialResult:
         """Runs all phases.
@@ -128,19 +131,23 @@ class Execution:
         return Outcome.CLOSED_EMPTY if self._touched else Outcome.NO_CONTACT
 
     def lift(self) -> Outcome | None:
-        """Raises the hand; None if the target is held at the top and has to prove itself there."""
+        """Takes the target away, along the retreat and the lift; None if it is held at the end of
+        the way and has to prove itself there."""
         carrier = self._carrier
-        for look in range(carrier.lift_looks):
-            carrier.lift(look)
-            self.advance()
-            if self._blocker:
-                return Outcome.BLOCKED
-            if not self.contact.any:
-                return Outcome.SLIPPED
-            if carrier.bears_the_most(look) and self._is_decided():
-                return self.held()
+        last = len(carrier.segments) - 1
+        for number, segment in enumerate(carrier.segments):
+            self._turn(segment)
+            for look in range(segment.looks):
+                carrier.lift(number, look)
+                self.advance()
+                if self._blocker:
+                    return Outcome.BLOCKED
+                if not self.contact.any:
+                    return Outcome.SLIPPED
+                if number == last and carrier.bears_the_most(look) and self._is_decided(segment):
+                    return self.held()
         carrier.stop()
-        if self.contact.both and self.risen() >= MINIMUM_LIFT * carrier.lift_height:
+        if self.contact.both and self.followed() >= MINIMUM_LIFT * self._way:
             return None
         return Outcome.SLIPPED
 
@@ -166,7 +173,13 @@ class Execution:
         disturbed = self._moved.largest > self._settings.disturbance
         return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
 
-    def _is_decided(self) -> bool:
+    def _turn(self, segment: Segment) -> None:
+        """From now on the way of the target counts along a segment."""
+        if segment.direction_W is not self._direction:
+            self._followed, self._center_start = self.followed(), self._center()
+            self._direction = segment.direction_W
+
+    def _is_decided(self, last: Segment) -> bool:
         """Whether the target will be held to the end, as nothing is left that could change it.
 
         While the hand accelerates upwards, the load on the grip is largest. Friction that does not
@@ -179,12 +192,12 @@ class Execution:
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
-        left = self._carrier.lift_height - self._carrier.risen()
-        if self.risen() + left < MINIMUM_LIFT * self._carrier.lift_height:
+        left = last.length - self._carrier.gone()
+        if self.followed() + left < MINIMUM_LIFT * self._way:
             return False
-        self._way_blocked = not self._carrier.is_free_above()
+        self._way_blocked = not self._carrier.is_free_ahead()
         if not self._way_blocked:
-            self._left_to_rise = left
+            self._left_to_go = left
         return not self._way_blocked
 
     def _sticks(self) -> bool:
@@ -257,9 +270,10 @@ class Execution:
         free = not touched_from_outside(contacts, self._robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
-    def risen(self) -> float:
-        """How far the target's centre of mass has risen [m]."""
-        return float(self._center()[2] - self._height_start)
+    def followed(self) -> float:
+        """How far the target's centre of mass has gone along the segments of the hand's way, that
+        is, risen in a lift straight up [m]."""
+        return self._followed + float((self._center() - self._center_start) @ self._direction)
 
     def X_GO(self) -> Array:
         """(4, 4) target in the grasp frame."""
@@ -288,7 +302,7 @@ class Execution:
             tilt=tilt,
             pad_force=force,
             patch_area=area,
-            lift=self.risen() + self._left_to_rise,
+            lift=self.followed() + self._left_to_go,
             others_moved=self._moved.largest,
             end_time=self._context.get_time(),
             tracking_error=self._carrier.tracking_error,

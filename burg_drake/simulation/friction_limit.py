@@ -87,5 +87,4 @@ def friction_to_carry(trial: HandTrial, instance: str, mass: float | None = None
     if mass is None:
         mass = trial.diagram.scene.entry(instance).mass
     gravity = float(np.linalg.norm(trial.diagram.plant.gravity_field().gravity_vector()))
-    acceleration = 4.0 * settings.lift_height / settings.lift_time**2
-    return mass * (gravity + acceleration) / (2.0 * trial.hand.document.force)
+    return mass * (gravity + settings.acceleration) / (2.0 * trial.hand.document.force)

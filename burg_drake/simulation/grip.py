@@ -133,7 +133,7 @@ class Grip:
     def _brake(self) -> None:
         """Stops the hand as gently as it was accelerated."""
         settings = self._trial.settings
-        braking = 4.0 * settings.lift_height / settings.lift_time**2
+        braking = settings.acceleration
         speed = self._trial.hand.lift.get_translation_rate(self._plant_context)
         looks = math.ceil(speed / (braking * settings.poll))
         for i in range(looks):

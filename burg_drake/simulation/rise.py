@@ -1,4 +1,4 @@
-"""Whether hand and target can rise together without touching anything: geometry, no time steps."""
+"""Whether hand and target can go on together without touching anything: geometry, no steps."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from burg_drake.station.floating_hand import FloatingHand
 from burg_drake.station.hollow import mesh_by_pieces
 
 STEP = 0.01
-"""Height between two looks [m]; a hand and what it meets are thicker, taken together."""
+"""Way between two looks [m]; a hand and what it meets are thicker, taken together."""
 GAP = 0.002
 """Boxes that come no closer than this are apart [m]."""
 
 
 class Rise:
-    """Looks along the way up of one target in the hand.
+    """Looks along the straight way ahead of one target in the hand.
 
     Args:
         station_diagram: a diagram built with `robot="hand"`.
@@ -44,36 +44,36 @@ class Rise:
         for side in (self._carried, self._others):
             declaration = CollisionFilterDeclaration()
             manager.Apply(declaration.ExcludeWithin(GeometrySet([g for g, _ in side])))
-        self._heights = (
-            plant.get_body(target).floating_positions_start() + 6,
-            self._hand.lift.position_start(),
-        )
+        start = plant.get_body(target).floating_positions_start() + 4
+        self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
-    def is_free(self, X_WG: Array, positions: Array, way: float) -> bool:
-        """Whether nothing is met on the way up.
+    def is_free(self, X_WG: Array, positions: Array, way: float, direction_W: Array) -> bool:
+        """Whether nothing is met on the way.
 
         Args:
-            X_WG: (4, 4) grasp at which the trial began; it sets the frames of the lift.
+            X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
             positions: of the plant, at present.
             way: how far there is to go [m].
+            direction_W: (3,) unit vector of the lift.
         """
-        self._hand.place(self._plant_context, X_WG)
+        self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
         self._plant.SetPositions(self._plant_context, positions)
-        if not self._boxes_meet(way):
+        if not self._boxes_meet(way * direction_W):
             return True
-        for height in np.append(np.arange(STEP, way, STEP), way):
-            risen = positions.copy()
-            risen[list(self._heights)] += height
-            self._plant.SetPositions(self._plant_context, risen)
+        for gone in np.append(np.arange(STEP, way, STEP), way):
+            moved = positions.copy()
+            moved[self._places] += gone * np.append(direction_W, 1.0)
+            self._plant.SetPositions(self._plant_context, moved)
             if self._query().HasCollisions():
                 return False
         return True
 
-    def _boxes_meet(self, way: float) -> bool:
-        """Whether an upright box about what rises, drawn out upwards, meets one of the others."""
+    def _boxes_meet(self, p_W: Array) -> bool:
+        """Whether an upright box about what moves, drawn out by a way (3,), meets one of the
+        others."""
         query = self._query()
         low, high = _bounds(query, self._carried)
-        high[:, 2] += way
+        low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
         other_low, other_high = _bounds(query, self._others)
         apart = (low[:, None] > other_high[None] + GAP) | (other_low[None] > high[:, None] + GAP)
         return not apart.any(axis=2).all()

@@ -27,6 +27,7 @@ from burg_drake.simulation.contacts import ContactReader
 from burg_drake.simulation.neighbours import Neighbours
 from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.diagram import StationDiagram
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.hand_handle import HandHandle
 
 
@@ -37,9 +38,11 @@ class Trial:
         diagram: the station diagram.
         hand: the hand in it.
         settings: phases of a trial.
+        motion: where the hand goes, if not as the settings or else the station say.
 
     Attributes:
         diagram, hand, settings: as given.
+        motion: where the hand goes.
         contacts: reader of the diagram's contact results.
         neighbours: which free objects stand close to each other.
         simulator: the simulator that runs the trials.
@@ -47,10 +50,17 @@ class Trial:
 
     hand: HandHandle
 
-    def __init__(self, diagram: StationDiagram, hand: HandHandle, settings: TrialSettings) -> None:
+    def __init__(
+        self,
+        diagram: StationDiagram,
+        hand: HandHandle,
+        settings: TrialSettings,
+        motion: GraspMotion | None = None,
+    ) -> None:
         self.diagram = diagram
         self.hand = hand
         self.settings = settings
+        self.motion = motion or settings.motion or diagram.station.document.motion
         self.contacts = ContactReader(diagram.plant, diagram.scene_graph)
         self.neighbours = Neighbours(diagram)
         self._default = diagram.diagram.CreateDefaultContext()

@@ -1,16 +1,17 @@
-"""Phases of a trial in numbers: how far and how fast the hand rises, and what counts as rest."""
+"""Phases of a trial in numbers: where and how fast the hand goes, and what counts as rest."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from burg_drake.core.ranges import require_ranges
+from burg_drake.station.grasp_motion import GraspMotion
 
 LONGEST = 30.0
 """Of a phase [s]: 60 times what the phases take by default."""
 
 RANGES = {
-    "lift_height": (1e-3, 10.0),
     "lift_time": (1e-2, LONGEST),
     "hold_time": (0.0, LONGEST),
     "creep_speed": (0.0, 10.0),
@@ -23,6 +24,8 @@ RANGES = {
     "disturbance": (0.0, 10.0),
 }
 """Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
+USUAL_LIFT = 0.30
+"""Length that `lift_time` is about [m]: that of the usual lift."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,10 +33,10 @@ class TrialSettings:
     """Phases of a trial.
 
     Attributes:
-        lift_height: how far the hand rises [m].
-        lift_time: duration of the rise [s]; half of it accelerates and half of it brakes, both by
-            4 height / time^2.
-        hold_time: how long the target must be held after the rise [s].
+        motion: where the hand goes; None if as the station says.
+        lift_time: duration of a straight way of 0.30 m with the target [s]: half of it accelerates
+            and half of it brakes, as they do, as hard, on a shorter way.
+        hold_time: how long the target must be held at the end of the way [s].
         creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
         creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
             trials early, see `Engine.whole_trial`.
@@ -46,7 +49,7 @@ class TrialSettings:
         disturbance: others that are moved by more than this count as disturbed [m].
     """
 
-    lift_height: float = 0.30
+    motion: GraspMotion | None = None
     lift_time: float = 1.25
     hold_time: float = 0.5
     creep_speed: float = 0.0003
@@ -60,6 +63,15 @@ class TrialSettings:
 
     def __post_init__(self) -> None:
         require_ranges(self, RANGES, "a trial")
+
+    @property
+    def acceleration(self) -> float:
+        """Of the hand on its straight ways with the target [m/s^2]."""
+        return 4.0 * USUAL_LIFT / self.lift_time**2
+
+    def time_of(self, way: float) -> float:
+        """Duration of a straight way with the target [s], by its length [m]."""
+        return self.lift_time * math.sqrt(way / USUAL_LIFT)
 
     @property
     def steady_polls(self) -> int:

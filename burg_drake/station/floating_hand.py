@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
@@ -9,6 +10,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.hand_handle import HandHandle
+
+UP = np.array((0.0, 0.0, 1.0))
 
 
 class FloatingHand(HandHandle):
@@ -19,7 +22,7 @@ class FloatingHand(HandHandle):
 
     Attributes:
         document, body, fingers, joints, pads: see `HandHandle`.
-        lift: the joint that carries the hand.
+        lift: the joint that carries the hand along a straight way.
 
     Raises:
         InvalidInputError: the diagram has no floating hand.
@@ -36,24 +39,50 @@ class FloatingHand(HandHandle):
         self._base = plant.GetFrameByName("lift_base")
         self._mount = plant.GetFrameByName("lift_mount")
 
-    def place(self, plant_context: Context, X_WG: Array, closed: float = 0.0) -> None:
+    def place(
+        self,
+        plant_context: Context,
+        X_WG: Array,
+        closed: float = 0.0,
+        direction_W: Array = UP,
+    ) -> None:
         """Puts the grasp frame at `X_WG` (4, 4), lift at 0, all at rest.
 
         Args:
             plant_context: the plant's part of the Context.
             X_WG: grasp in the world.
             closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
+            direction_W: (3,) unit vector, in which the lift goes from there.
         """
-        # The lift joint keeps to world z: its base frame has the world's axes and the hand's
-        # position, its mount frame takes up the hand's orientation.
-        X_WH = X_WG @ self._X_GH
-        R_WH = RotationMatrix(X_WH[:3, :3])
-        self._base.SetPoseInParentFrame(plant_context, RigidTransform(X_WH[:3, 3]))
-        self._mount.SetPoseInParentFrame(plant_context, RigidTransform(R_WH.inverse()))
-        self.lift.set_translation(plant_context, 0.0)
-        self.lift.set_translation_rate(plant_context, 0.0)
+        self._hang(plant_context, X_WG @ self._X_GH, direction_W)
         self.set_fingers(plant_context, closed)
 
-    def risen(self, plant_context: Context) -> float:
-        """How far the hand has risen since it was placed [m]."""
+    def turn_lift(self, plant_context: Context, direction_W: Array) -> None:
+        """Has the lift go in another direction (3,) from where the hand is, at rest there; the
+        fingers stay as they are, and move on as they do."""
+        self._hang(plant_context, self.X_WH(plant_context), direction_W)
+
+    def gone(self, plant_context: Context) -> float:
+        """How far the hand has gone along the lift [m]."""
         return float(self.lift.get_translation(plant_context))
+
+    def _hang(self, plant_context: Context, X_WH: Array, direction_W: Array) -> None:
+        # The lift joint goes along z of its frames L: the base has the hand's position, and the
+        # mount takes up the hand's orientation.
+        R_WL = RotationMatrix(_turned_from_z(direction_W))
+        R_WH = RotationMatrix(X_WH[:3, :3])
+        self._base.SetPoseInParentFrame(plant_context, RigidTransform(R_WL, X_WH[:3, 3]))
+        R_HL = R_WH.inverse().multiply(R_WL)
+        self._mount.SetPoseInParentFrame(plant_context, RigidTransform(R_HL, np.zeros(3)))
+        self.lift.set_translation(plant_context, 0.0)
+        self.lift.set_translation_rate(plant_context, 0.0)
+
+
+def _turned_from_z(u: Array) -> Array:
+    """A rotation (3, 3) that takes z to a unit vector (3,); none for z itself."""
+    if u[2] < 0.0:
+        return _turned_from_z(-u) @ np.diag([1.0, -1.0, -1.0])
+    v = np.array((-u[1], u[0], 0.0))
+    cross = np.array(((0.0, -v[2], v[1]), (v[2], 0.0, -v[0]), (-v[1], v[0], 0.0)))
+    turned: Array = np.eye(3) + cross + cross @ cross / (1.0 + u[2])
+    return turned

@@ -44,6 +44,7 @@ def record_trial(
     settings: TrialSettings = DEFAULT_TRIAL,
     friction: float | None = None,
     mass: float | None = None,
+    lift: float | None = None,
 ) -> TrialResult:
     """Executes a grasp once more and leaves the recording in Meshcat, where it plays in a loop.
 
@@ -55,7 +56,7 @@ def record_trial(
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         meshcat: where to show it.
-        engine, settings, friction, mass: as in the trial to be shown.
+        engine, settings, friction, mass, lift: as in the trial to be shown.
 
     Returns:
         What became of the whole trial; the same as without a picture.
@@ -75,10 +76,11 @@ def record_trial(
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
     offset = camera_offset(X_WG, np.reshape(others, (-1, 3)))
-    lifted = hand + np.array([0.0, 0.0, settings.lift_height])
-    aim_at(meshcat, np.vstack([scene_points(scene, station), hand, lifted]), -offset)
+    steps = [way.length * way.direction_W for way in trial.ways(X_WG, lift)]
+    on_way = [hand + p_W for p_W in np.cumsum(steps, axis=0)]
+    aim_at(meshcat, np.vstack([scene_points(scene, station), hand, *on_way]), -offset)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
-    result = trial.run(instance, X_OG, friction=friction, mass=mass)
+    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
     meshcat.StopRecording()
     if result.margins.end_time > 0.0:
         play_in_a_loop(meshcat)

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, from_above, make_station
+from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, from_above, lifting, make_station
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, swap_fingers
@@ -16,7 +16,6 @@ from burg_drake.scene.scene import Instance
 from burg_drake.simulation.execution import Execution
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import TrialResult
-from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import Obstacle
 
@@ -85,7 +84,7 @@ def test_half_of_the_lift_is_lifted(make_scene, share: float, outcome: str) -> N
     height, time, mass = 0.1, 0.35, 0.3
     A = 4 * height / time**2
     a = share * A / (2 - share)
-    settings = TrialSettings(lift_height=height, lift_time=time)
+    settings = lifting(height, time)
     trial = HandTrial(make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings)
     sideways = grasp_from_axes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.2))
     result = trial.run("post", sideways, friction=mass * (GRAVITY + a) / (2 * FORCE))

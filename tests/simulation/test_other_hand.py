@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from trial_world import lifting
 
 from burg_drake.core.frames import swap_fingers
 from burg_drake.core.outcome import Outcome
@@ -29,7 +30,7 @@ MASS = 0.3
 GRAVITY = 9.81
 
 NORMAL = TrialSettings()
-SLOW = TrialSettings(lift_height=0.02, lift_time=2.0, hold_time=0.5)
+SLOW = lifting(0.02, 2.0, hold_time=0.5)
 """Accelerates by at most 0.03 m/s^2, so that weight alone decides."""
 
 

@@ -20,13 +20,13 @@ from trial_world import (
     PAD,
     SLOW,
     from_above,
+    lifting,
     make_station,
 )
 
 from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES
 
 STIFFNESS = 1e7 / 0.0076
@@ -41,7 +41,8 @@ COULOMB_MASS = 2 * FORCE * 0.08 / GRAVITY
 BAR_MASS, BAR_LENGTH = 0.2, 0.30
 LEVER = 0.05
 """The bar is gripped so far beside its middle [m]."""
-STEEP = TrialSettings(lift_height=0.02, lift_time=1.4, hold_time=0.1)
+STEEP_LIFT = 0.02
+STEEP = lifting(STEEP_LIFT, 1.4, hold_time=0.1)
 """Raises the hand by 20 mm, also at 0.04 m/s^2."""
 
 
@@ -103,7 +104,7 @@ def test_pads_that_slide_pull_with_coulombs_force(slow_trials, friction: float) 
     for _ in range(20):
         execution.advance()
         pulls.append(execution.contact.force[:, 2].sum())
-    assert execution.risen() == pytest.approx(0.0, abs=1e-4)
+    assert execution.followed() == pytest.approx(0.0, abs=1e-4)
     assert np.mean(pulls[5:]) == pytest.approx(2 * friction * FORCE, rel=0.02)
 
 
@@ -202,7 +203,7 @@ def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance)
         X_OG, friction = from_above(0.02, y=LEVER), share * BAR_FRICTION
         return bar_trials[engine].run("bar", X_OG, friction=friction).margins.tilt
 
-    assert tilt(0.9) == pytest.approx(STEEP.lift_height / far_end, rel=0.05)
+    assert tilt(0.9) == pytest.approx(STEEP_LIFT / far_end, rel=0.05)
     assert tilt(1.3) < np.deg2rad(0.5)
     limit = bisected(lambda share: tilt(share) < np.deg2rad(2.5), 0.9, 1.3, steps=5)
     assert limit == pytest.approx(1.0, abs=tolerance)

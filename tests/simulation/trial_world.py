@@ -10,7 +10,8 @@ import trimesh
 from burg_drake.core.frames import Array, grasp_from_axes
 from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose
-from burg_drake.simulation.trial_settings import TrialSettings
+from burg_drake.simulation.trial_settings import USUAL_LIFT, TrialSettings
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Obstacle, Station, StationDocument, Table
 
@@ -25,7 +26,14 @@ BOX_MASS = 0.3
 POST = (0.04, 0.04, 0.42)
 """Size of the post [m], which reaches up to an arm's forearm."""
 
-SLOW = TrialSettings(lift_height=0.01, lift_time=1.0, hold_time=0.3)
+
+def lifting(height: float, time: float, **others: float) -> TrialSettings:
+    """Phases with a lift of a height [m] in a time [s]."""
+    motion = GraspMotion(lift_height=height)
+    return TrialSettings(motion=motion, lift_time=time * (USUAL_LIFT / height) ** 0.5, **others)
+
+
+SLOW = lifting(0.01, 1.0, hold_time=0.3)
 """Accelerates by at most 0.04 m/s^2, so that weight alone decides."""
 
 

@@ -19,7 +19,6 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.simulation.hand_trial import HandTrial
 from burg_drake.simulation.result import Margins, TrialResult
-from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
 from burg_drake.station.engine import ENGINES
 from burg_drake.station.station import Station, load_station
 from burg_drake.visualization.replay import CLEAR_VIEW, VIEW, camera_offset, describe, record_trial
@@ -57,7 +56,7 @@ def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station:
     board = transform_points(X_WS, [[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]])
     X_WO = X_WS @ scene.X_SO("box")
     hand = X_WO @ X_OG @ make_pose(p_AB=(0.0, 0.0, -0.15))  # behind its palm
-    raised = hand[:3, 3] + (0.0, 0.0, DEFAULT_TRIAL.lift_height)
+    raised = hand[:3, 3] + (0.0, 0.0, station.document.motion.lift_height)
     for view in VIEWS:
         seen = in_view(page, np.vstack([board, hand[:3, 3], raised]), view)
         assert np.abs(seen).max() < 1.0, view
