@@ -17,6 +17,7 @@ from burg_drake.apps.arguments import (
     workers,
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
+from burg_drake.apps.motion_options import add_motion, chosen_motion, require_standoff_of_arm
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, require_sampled
 
@@ -42,6 +43,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
+        "burg-drake evaluate my_scene.yaml --station panda_shelf --retreat-mm 100 --lift-mm 50",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "",
@@ -80,6 +82,7 @@ def add_to(verbs: Any) -> None:
         " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
         " there is no arm)",
     )
+    add_motion(parser)
     add_retry_failed(parser, "grasps")
     add_quiet(parser)
     parser.set_defaults(after_interrupt="; the same command goes on from here")
@@ -98,10 +101,13 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     require_sampled(arguments)
     scene = load_scene(arguments.scene)
     station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    require_standoff_of_arm(arguments, mode)
+    motion = chosen_motion(arguments, station)
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
     for note in given.notes if given else ():
         print(f"note: {note}")
-    if mode_for(station, arguments.mode) != "hand":
+    if mode != "hand":
         require_sound_scene(scene, station)
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
@@ -118,7 +124,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
         workers=arguments.workers,
         table=arguments.table,
-        mode=arguments.mode,
+        mode=mode,
+        motion=motion,
         retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
     )

@@ -18,6 +18,7 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
+from burg_drake.apps.motion_options import add_motion, chosen_motion
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 from burg_drake.apps.sampling_options import (
     add_sampling,
@@ -54,17 +55,20 @@ def add_to(verbs: Any) -> None:
         "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
         "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
         "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
+        "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
         "",
         "A grasp is reachable if the open hand is clear, also on the straight way in, and with",
-        "the object in it on the straight way up, the arm can follow both, and it finds a way from",
-        "home to where they begin. Each yes is checked by Drake's CollisionChecker; each no says",
-        "what failed first and what was in the way. Nothing is simulated; `evaluate` does that.",
+        "the object in it on the straight ways back and up, the arm can follow them, and it finds",
+        "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
+        "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
+        "does that.",
     )
     add_scene(parser)
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
     add_station(parser)
+    add_motion(parser)
     parser.add_argument(
         "-o",
         "--output",
@@ -105,6 +109,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
     from burg_drake.core.outcome import Outcome
     from burg_drake.evaluation.feasibility import reach
+    from burg_drake.evaluation.short_lifts import short_lifts
     from burg_drake.motion.station_check import require_usable_arm
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.check import require_sound_scene
@@ -124,6 +129,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     require_sound_scene(scene, station)
+    motion = chosen_motion(arguments, station)
     grasps = _grasps(arguments, scene, station)
     if isinstance(output, Output):
         output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
@@ -133,6 +139,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         scene,
         station,
         grasps,
+        motion=motion,
         exact=not arguments.screening,
         plans=arguments.plans,
         plan_format=arguments.plan_format or "json",
@@ -142,6 +149,9 @@ def run_reach(arguments: argparse.Namespace) -> int:
     )
     answered = judged.column("outcome") != ""
     _print_tables(judged.select(answered))
+    lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
+    if lifts is not None:
+        print(lifts)
     yes = judged.column("outcome") == Outcome.REACHABLE
     unplanned = yes & (judged.column("reason") != "")
     if arguments.plans is not None:

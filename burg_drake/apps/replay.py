@@ -124,14 +124,15 @@ def _execute(source: Source, meshcat: Any) -> tuple[Verdict, TrialResult, str]:
         "friction": trial.friction,
         "mass": trial.mass,
     }
+    by_hand = like | {"lift": trial.lift}
     what = (scene, station, trial.instance, trial.X_OG)
     if decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
-        shown = record_trial(*what, meshcat, **like)
+        shown = record_trial(*what, meshcat, **by_hand)
         return trial_verdict(shown), shown, "the hand alone"
     verdict, plan = rerun(scene, station, trial, origin)
     if plan is not None:
         return verdict, record_arm_trial(*what, plan, meshcat, **like), "the arm from home on"
-    return verdict, record_trial(*what, meshcat, **like), "the hand alone"
+    return verdict, record_trial(*what, meshcat, **by_hand), "the hand alone"
 
 
 def _from_run(path: Path, arguments: argparse.Namespace) -> Source:

@@ -67,8 +67,11 @@ _MARGINS = {
     "patch_area": Column("m2", "contact patch of the pad with the smaller one"),
     "lift": Column(
         "m",
-        "how far the target's centre of mass rose; of a trial decided on the way up with the"
-        " rest of the way, which is free by geometry",
+        "how far the target's centre of mass rose, or went along the straight ways of another"
+        " motion; of a trial decided on the way with the rest of it, which is free by geometry",
+    ),
+    "lift_height": Column(
+        "m", "length of the lift: as asked, or as far as there is room where less is allowed"
     ),
     "others_moved": Column("m", "largest displacement of any other object's centre of mass"),
     "end_time": Column(

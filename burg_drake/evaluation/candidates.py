@@ -33,6 +33,7 @@ class Candidate:
         friction: the target's coefficient, in place of the library's.
         mass: of the target, in place of the library's [kg].
         width: distance of the contacts [m]; NaN if unknown.
+        lift: length of the lift, in place of the motion's [m].
     """
 
     id: str
@@ -41,6 +42,7 @@ class Candidate:
     friction: float | None = None
     mass: float | None = None
     width: float = math.nan
+    lift: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,7 @@ from burg_drake.evaluation.station_judge import StationJudgeFactory
 from burg_drake.evaluation.table_file import require_writer, write_table
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.engine import ENGINES, Engine, engine_preset
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 
@@ -78,6 +79,7 @@ def evaluate(
     workers: int | None = None,
     table: TableFormat = "csv",
     mode: Mode | None = None,
+    motion: GraspMotion | None = None,
     retry_failed: bool = False,
     progress: bool | Listener = True,
 ) -> Run:
@@ -111,6 +113,7 @@ def evaluate(
         mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
             execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
             the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
+        motion: how the hand goes to a grasp and away from it; as the station says if None.
         retry_failed: try all grasps again that an earlier call could not simulate.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
@@ -130,6 +133,7 @@ def evaluate(
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)
     mode = mode_for(station, mode)
+    motion = motion or station.document.motion
     engine = engine if isinstance(engine, Engine) else engine_preset(engine)
     chosen = chosen_instances(scene, only)
     if grasps is not None:
@@ -162,10 +166,20 @@ def evaluate(
             scene,
             station,
             given,
-            _document(folder, scene, station, asked, engine, seed=seed, mode=mode, table=table),
+            _document(
+                folder,
+                scene,
+                station,
+                asked,
+                engine,
+                seed=seed,
+                mode=mode,
+                motion=motion,
+                table=table,
+            ),
             reporter,
         )
-        make_judge = StationJudgeFactory(scene, station, engine, mode)
+        make_judge = StationJudgeFactory(scene, station, engine, mode, motion)
         remove_unfinished(folder)
         left = _open_grasps(run, retry_failed)
         run = _judge(run, left, make_judge, journal, workers, reporter)
@@ -181,6 +195,7 @@ def _document(
     *,
     seed: int,
     mode: Mode,
+    motion: GraspMotion,
     table: TableFormat,
 ) -> RunDocument:
     """What this call asks for; what comes of the grasps is filled in later."""
@@ -199,9 +214,9 @@ def _document(
         ),
         grasps=grasps,
         engine=engine,
-        trial=numbers(TrialSettings()),
+        trial=numbers(TrialSettings(motion=motion)),
         mode=mode,
-        arm={} if mode == "hand" else numbers(arm_settings()),
+        arm={} if mode == "hand" else numbers(arm_settings(motion)),
         seed=seed,
         table=table,
         versions=software_versions(),

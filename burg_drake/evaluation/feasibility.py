@@ -20,7 +20,7 @@ from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporte
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
 from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.judge import Decide, Decision, Verdict, one_line
+from burg_drake.evaluation.judge import LIFT_HEIGHT, Decide, Decision, Verdict, one_line
 from burg_drake.evaluation.plan_folder import PlanFolder, plans_document
 from burg_drake.evaluation.plan_folder import PlanFormat as PlanFormat
 from burg_drake.evaluation.run_document import input_of, numbers
@@ -33,15 +33,17 @@ from burg_drake.evaluation.screens import (
 )
 from burg_drake.evaluation.set_documents import set_documents
 from burg_drake.evaluation.table import Columns
+from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.trajectory import Plan
 from burg_drake.motion.witness import Witness
 from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
 """What becomes of a grasp, unless the computation itself fails."""
-MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess")
+MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess", LIFT_HEIGHT)
 """Margins of a verdict that become columns; NaN where they are not defined."""
 
 
@@ -50,6 +52,7 @@ def reach(
     station: Station | str | Path,
     grasps: GraspSet | Mapping[str, GraspSet],
     *,
+    motion: GraspMotion | None = None,
     exact: bool = True,
     plans: str | Path | None = None,
     plan_format: PlanFormat = "json",
@@ -60,13 +63,15 @@ def reach(
     """Asks of every grasp whether the arm can execute it, without a trial.
 
     That is: the open hand is clear, also on the straight way in, and with the target in it on the
-    straight way up; the arm can follow both; and it finds a way from home to where they begin.
+    straight ways back and up; the arm can follow them; and it finds a way from home to where they
+    begin.
 
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
         grasps: in the frames of their objects. A set goes to the instances that its column
             `instance` names, or else to all instances of its objects; a mapping has sets by
             instance, such as those of `read_grasps`.
+        motion: how the hand goes to a grasp and away from it; as the station says if None.
         exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
             screening, several times faster.
         plans: folder that gets the timed motion of each grasp that the arm can execute, as
@@ -85,9 +90,10 @@ def reach(
         `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
         is no outcome, or no plan of what is reachable, should a computation fail; `clearance` of
         the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
-        `judge.ARM_SCREEN_MARGINS`; `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there
-        [rad], NaN where there is none; and `cpu` [s]. Answers do not depend on the batch, the
-        order or the number of workers. The provenance tells documents, versions and settings.
+        `judge.ARM_SCREEN_MARGINS`; `lift_height` [m], as asked or as far as there is room;
+        `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there [rad], NaN where there is
+        none; and `cpu` [s]. Answers do not depend on the batch, the order or the number of workers.
+        The provenance tells documents, versions and settings.
 
     Raises:
         InvalidInputError: the station has no arm, or one that stands in something, collides in
@@ -105,6 +111,7 @@ def reach(
             f"station {station.name!r} has no arm, of which one could ask what it can reach; give"
             " another one"
         )
+    motion = motion or station.document.motion
     given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
     candidates = given_candidates(scene, given)
     require_usable_arm(scene, station)
@@ -118,14 +125,14 @@ def reach(
                     input_of(scene, "scenes"),
                     input_of(station, "stations"),
                     candidates,
-                    numbers(arm_settings(exact=exact)),
+                    numbers(arm_settings(motion, exact=exact)),
                     exact=exact,
                     format=plan_format,
                 ),
             )
             journal = opened.enter_context(folder.opened())
             verdicts = folder.finished(retry_failed=retry_failed)
-        factory = ReachJudgeFactory(scene, station, exact, folder)
+        factory = ReachJudgeFactory(scene, station, motion, exact, folder)
         left = [candidate for candidate in candidates if candidate.id not in verdicts]
         outcomes = Counter(v.outcome for v in verdicts.values())
         done, total = len(candidates) - len(left), len(candidates)
@@ -141,7 +148,8 @@ def reach(
         if folder is not None:
             verdicts = folder.verdicts()  # with the digits that a later call will find
     rows = [verdicts[id] for id in candidates.id]
-    return _with_columns(candidates, rows, scene, station, exact)
+    settings = arm_settings(motion, exact=exact)
+    return _with_columns(candidates, rows, scene, station, settings)
 
 
 class ReachJudge:
@@ -156,7 +164,7 @@ class ReachJudge:
 
         scene, station = factory.scene, factory.station
         hand, X_WO = hand_alone(scene, station)
-        arm = arm_reach(scene, station, exact=factory.exact)
+        arm = arm_reach(scene, station, factory.motion, exact=factory.exact)
         wanted = factory.plans is not None
         self.screens = (hand_screen(hand, X_WO), arm_screen(arm, X_WO, motions=wanted))
         self.stages: tuple[tuple[Stage, Decide], ...] = ((Stage.PLANNED, self._plan),)
@@ -183,12 +191,13 @@ class ReachJudgeFactory:
 
     Attributes:
         scene, station: where the grasps are.
-        exact: as in `reach`.
+        motion, exact: as in `reach`.
         plans: where plans go, if they are wanted.
     """
 
     scene: Scene
     station: Station
+    motion: GraspMotion
     exact: bool = True
     plans: PlanFolder | None = None
 
@@ -197,7 +206,11 @@ class ReachJudgeFactory:
 
 
 def _with_columns(
-    candidates: Candidates, rows: Sequence[Verdict], scene: Scene, station: Station, exact: bool
+    candidates: Candidates,
+    rows: Sequence[Verdict],
+    scene: Scene,
+    station: Station,
+    settings: ReachSettings,
 ) -> GraspSet:
     arm = station.document.arm
     assert arm is not None
@@ -222,7 +235,7 @@ def _with_columns(
     provenance = {
         **candidates.grasps.provenance,
         **set_documents(scene.library, scene, station, objects),
-        "reach": {**numbers(arm_settings(exact=exact)), "exact": exact},
+        "reach": {**numbers(settings), "exact": settings.exact},
     }
     return replace(candidates.grasps, provenance=provenance).with_columns(**columns)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from burg_drake.core.outcome import Outcome, Stage
@@ -32,12 +32,15 @@ ARM_MARGINS = (
 )
 """Margins that only stations with an arm have: those of the arm's screen, the `duration` of the
 planned motion [s], and those of `simulation.arm_trial`, see `simulation.result.Margins`."""
+LIFT_HEIGHT = "lift_height"
+"""Margin: length of the lift, as long as the run's motion asks for, or as there is room where it
+allows less [m]."""
 MARGINS = (
     *("overlap", "clearance", "slip", "tilt", "pad_force", "patch_area"),
-    *("lift", "others_moved", "end_time"),
+    *("lift", LIFT_HEIGHT, "others_moved", "end_time"),
     *ARM_MARGINS,
 )
-"""Margins of a verdict: see `simulation.result.Margins` and `ARM_MARGINS`."""
+"""Margins of a verdict: see `simulation.result.Margins`, `LIFT_HEIGHT` and `ARM_MARGINS`."""
 
 
 @dataclass(frozen=True)
@@ -222,13 +225,22 @@ def judge_grasp(
         motion = next((d.motion for d in reversed(answers.decisions) if d.motion), None)
         start = time.process_time()
         try:
-            decision = decide(candidate, motion)
+            decision = decide(_with_lift(candidate, answers.decisions), motion)
         except Exception as error:  # whatever Drake throws becomes this one grasp's outcome
             decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
         answers = answers.then(stage, decision, time.process_time() - start)
     if answers.outcome is None:
         raise ValueError("the last stage of a judge has to decide")
     return answers.verdict()
+
+
+def _with_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
+    """A grasp with the length of the lift for which an earlier stage has found room, unless it
+    comes with one."""
+    if candidate.lift is not None:
+        return candidate
+    found = [d.margins[LIFT_HEIGHT] for d in decisions if LIFT_HEIGHT in d.margins]
+    return replace(candidate, lift=found[-1]) if found else candidate
 
 
 def one_line(error: BaseException) -> str:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.reader import Reader
 from burg_drake.core.yaml_nodes import parse_nodes
 from burg_drake.evaluation.mode import MODES, Mode
+from burg_drake.evaluation.motion_numbers import gathered, without_motion
 from burg_drake.station.engine import ENGINES, Engine
 
 if TYPE_CHECKING:
@@ -64,7 +65,8 @@ class Origin:
     run: str = ""
 
     def settings(self, where: str = "trial settings") -> TrialSettings:
-        """The trial's settings; those that were not recorded have their defaults.
+        """The trial's settings; those that were not recorded have their defaults, and so has the
+        motion, whatever the station says.
 
         Args:
             where: names them in messages.
@@ -73,8 +75,12 @@ class Origin:
             InvalidInputError: one of them is unknown or cannot be used.
         """
         from burg_drake.simulation.trial_settings import TrialSettings
+        from burg_drake.station.grasp_motion import GraspMotion
 
-        return _typed(self.trial, TrialSettings, where)
+        others, values = without_motion(self.trial), gathered(self.trial)
+        motion = {name: value for name, value in values.items() if name not in others}
+        settings = _typed(others, TrialSettings, where)
+        return replace(settings, motion=_typed(motion, GraspMotion, where))
 
     def cells(self) -> dict[str, str]:
         """The texts `ORIGIN_TEXT` by column."""
@@ -180,6 +186,11 @@ def _pairs(text: str, where: str) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
+def _yaml(value: object) -> str:
+    """A text, or a list of texts, as the reader takes them."""
+    return json.dumps([str(v) for v in value] if isinstance(value, list) else str(value))
+
+
 class _CellReader(Reader):
     LINES = False
 
@@ -193,6 +204,6 @@ def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
             f"{where}: {unknown[0]!r} is no setting of this release of burg_drake; install the one"
             " that made the results"
         )
-    text = "\n".join(f"{name}: {json.dumps(str(value))}" for name, value in values.items())
+    text = "\n".join(f"{name}: {_yaml(value)}" for name, value in values.items())
     found: T = _CellReader(where).read(parse_nodes(text or "{}", where), schema, "")
     return found

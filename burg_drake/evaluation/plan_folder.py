@@ -21,6 +21,7 @@ from burg_drake.core.schema import load_document, save_document
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
 from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.motion_numbers import motion_in, motion_text, without_motion
 from burg_drake.evaluation.run_document import HASH_DIGITS, Input, differences, software_versions
 
 PlanFormat = Literal["json", "csv"]
@@ -151,13 +152,14 @@ def plans_document(
 
 def _identity(document: PlansDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same plans, in words, by topic."""
-    arm = {name: value for name, value in document.arm.items() if name != "exact"}
+    arm = without_motion({k: v for k, v in document.arm.items() if k != "exact"})
     return {
         "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "grasps": f"{document.grasps}, content {document.content[:HASH_DIGITS]}",
         "check": "exact" if document.exact else "screening",
         "settings of the arm": content_hash(arm)[:HASH_DIGITS],
+        "motion": motion_text(motion_in(document.arm)),
         "format": document.format,
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),

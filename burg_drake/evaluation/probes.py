@@ -97,7 +97,7 @@ def make_probes(
         key = _key(test, settings, context)
         if test != "noise":
             id = _probe_id(grasp.id, test, key)
-            yield Probe(id, grasp.instance, grasp.X_OG, test=test, grasp=grasp.id)
+            yield Probe(id, grasp.instance, grasp.X_OG, lift=grasp.lift, test=test, grasp=grasp.id)
             continue
         entry = scene.entry(grasp.instance)
         for repeat in range(settings.repeats):
@@ -116,6 +116,7 @@ def make_probes(
                 drawn.X_OG,
                 drawn.friction,
                 drawn.mass,
+                lift=grasp.lift,
                 test=test,
                 grasp=grasp.id,
             )
@@ -171,15 +172,16 @@ class ProbeJudge:
 
     def _answer(self, probe: Candidate, motion: object) -> Decision:
         assert isinstance(probe, Probe)
-        trial, settings = self._trial, self._settings
+        trial, settings, lift = self._trial, self._settings, probe.lift
+        what = (probe.instance, probe.X_OG)
         if probe.test == "noise":
             return trial_decision(
-                trial.run(probe.instance, probe.X_OG, friction=probe.friction, mass=probe.mass)
+                trial.run(*what, friction=probe.friction, mass=probe.mass, lift=lift)
             )
         if probe.test == "friction":
-            limit = friction_limit(trial, probe.instance, probe.X_OG, settings=settings.friction)
+            limit = friction_limit(trial, *what, lift=lift, settings=settings.friction)
             return Decision(Outcome.LIFTED, margins={"friction": limit})
-        grip = take_grip(trial, probe.instance, probe.X_OG)
+        grip = take_grip(trial, *what, lift=lift)
         if isinstance(grip, TrialResult):
             return trial_decision(grip)
         found = (tug if probe.test == "tug" else shake)(grip, settings.loads)

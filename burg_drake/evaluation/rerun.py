@@ -7,7 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from burg_drake.core.outcome import Stage
-from burg_drake.evaluation.judge import ARM_SCREEN_MARGINS, MARGINS, Verdict, judge_grasp
+from burg_drake.evaluation.judge import (
+    ARM_SCREEN_MARGINS,
+    LIFT_HEIGHT,
+    MARGINS,
+    Verdict,
+    judge_grasp,
+)
 from burg_drake.evaluation.mode import Mode, mode_for
 from burg_drake.evaluation.origin import Origin
 from burg_drake.evaluation.run_document import software_versions
@@ -83,7 +89,10 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     there, here = _results(recorded), _results(now)
     if "clearance" not in there:  # of a release that did not measure it
         here.pop("clearance", None)
-    for name in ARM_SCREEN_MARGINS:  # the arm may have passed a grasp on, and is not asked again
+    if math.isnan(recorded.margins.get(LIFT_HEIGHT, math.nan)):  # likewise, or of a trial alone
+        here.pop(LIFT_HEIGHT, None)
+    # The arm may have passed a grasp on, and is not asked again.
+    for name in (*ARM_SCREEN_MARGINS, LIFT_HEIGHT):
         if name not in here:
             there.pop(name, None)
     found = []

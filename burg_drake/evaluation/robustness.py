@@ -142,7 +142,7 @@ def _choose(
         ids = run.best(best, each=True, only=only)
         if not ids:
             raise InvalidInputError(f"{run.path}: no grasp was lifted; there is nothing to test")
-    chosen = {id: run.candidate(id) for id in ids}
+    chosen = {id: run.trial(id).candidate for id in ids}
     for id in chosen:
         verdict = run.verdicts.get(id)
         if verdict is None:

@@ -13,6 +13,7 @@ from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import data_root
 from burg_drake.evaluation.mode import Mode
+from burg_drake.evaluation.motion_numbers import motion_in, motion_text, without_motion
 from burg_drake.evaluation.origin import Origin, engine_label
 from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import Engine
@@ -151,7 +152,8 @@ def software_versions() -> dict[str, str]:
 def identity(document: RunDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same run, in words, by topic."""
     grasps, engine = document.grasps, document.engine
-    settings = content_hash(vars(engine), document.trial, document.arm)[:HASH_DIGITS]
+    others = [without_motion(values) for values in (document.trial, document.arm)]
+    settings = content_hash(vars(engine), *others)[:HASH_DIGITS]
     sampled = grasps.origin == "sampled"
     approach = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
     return {
@@ -159,6 +161,7 @@ def identity(document: RunDocument) -> dict[str, str]:
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
         "settings of engine, trial and arm": settings,
+        "motion": motion_text(motion_in(document.trial)),
         "mode": document.mode,
         "grasps": (
             _sampled(grasps) if sampled else f"given, content {grasps.content[:HASH_DIGITS]}"

@@ -22,6 +22,8 @@ REMEDIES = {
     Stage.EXECUTED: "the table of results has the reasons",
 }
 """What would help, by the stage that stopped most grasps."""
+NO_LIFT = (Outcome.HAND_COLLISION_LIFT, Outcome.LIFT_LINE)
+REMEDY_OF_LIFT = "a shorter lift (--least-lift-mm) or a retreat first (--retreat-mm) may help"
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
@@ -62,6 +64,8 @@ def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray) -> str:
     rest = int(mine.sum()) - sum(count for _, count in named)
     parts += [f"others in {rest:,}"] if rest else []
     remedy = REMEDIES[Stage(stages.most_common(1)[0][0])]
+    if Outcome(named[0][0][0]) in NO_LIFT:
+        remedy = f"{REMEDY_OF_LIFT}; {remedy}"
     count = int(mine.sum())
     grasps = f"{count:,} grasp{'' if count == 1 else 's'}"
     return f"{name}: nothing executed of {grasps}: {', '.join(parts)}; {remedy}"

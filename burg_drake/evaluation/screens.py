@@ -12,15 +12,16 @@ import numpy as np
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decision, Screen
+from burg_drake.evaluation.judge import LIFT_HEIGHT, Decision, Screen
 from burg_drake.scene.scene import Scene
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.lift_room import LiftRoom
     from burg_drake.grasping.clearance import HandClearance
     from burg_drake.motion.reach import ArmReach, Reach
     from burg_drake.motion.reach_settings import ReachSettings
-    from burg_drake.simulation.trial_settings import TrialSettings
 
 HAND_BATCH = 512
 """A grasp takes about 0.025 ms in such a batch."""
@@ -28,12 +29,15 @@ ARM_BATCH = 128
 """As many as `ArmReach` judges together."""
 
 
-def hand_screen(clearance: HandClearance, X_WO: Mapping[str, Array]) -> Screen:
+def hand_screen(
+    clearance: HandClearance, X_WO: Mapping[str, Array], room: LiftRoom | None = None
+) -> Screen:
     """The stage `clear`.
 
     Args:
         clearance: of the open hand in the scene.
         X_WO: (4, 4) poses of the free instances by name.
+        room: says how far clear hands can lift, if no later stage does.
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
@@ -44,8 +48,15 @@ def hand_screen(clearance: HandClearance, X_WO: Mapping[str, Array]) -> Screen:
         for instance, chosen in places.items():
             X_WG = placed([grasps[k] for k in chosen], X_WO)
             found = clearance.check_all(instance, X_WG)
-            for k, answer in zip(chosen, found, strict=True):
+            lifts = np.full(len(chosen), np.nan)
+            clear = np.flatnonzero([answer.outcome is None for answer in found])
+            if room is not None and len(clear):
+                width = np.array([grasps[chosen[k]].width for k in clear])
+                lifts[clear] = room.length(instance, X_WG[clear], width)
+            for k, answer, lift in zip(chosen, found, lifts.tolist(), strict=True):
                 margins = {"overlap": answer.overlap, "clearance": answer.clearance}
+                if math.isfinite(lift):
+                    margins[LIFT_HEIGHT] = lift
                 decisions[k] = Decision(answer.outcome, answer.blocker, margins=margins)
         return decisions
 
@@ -67,7 +78,7 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
             placed(grasps, X_WO),
             np.array([grasp.width for grasp in grasps]),
         )
-        return [_decision(answer, motions) for answer in found]
+        return [_decision(answer, motions, reach.motion.lift_height) for answer in found]
 
     return Screen(Stage.REACHABLE, ask, ARM_BATCH)
 
@@ -80,8 +91,10 @@ def placed(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
     return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
 
 
-def _decision(answer: Reach, motions: bool) -> Decision:
+def _decision(answer: Reach, motions: bool, lift: float) -> Decision:
     margins = {"arm_clearance": answer.clearance, "joint_excess": answer.excess}
+    if answer.outcome is None:
+        margins[LIFT_HEIGHT] = lift
     return Decision(
         answer.outcome,
         answer.blocker,
@@ -106,25 +119,22 @@ def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str,
 
 
 def arm_reach(
-    scene: Scene, station: Station, settings: TrialSettings | None = None, *, exact: bool = True
+    scene: Scene, station: Station, motion: GraspMotion, *, exact: bool = True
 ) -> ArmReach:
-    """The arm in the scene, which lifts as far as in a trial.
+    """The arm in the scene.
 
     Args:
         scene, station: where.
-        settings: of the trial; the usual ones if None.
+        motion: of the hand, as in a trial.
         exact: see `ReachSettings`.
     """
     from burg_drake.motion.reach import ArmReach
 
-    return ArmReach(scene, station, settings=arm_settings(settings, exact=exact))
+    return ArmReach(scene, station, settings=arm_settings(motion, exact=exact))
 
 
-def arm_settings(settings: TrialSettings | None = None, *, exact: bool = True) -> ReachSettings:
+def arm_settings(motion: GraspMotion, *, exact: bool = True) -> ReachSettings:
     """How the arm is asked before a trial; see `arm_reach`."""
     from burg_drake.motion.reach_settings import ReachSettings
-    from burg_drake.simulation.trial_settings import DEFAULT_TRIAL
-    from burg_drake.station.grasp_motion import GraspMotion
 
-    motion = (settings or DEFAULT_TRIAL).motion or GraspMotion()
-    return ReachSettings(standoff=motion.standoff, lift_height=motion.lift_height, exact=exact)
+    return ReachSettings(motion=motion, exact=exact)

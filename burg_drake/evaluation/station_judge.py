@@ -3,21 +3,23 @@ and a trial in simulation, of the hand alone or of the whole arm."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decide, Decision, Screen, trial_decision
+from burg_drake.evaluation.judge import LIFT_HEIGHT, Decide, Decision, Screen, trial_decision
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.screens import arm_reach, arm_screen, hand_alone, hand_screen
 from burg_drake.motion.trajectory import Plan
 from burg_drake.motion.witness import Witness
 from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import Engine
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.lift_room import LiftRoom
     from burg_drake.simulation.trial_settings import TrialSettings
 
 
@@ -44,40 +46,63 @@ class StationJudge:
             scene, station: what to build.
             engine: how the trial is stepped.
             mode: what to ask; but for `hand` the station needs an arm.
-            settings: phases of the trial, if not the usual ones.
+            settings: phases of the trial, if not the usual ones; where they have no motion, it is
+                the station's.
         """
         from burg_drake.simulation.hand_trial import HandTrial
         from burg_drake.simulation.trial_settings import TrialSettings
 
         settings = TrialSettings() if settings is None else settings
+        motion = settings.motion or station.document.motion
+        settings = replace(settings, motion=motion)
         self.plan: Plan | None = None
         if mode == "arm":
-            self._build_arm_trial(scene, station, engine, settings)
+            self._build_arm_trial(scene, station, engine, settings, motion)
             return
         self._hand = HandTrial(scene, station, engine=engine, settings=settings)
         X_WO = {name: self._hand.diagram.X_WO(name) for name in scene.instances}
-        self.screens: list[Screen] = [hand_screen(self._hand.clearance, X_WO)]
+        self.screens: list[Screen] = [
+            hand_screen(self._hand.clearance, X_WO, self._room(scene, station, motion, mode))
+        ]
         self.stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._execute)]
         if mode == "reach":
-            self.screens.append(arm_screen(arm_reach(scene, station, settings), X_WO))
+            self.screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
 
     def _build_arm_trial(
-        self, scene: Scene, station: Station, engine: Engine, settings: TrialSettings
+        self,
+        scene: Scene,
+        station: Station,
+        engine: Engine,
+        settings: TrialSettings,
+        motion: GraspMotion,
     ) -> None:
         from burg_drake.motion.plan import Planner
         from burg_drake.simulation.arm_trial import ArmTrial
 
         hand, X_WO = hand_alone(scene, station)
-        reach = arm_reach(scene, station, settings)
+        reach = arm_reach(scene, station, motion)
         self._planner = Planner(reach)
         self._arm = ArmTrial(scene, station, engine=engine, settings=settings, clearance=hand)
         self.screens = [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)]
         self.stages = [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute_by_arm)]
 
+    @staticmethod
+    def _room(scene: Scene, station: Station, motion: GraspMotion, mode: Mode) -> LiftRoom | None:
+        """What says how far the hand can lift, where the arm is not asked and it may be less."""
+        from burg_drake.evaluation.lift_room import LiftRoom
+
+        if mode == "hand" and motion.least < motion.lift_height:
+            return LiftRoom(scene, station, motion)
+        return None
+
     def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
-        return trial_decision(
-            self._hand.run(grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass)
+        lift = self._hand.motion.lift_height if grasp.lift is None else grasp.lift
+        decision = trial_decision(
+            self._hand.run(
+                grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
+            )
         )
+        return replace(decision, margins={**decision.margins, LIFT_HEIGHT: lift})
 
     def _time(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
         assert isinstance(motion, Witness)
@@ -102,6 +127,15 @@ class StationJudgeFactory:
     station: Station
     engine: Engine
     mode: Mode
+    motion: GraspMotion | None = None
 
     def __call__(self) -> StationJudge:
-        return StationJudge(self.scene, self.station, engine=self.engine, mode=self.mode)
+        from burg_drake.simulation.trial_settings import TrialSettings
+
+        return StationJudge(
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=TrialSettings(motion=self.motion),
+        )

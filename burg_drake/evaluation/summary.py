@@ -10,9 +10,12 @@ import numpy as np
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.evaluation.judge import LIFT_HEIGHT
 from burg_drake.evaluation.mode import Mode
+from burg_drake.evaluation.motion_numbers import motion_in
 from burg_drake.evaluation.run_notes import run_notes
 from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.short_lifts import ShortLifts, short_lifts
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 from burg_drake.evaluation.trial import PUSHED
 
@@ -156,6 +159,7 @@ class Summary:
         costs: by stage, sampling first.
         mode: what was asked about each grasp.
         pushes: what the arm's approaches pushed; None where no arm executed anything.
+        lifts: where there is no room for the whole lift; None if there is wherever there is any.
         notes: what is missing, and why, one sentence each; see `run_notes`.
     """
 
@@ -164,6 +168,7 @@ class Summary:
     costs: tuple[StageCost, ...]
     mode: Mode
     pushes: Pushes | None = None
+    lifts: ShortLifts | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -186,6 +191,7 @@ def summarize(run: Run) -> Summary:
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(columns),
+        lifts=short_lifts(columns[LIFT_HEIGHT], motion_in(document.trial).lift_height),
         notes=run_notes(run),
     )
 

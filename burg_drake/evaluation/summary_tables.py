@@ -34,8 +34,9 @@ class SummaryView:
             yield Text("\n".join(f"note: {note}" for note in self.summary.notes) + "\n")
         yield matrix if fits else _outcome_list(self.summary)
         yield ""
-        if self.summary.pushes is not None:
-            yield f"{self.summary.pushes}\n"
+        for found in (self.summary.lifts, self.summary.pushes):
+            if found is not None:
+                yield f"{found}\n"
         yield _cost_table(self.summary)
         yield ""
 

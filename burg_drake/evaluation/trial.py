@@ -14,7 +14,7 @@ from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.frames import Array, check_pose
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import MARGINS, Verdict
+from burg_drake.evaluation.judge import LIFT_HEIGHT, MARGINS, Verdict
 from burg_drake.evaluation.origin import ORIGIN_TEXT
 
 Name = TypeVar("Name", bound=StrEnum)
@@ -56,10 +56,23 @@ class Trial:
     verdict: Verdict | None = None
 
     @property
+    def lift(self) -> float | None:
+        """Length of the lift that was executed, in place of the motion's [m]; None if it is not
+        known, which it is not of older releases."""
+        height = math.nan if self.verdict is None else self.verdict.margins.get(LIFT_HEIGHT)
+        return None if height is None or math.isnan(height) else height
+
+    @property
     def candidate(self) -> Candidate:
         """What a judge has to know."""
         return Candidate(
-            self.id, self.instance, self.X_OG, self.friction, self.mass, width=self.width
+            self.id,
+            self.instance,
+            self.X_OG,
+            self.friction,
+            self.mass,
+            width=self.width,
+            lift=self.lift,
         )
 
 

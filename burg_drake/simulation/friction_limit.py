@@ -44,6 +44,7 @@ def friction_limit(
     X_OG: Array,
     *,
     mass: float | None = None,
+    lift: float | None = None,
     settings: FrictionSettings = FrictionSettings(),
 ) -> float:
     """Looks for the smallest coefficient between target and pads with which a grasp lifts.
@@ -56,6 +57,7 @@ def friction_limit(
         instance: the target.
         X_OG: (4, 4) grasp in the target's frame.
         mass: of the target in place of the library's [kg].
+        lift: length of the lift in place of the motion's [m].
         settings: which coefficients are tried.
 
     Returns:
@@ -67,7 +69,7 @@ def friction_limit(
     """
 
     def lifts(inverse: float) -> bool:
-        result = trial.run(instance, X_OG, friction=1.0 / inverse, mass=mass)
+        result = trial.run(instance, X_OG, friction=1.0 / inverse, mass=mass, lift=lift)
         return result.outcome is Outcome.LIFTED
 
     largest_inverse = largest_borne(

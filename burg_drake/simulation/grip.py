@@ -171,11 +171,12 @@ def take_grip(
     *,
     friction: float | None = None,
     mass: float | None = None,
+    lift: float | None = None,
 ) -> Grip | TrialResult:
     """Executes a grasp, and takes the hand as it then holds the target.
 
     Args:
-        trial, instance, X_OG, friction, mass: as for `HandTrial.run`.
+        trial, instance, X_OG, friction, mass, lift: as for `HandTrial.run`.
 
     Returns:
         The grip; the trial's result if the target is not held at its end.
@@ -184,5 +185,5 @@ def take_grip(
         InvalidInputError: as `HandTrial.run`.
         RuntimeError, SystemExit: from Drake.
     """
-    result = trial.run(instance, X_OG, friction=friction, mass=mass)
+    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
     return Grip(trial, instance, friction) if result.outcome.held else result

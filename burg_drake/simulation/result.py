@@ -22,8 +22,8 @@ class Margins:
         tilt: how far the target turned in the hand since the grip [rad].
         pad_force: normal force of the weaker pad [N], along the closing direction.
         patch_area: area on which the pad with the smaller contact patch touches the target [m^2].
-        lift: how far the target's centre of mass rose [m]; of a trial that was decided on the way
-            up, with the way that the hand had left.
+        lift: how far the target's centre of mass rose, or went along the straight ways of another
+            motion [m]; of a trial that was decided on the way, with what the hand had left of it.
         others_moved: largest displacement of the centre of mass of any other object since the start
             [m].
         end_time: simulated time at which the outcome was decided [s].

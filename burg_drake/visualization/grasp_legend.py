@@ -22,7 +22,10 @@ from burg_drake.visualization.grasp_view import grasp_path
 from burg_drake.visualization.legend import ColorBar, LegendEntry
 
 UNITS = {
-    "m": ("width", "clearance", "overlap", "slip", "lift", "others_moved", "contact_offset"),
+    "m": (
+        *("width", "clearance", "overlap", "slip", "lift", "lift_height", "others_moved"),
+        "contact_offset",
+    ),
     "rad": ("tilt", "antipodal_angle"),
     "N": ("pad_force",),
     "m²": ("patch_area",),

@@ -14,6 +14,7 @@ from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import (
     ARM_SCREEN_MARGINS,
+    LIFT_HEIGHT,
     MARGINS,
     Decision,
     Screen,
@@ -184,4 +185,4 @@ def test_margins_are_those_of_the_trial() -> None:
     from burg_drake.simulation.result import Margins
 
     of_trials = {field.name for field in fields(Margins)}
-    assert of_trials == {*MARGINS} - {*ARM_SCREEN_MARGINS, "duration"}
+    assert of_trials == {*MARGINS} - {*ARM_SCREEN_MARGINS, "duration", LIFT_HEIGHT}

@@ -8,8 +8,10 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.origin import Origin, engine_label, read_origin
+from burg_drake.evaluation.run_document import numbers
 from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.engine import ENGINES, Engine
+from burg_drake.station.grasp_motion import GraspMotion
 
 CUSTOM = Engine(
     name="mine",
@@ -52,7 +54,35 @@ def test_cells_give_back_the_origin(engine: Engine) -> None:
 
 def test_settings_are_those_of_the_trial_and_defaults_where_none_were_recorded() -> None:
     settings = origin(CUSTOM).settings()
-    assert settings == TrialSettings(lift_height=0.1 + 0.2, disturbance=1e-7)
+    motion = GraspMotion(lift_height=0.1 + 0.2)
+    assert settings == TrialSettings(motion=motion, disturbance=1e-7)
+
+
+def test_the_motion_comes_back_bit_for_bit() -> None:
+    motion = GraspMotion(
+        standoff=0.07,
+        retreat=1 / 30,
+        lift_height=0.1 + 0.2,
+        least_lift=0.02,
+        lift_direction=(0.3, 0, 2),
+    )
+    there = dataclasses.replace(origin(CUSTOM), trial=numbers(TrialSettings(motion=motion)))
+    settings = read_origin(row(there), "here").settings()
+    assert settings == TrialSettings(motion=motion)
+    assert settings.motion is not None and settings.motion.lift_direction == (0.3, 0.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("trial", "message"),
+    [
+        ({"lift_height": 0.1, "least_lift": 0.2}, "here: .*least_lift is 0.2 m, more than lift_he"),
+        ({"lift_direction_1": 0.0}, "'lift_direction_1' is no setting of this release"),
+        ({f"lift_direction_{k}": 0.0 for k in (1, 2, 3)}, "here: .*has no length"),
+    ],
+)
+def test_motions_that_no_hand_can_make(trial: dict[str, float], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        dataclasses.replace(origin(CUSTOM), trial=trial).settings("here")
 
 
 def test_an_engine_that_only_shares_the_name_of_a_preset_is_marked() -> None:

@@ -36,6 +36,7 @@ def objects_section(summary: Summary) -> Html:
         table(head, rows, numbers=(1, 3)),
         legend([(STYLES[g.name], g.name) for g in present]),
         *(element("p", note, class_="notice") for note in summary.notes),
+        *([element("p", str(summary.lifts))] if summary.lifts else []),
     )
 
 

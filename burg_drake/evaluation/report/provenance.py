@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 
 from burg_drake.core.figures import duration
+from burg_drake.core.schema import load_document
+from burg_drake.evaluation.motion_numbers import (
+    motion_in,
+    motion_options,
+    motion_text,
+    without_motion,
+)
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.markup import Html, command, element, join
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
-from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
+from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, STATION_FILE, Run
 from burg_drake.station.engine import ENGINES, Engine
+from burg_drake.station.station import StationDocument
 
 
 def provenance(run: Run) -> Html:
@@ -46,6 +55,11 @@ def reproduce_command(run: Run) -> str:
         words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
         words += ["--blind"] if document.grasps.blind else []
         words += [word for name in document.grasps.only for word in ("--only", name)]
+    usual = load_document(run.path / STATION_FILE, StationDocument).motion
+    motion = motion_in(document.trial)
+    if document.mode == "hand":  # which does not begin before the grasp
+        motion = replace(motion, standoff=usual.standoff)
+    words += motion_options(motion, usual)
     words += ["--engine", document.engine.name, "--seed", str(document.seed)]
     words += [] if document.table == "csv" else ["--table", document.table]
     return shlex.join([*words, "-o", str(run.path)])
@@ -80,9 +94,10 @@ def _settings(document: RunDocument) -> list[tuple[str, str]]:
     engine = document.engine
     return [
         ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
-        ("trial", _listed(document.trial)),
+        ("motion", motion_text(motion_in(document.trial))),
+        ("trial", _listed(without_motion(document.trial))),
         ("mode", document.mode),
-        ("arm", _listed(document.arm) if document.arm else "not asked"),
+        ("arm", _listed(without_motion(document.arm)) if document.arm else "not asked"),
         ("seed", str(document.seed)),
         ("run", f"{document.hash} (all of the above; column run of the table)"),
         *document.versions.items(),

@@ -1,0 +1,56 @@
+"""The options of the hand's motion: what they mean, and what is refused in one line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from burg_drake.apps.arguments import Parser
+from burg_drake.apps.cli import main
+from burg_drake.apps.motion_options import LONGEST_MM, add_motion, chosen_motion
+from burg_drake.station.grasp_motion import RANGES, GraspMotion
+from burg_drake.station.station import load_station
+
+
+def test_lengths_are_those_of_a_document() -> None:
+    assert {name: (0.0, most / 1000.0) for name, most in LONGEST_MM.items()} == RANGES
+
+
+def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -> None:
+    station = load_station("panda_tabletop")
+    own = GraspMotion(retreat=0.05, least_lift=0.02)
+    station = replace(station, document=replace(station.document, motion=own))
+    parser = Parser()
+    add_motion(parser)
+    assert chosen_motion(parser.parse_args([]), station) == own
+    words = ["--retreat-mm", "0", "--lift-mm", "150", "--lift-direction", "0", "1", "1"]
+    assert chosen_motion(parser.parse_args(words), station) == GraspMotion(
+        retreat=0.0, lift_height=0.15, least_lift=0.02, lift_direction=(0.0, 1.0, 1.0)
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "reach --lift-mm 10 --least-lift-mm 20",
+            "--lift-mm, --least-lift-mm: least_lift is 0.02 m",
+        ),
+        ("reach --lift-mm 0", "--lift-mm: retreat and lift together may be as short as 0 mm"),
+        ("reach --lift-direction 0 0 0", "--lift-direction: lift_direction [0.0, 0.0, 0.0] has no"),
+        ("evaluate --retreat-mm -1", "--retreat-mm: -1 is not a length from 0 to 1000 mm"),
+        ("evaluate --lift-mm 9000", "--lift-mm: 9000 is not a length from 0 to 2000 mm"),
+        ("evaluate --lift-direction 0 0", "--lift-direction: expected 3 arguments"),
+        ("evaluate --mode hand --standoff-mm 50", "--standoff-mm is about the arm's way to the"),
+    ],
+)
+def test_what_no_hand_can_do_is_one_line(words: str, message: str, capsys) -> None:
+    verb, *options = words.split()
+    try:
+        code = main([verb, "tabletop_six", *options])
+    except SystemExit as ended:  # of the parser
+        code = ended.code
+    error = capsys.readouterr().err
+    assert code == 2
+    assert message in error and error.count("\n") == 1

@@ -1,0 +1,68 @@
+"""A run with a motion of its own: what it records, and that a row alone repeats it."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.journal import read_journal
+from burg_drake.evaluation.origin import read_origin
+from burg_drake.evaluation.report.provenance import reproduce_command
+from burg_drake.evaluation.rerun import differences, rerun
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.table import table_row
+from burg_drake.evaluation.table_file import read_table
+from burg_drake.evaluation.trial import read_trial
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.station.station import load_station
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+MOTION = GraspMotion(retreat=0.02, lift_height=0.06, lift_direction=(0.0, -0.6, 0.8))
+GRASPS = GraspSet.create(ABOVE[None], object="box", width=0.06)
+
+
+def judged(folder: Path, motion: GraspMotion | None) -> Run:
+    return evaluate(
+        "tabletop_six", "panda_tabletop", folder,
+        grasps=GRASPS, workers=1, mode="hand", motion=motion, progress=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return judged(tmp_path_factory.mktemp("motion") / "run", MOTION)
+
+
+def test_a_row_tells_the_motion_and_repeats_the_trial(run: Run) -> None:
+    row = table_row(read_table(run.table_path), 0)
+    assert row["outcome"] == Outcome.LIFTED
+    assert row["lift_height"] == 0.06
+    assert row["lift"] == pytest.approx(0.08, abs=0.001)
+    trial, origin = read_trial(row, "row"), read_origin(row, "row")
+    assert origin.settings().motion == MOTION
+    verdict, _ = rerun(load_scene("tabletop_six"), load_station("panda_tabletop"), trial, origin)
+    assert trial.verdict is not None and not differences(trial.verdict, verdict)
+
+
+def test_another_motion_is_another_run(run: Run) -> None:
+    with pytest.raises(InvalidInputError, match=r"motion is standoff 100 mm, retreat 20 .* here"):
+        judged(run.path, None)
+    assert judged(run.path, MOTION).complete
+    assert len(read_journal(run.path / "journal.jsonl")) == 1
+
+
+def test_the_report_says_how_to_ask_for_it_again(run: Run) -> None:
+    words = shlex.split(reproduce_command(run))
+    at = words.index("--retreat-mm")
+    assert words[at : at + 4] == ["--retreat-mm", "20", "--lift-mm", "60"]
+    np.testing.assert_array_equal([float(w) for w in words[at + 5 : at + 8]], MOTION.lift_direction)
