@@ -2,8 +2,8 @@
 
 No collision checker, no filters and no bounds of `burg_drake.motion`: a simulation's diagram with
 free objects, positions that are set one after the other, and Drake's penetration query. The target
-moves with the hand on the lift, and is looked at as all else is. Of concave objects Drake sees
-the convex pieces, as their hulls would keep fingers out of a mug.
+moves with the hand on retreat and lift, and is looked at as all else is. Of concave objects Drake
+sees the convex pieces, as their hulls would keep fingers out of a mug.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Fault:
     """Two bodies that overlap in an audited motion.
 
     Attributes:
-        part: `transfer`, `approach` or `lift`.
+        part: `transfer`, `approach`, `retreat` or `lift`.
         share: how far along it, from 0 to 1.
         bodies: their names.
         depth: of the overlap; more than at rest, where they touch there [m].
@@ -71,22 +71,24 @@ class Audit:
     ) -> list[Fault]:
         """What overlaps, for each configuration that is looked at.
 
-        On the lift, hand and target may. What stands still is not held against each other.
+        On retreat and lift, hand and target may. What stands still is not held against each other.
 
         Args:
             instance: the target; "" if there is none.
             witness: the motion.
-            width: distance between the pads on the lift [m]; NaN for the open hand.
+            width: distance between the pads on retreat and lift [m]; NaN for the open hand.
             step: between two configurations; a radian of each joint counts as one metre, which is
                 longer than the arm [m].
         """
         parts = {"transfer": witness.transfer, "approach": witness.approach, "lift": witness.lift}
+        if witness.retreat is not None:
+            parts = {**parts, "retreat": witness.retreat}
         target = self._built.free.get(instance)
         X_WO = RigidTransform(self._built.X_WO(instance)) if instance else RigidTransform()
-        X_HO = self._X_WH(witness.lift[0]).inverse() @ X_WO
+        X_HO = self._X_WH(witness.approach[-1]).inverse() @ X_WO
         found = []
         for part, rows in parts.items():
-            held = target if part == "lift" else None
+            held = target if part in ("retreat", "lift") else None
             self._set_fingers(np.nan if held is None else width)
             for share, q in between(rows, step):
                 X_WH = self._X_WH(q)

@@ -80,7 +80,7 @@ class World:
     def is_free(self, q: Array, instance: str = "", way: float = 0.0) -> bool:
         """Whether the arm is free there, with the target in the hand above the grasp."""
         carried = instance if way > 0.0 else None
-        return self.collision.is_free(q, carried=carried, rise=max(0.0, way))
+        return self.collision.is_free(q, carried=carried, moved_W=(0.0, 0.0, max(0.0, way)))
 
     def is_free_straight(self, q: Array, q_after: Array) -> bool:
         """Whether a straight motion without target is free."""

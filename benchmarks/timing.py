@@ -197,7 +197,7 @@ def collides(planner: Planner, instance: str, plan: Plan) -> bool:
     z = arm.forward(q)[0][:, :3, 3] @ X_WA[2, :3]
     rises = np.maximum(0.0, z - z[0])
     return not all(
-        collision.is_free(row, carried=instance, rise=float(rise))
+        collision.is_free(row, carried=instance, moved_W=(0.0, 0.0, float(rise)))
         for row, rise in zip(q, rises, strict=True)
     )
 

@@ -30,8 +30,10 @@ class Outcome(StrEnum):
     """The open hand overlaps a fixed body of the scene or station."""
     HAND_COLLISION_APPROACH = "hand_collision_approach"
     """On the straight way from pregrasp to grasp the open hand overlaps something."""
+    HAND_COLLISION_RETREAT = "hand_collision_retreat"
+    """On the straight way back the hand, or the target in it, overlaps something."""
     HAND_COLLISION_LIFT = "hand_collision_lift"
-    """On the straight way up the hand, or the target in it, overlaps something."""
+    """On the lift the hand, or the target in it, overlaps something."""
     NO_IK = "no_ik"
     """No arm configuration puts the hand at the grasp and at the pregrasp, whatever the joint
     limits."""
@@ -42,8 +44,10 @@ class Outcome(StrEnum):
     APPROACH_LINE = "approach_line"
     """Grasp and pregrasp are reached, but the arm cannot take the hand straight from one to the
     other."""
+    RETREAT_LINE = "retreat_line"
+    """The arm cannot take the hand straight back from the grasp."""
     LIFT_LINE = "lift_line"
-    """The arm cannot take the hand straight up from the grasp."""
+    """The arm cannot take the hand along the lift."""
     NO_PATH = "no_path"
     """No collision-free path from the home posture to a pregrasp was found."""
     NO_CONTACT = "no_contact"
@@ -86,13 +90,20 @@ class Outcome(StrEnum):
 
 _REACHABLE = (
     Outcome.HAND_COLLISION_APPROACH,
+    Outcome.HAND_COLLISION_RETREAT,
     Outcome.HAND_COLLISION_LIFT,
     Outcome.NO_IK,
     Outcome.JOINT_LIMIT,
     Outcome.ARM_COLLISION,
 )
 """Whether the hand can come to a grasp and away, and the arm be there."""
-_PLANNED = (Outcome.APPROACH_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH, Outcome.REACHABLE)
-"""Whether the arm can move there, straight in and straight up."""
+_PLANNED = (
+    Outcome.APPROACH_LINE,
+    Outcome.RETREAT_LINE,
+    Outcome.LIFT_LINE,
+    Outcome.NO_PATH,
+    Outcome.REACHABLE,
+)
+"""Whether the arm can move there, straight in, back and up."""
 UNTRIED = ("", Outcome.REACHABLE.value)
 """Texts in a column of outcomes that tell nothing of a trial."""

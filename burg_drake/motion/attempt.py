@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
-from burg_drake.motion.collision import ArmCollision, Overlap
+from burg_drake.motion.collision import STILL, ArmCollision, Overlap
 from burg_drake.motion.edges import Edges
 from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.line_search import Chain, Failure, Lines
@@ -18,7 +19,12 @@ from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.verdict import Reach
 from burg_drake.motion.witness import Witness
 
-PROGRESS = (Outcome.ARM_COLLISION, Outcome.APPROACH_LINE, Outcome.LIFT_LINE)
+PROGRESS = (
+    Outcome.ARM_COLLISION,
+    Outcome.APPROACH_LINE,
+    Outcome.RETREAT_LINE,
+    Outcome.LIFT_LINE,
+)
 """Outcomes by how far a motion got."""
 
 
@@ -115,18 +121,20 @@ class Attempt:
             return None
         doubtful = np.flatnonzero(chain.lower <= 0.0)
         for row in doubtful[np.argsort(chain.lower[doubtful], kind="stable")]:
-            carried, rise, width = self._load(grasp, chain, row)
-            free = self._collision.is_free(chain.q[row], carried=carried, rise=rise, width=width)
-            if not free:
+            carried, moved_W, width = self._load(grasp, chain.moved_W[row])
+            if not self._collision.is_free(
+                chain.q[row], carried=carried, moved_W=moved_W, width=width
+            ):
                 return int(row)
         return None
 
-    def _load(self, grasp: int, chain: Chain, row: int) -> tuple[str | None, float, float]:
-        """What the hand carries at a row, how far that has risen [m], and its width [m]."""
-        rise = float(chain.rise[row])
-        name = self._task.instance[grasp] if rise > 0.0 else ""
-        width = float(self._task.width[grasp]) if rise > 0.0 else np.nan
-        return (name, rise, width) if name else (None, 0.0, width)
+    def _load(self, grasp: int, moved_W: Array) -> tuple[str | None, ArrayLike, float]:
+        """What the hand carries once it has moved the target by (3,) [m], how far that has been
+        moved, and its width [m]."""
+        held = bool(moved_W.any())
+        name = self._task.instance[grasp] if held else ""
+        width = float(self._task.width[grasp]) if held else np.nan
+        return (name, moved_W, width) if name else (None, STILL, width)
 
     def _first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
         """Rows at, or just before, which the arm collides on the approach, or on the lift."""
@@ -138,7 +146,7 @@ class Attempt:
             [chain.q[rows[grasp]] for grasp, chain in chains.items()],
             hand=False,
             carried=[(self._task.instance[grasp] or None) if lift else None for grasp in chains],
-            rise=[chain.rise[rows[grasp]] for grasp, chain in chains.items()],
+            moved_W=[chain.moved_W[rows[grasp]] for grasp, chain in chains.items()],
             width=[float(self._task.width[grasp]) if lift else np.nan for grasp in chains],
             lower=[chain.lower[rows[grasp]] for grasp, chain in chains.items()],
         )
@@ -151,8 +159,10 @@ class Attempt:
         """Puts a chain out; where what collides is rigid with the hand, no other posture helps,
         and all of this way to put the fingers goes with it."""
         self._refused[grasp] += 1
-        carried, rise, width = self._load(grasp, chain, row)
-        overlaps = self._collision.overlaps(chain.q[row], carried=carried, rise=rise, width=width)
+        carried, moved_W, width = self._load(grasp, chain.moved_W[row])
+        overlaps = self._collision.overlaps(
+            chain.q[row], carried=carried, moved_W=moved_W, width=width
+        )
         with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
         if with_hand is not None:
             self._lines.close(grasp, chain.way)
@@ -161,7 +171,7 @@ class Attempt:
         if row in (0, chain.at_grasp) or with_hand is not None:
             outcome = Outcome.ARM_COLLISION
         else:
-            outcome = PROGRESS[1 + (row > chain.at_grasp)]
+            outcome = PROGRESS[1 + (row > chain.at_grasp) + (row > chain.at_retreated)]
         refusal = Refusal(outcome, with_hand or next(iter(overlaps), None))
         if grasp not in self._nearest or refusal.rank > self._nearest[grasp].rank:
             self._nearest[grasp] = refusal
@@ -177,12 +187,14 @@ class Attempt:
                 self._lines.refuse(grasp, chain, None)
                 self._unconnected[grasp] += 1
                 continue
-            at, hand = chain.at_grasp, float(self._task.clearance[grasp, chain.way])
+            at, corner = chain.at_grasp, chain.at_retreated
+            hand = float(self._task.clearance[grasp, chain.way])
             witness = Witness(
                 X_WG=self._task.X_WG[grasp, chain.way],
                 transfer=transfer,
                 approach=chain.q[: at + 1],
-                lift=chain.q[at:],
+                retreat=chain.q[at : corner + 1] if corner > at else None,
+                lift=chain.q[corner:],
                 clearance=hand,
             )
             clearance = max(0.0, min(hand, float(chain.lower.min())))
@@ -196,22 +208,17 @@ class Attempt:
         failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
         if refusal is not None and refusal.rank[0] >= _progress(failure.outcome):
             return _because(refusal.outcome, refusal.overlap)
-        least = self._least(self._task.instance[grasp], float(self._task.width[grasp]), failure)
+        least = self._least(grasp, failure)
         if least is None:
             return Reach(failure.outcome, excess=failure.excess)
         return _because(failure.outcome, least)
 
-    def _least(self, instance: str, width: float, failure: Failure) -> Overlap | None:
+    def _least(self, grasp: int, failure: Failure) -> Overlap | None:
         """What is in the way, of the configuration where that is least."""
         least: Overlap | None = None
-        for q, rise in zip(failure.q, failure.rise, strict=True):
-            carried = instance if rise > 0.0 else ""
-            overlaps = self._collision.overlaps(
-                q,
-                carried=carried or None,
-                rise=float(rise) if carried else 0.0,
-                width=width if rise > 0.0 else np.nan,
-            )
+        for q, place in zip(failure.q, failure.moved_W, strict=True):
+            carried, moved_W, width = self._load(grasp, place)
+            overlaps = self._collision.overlaps(q, carried=carried, moved_W=moved_W, width=width)
             if overlaps and (least is None or overlaps[0].depth < least.depth):
                 least = overlaps[0]
         return least

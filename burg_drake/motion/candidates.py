@@ -12,8 +12,8 @@ from burg_drake.core.frames import Array
 
 Indices = NDArray[np.intp]
 
-GRASP, APPROACH, LIFT, WHOLE = range(4)
-"""Where a candidate ended: at the grasp, on the way there, on the way up, or not at all."""
+GRASP, APPROACH, RETREAT, LIFT, WHOLE = range(5)
+"""Where a candidate ended: at the grasp, on the way there, back, or up, or not at all."""
 SAME = 0.05
 """Postures whose joints differ by no more than this are taken for the same [rad or m]."""
 
@@ -35,7 +35,7 @@ class Candidates:
     stage: Indices
     cost: Array
     open: NDArray[np.bool_]
-    _blocked: list[tuple[int, float, Array, float]] = field(default_factory=list)
+    _blocked: list[tuple[int, float, Array, Array]] = field(default_factory=list)
     _closed: set[int] = field(default_factory=set)
 
     @classmethod
@@ -84,18 +84,18 @@ class Candidates:
         """A candidate ends at a stage, as its continuation does not exist."""
         self.stage[k], self.open[k] = stage, False
 
-    def block(self, k: int, stage: int, q: Array, rise: float, upper: float) -> None:
+    def block(self, k: int, stage: int, q: Array, moved_W: Array, upper: float) -> None:
         """A candidate ends at a stage, as it is in collision there.
 
         Args:
             k: its index.
             stage: where it ends.
             q: (n,) the arm positions in collision.
-            rise: how far the target has risen there [m].
+            moved_W: (3,) how far the target has been moved there [m].
             upper: bound of the clearance there [m].
         """
         self.stop(k, stage)
-        self._blocked.append((stage, upper, q.copy(), rise))
+        self._blocked.append((stage, upper, q.copy(), moved_W))
 
     def close(self, way: int) -> None:
         """Proposes nothing any more with the fingers in one way."""
@@ -109,7 +109,7 @@ class Candidates:
 
     def in_the_way(self, stage: int, count: int) -> tuple[Array, Array]:
         """Arm positions (K, n) in collision at a stage, the nearest to being free first, and how
-        far the target has risen there (K,) [m]; K is at most `count`."""
+        far the target has been moved there (K, 3) [m]; K is at most `count`."""
         of = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]
         q = np.array([b[2] for b in of]).reshape(len(of), self.q.shape[-1])
-        return q, np.array([b[3] for b in of])
+        return q, np.array([b[3] for b in of]).reshape(len(of), 3)

@@ -36,6 +36,11 @@ either side of it."""
 class ClosedFormLines(PostureGrids):
     """Looks for chains of a Panda in a scene; for the arguments see `PostureGrids`."""
 
+    def lifted(self, height: float) -> ClosedFormLines:
+        """See `LineSearch`."""
+        lines = replace(self.lines, lift=height)
+        return ClosedFormLines(self.ik, lines, self.proximity, self.home, self.settings)
+
     def begin(self, X_AG: Array, clearance: Array) -> _Lines:
         """See `LineSearch`."""
         return _Lines(self, X_AG, clearance)
@@ -218,7 +223,8 @@ class _Lines:
             way=found.place.way,
             q=rows.q[own],
             at_grasp=int(np.searchsorted(layer, self._search.at_grasp)),
-            rise=np.maximum(length, 0.0),
+            at_retreated=int(np.searchsorted(layer, self._search.lines.at_retreated)),
+            moved_W=self._search.lines.carried(self._X_AG[grasp, found.place.way], length),
             lower=lower[own],
             place=found,
         )

@@ -8,18 +8,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.common import Parallelism
 from pydrake.geometry import GeometryId, SceneGraphInspector
 from pydrake.multibody.tree import BodyIndex
 from pydrake.planning import SceneGraphCollisionChecker
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.motion.anchored import anchor
-from burg_drake.station.diagram import RISE, StationDiagram
+from burg_drake.motion.carried import Carried, Shifts
+from burg_drake.station.diagram import StationDiagram
 
 EDGE_STEP = 0.05
 """Distance between the checked configurations of an edge [rad]."""
+
+STILL = (0.0, 0.0, 0.0)
 
 FILTERED = 1
 """A pair that does not collide, in the filter matrix of Drake's `CollisionChecker`."""
@@ -91,8 +95,8 @@ class ArmCollision:
             (plant.GetJointByName(finger.joint, hand).position_start(), finger)
             for finger in station_diagram.station.hand.fingers
         ]
-        self._rise = _rise_positions(station_diagram)
-        self._carrying: dict[str, SceneGraphCollisionChecker] = {}
+        self._carried = Carried(station_diagram)
+        self._carrying: dict[str, tuple[SceneGraphCollisionChecker, Shifts]] = {}
         self._anchored: dict[GeometryId, BodyIndex] = {}
         self._in_base = self._overlapping_base()
         hand = plant.GetModelInstanceByName("hand")
@@ -101,8 +105,9 @@ class ArmCollision:
         fingers = self._in_hand - {body.index()}  # which may be asked about closed, too
         self._apart = tuple(pair for pair in apart if not fingers & {*pair})
         self._empty_handed = self._answering()
+        self._shifts = self._carried.shifted(self.checker)
         self._names = station_diagram.body_names
-        self._carried = _carried(station_diagram)
+        self._with_hand = _with_hand(station_diagram)
 
     def configuration(
         self,
@@ -121,7 +126,6 @@ class ArmCollision:
 
         Raises:
             UnknownNameError: there is no such instance.
-            InvalidInputError: a rise of nothing.
         """
         positions = self._default.copy()
         positions[self._index] = q
@@ -131,9 +135,7 @@ class ArmCollision:
             for index, finger in self._fingers:
                 positions[index] = finger.open + closed * (finger.closed - finger.open)
         if carried:
-            positions[self._rise_of(carried)] = rise
-        elif rise != 0.0:
-            raise InvalidInputError(f"rise is {rise} m, but nothing is carried; give `carried`")
+            positions[self._carried.height(carried)] = rise
         return positions
 
     def is_free(
@@ -141,7 +143,7 @@ class ArmCollision:
         q: Array,
         *,
         carried: str | None = None,
-        rise: float = 0.0,
+        moved_W: ArrayLike = STILL,
         width: float = np.nan,
     ) -> bool:
         """Drake's verdict on arm positions `q` (n,).
@@ -151,31 +153,38 @@ class ArmCollision:
             carried: the instance that the hand holds; None or "" if it is empty. It counts as an
                 obstacle to the arm's links, but not to the hand and its fingers; against the scene
                 no object counts.
-            rise: how far that instance is above its place [m]; all others are at theirs.
+            moved_W: (3,) how far that instance is from its place [m]; all others are at theirs.
             width: distance between the pads [m]; the hand is open if that is NaN.
 
         Raises:
             UnknownNameError: there is no such instance.
-            InvalidInputError: a rise of nothing.
+            InvalidInputError: nothing is carried, and has been moved.
         """
-        configuration = self.configuration(q, carried, rise, width)
-        return bool(self._checker(carried).CheckConfigCollisionFree(configuration))
+        moved = _checked(carried, moved_W)
+        configuration = self.configuration(q, carried, moved[2], width)
+        if not carried:
+            return bool(self._empty_handed.CheckConfigCollisionFree(configuration))
+        checker, shifts = self._checker(carried)
+        shifts.put(carried, moved[:2])
+        return bool(checker.CheckConfigCollisionFree(configuration))
 
     def overlaps(
         self,
         q: Array,
         *,
         carried: str | None = None,
-        rise: float = 0.0,
+        moved_W: ArrayLike = STILL,
         width: float = np.nan,
     ) -> list[Overlap]:
         """What collides, the deepest overlap first; empty if free. See `is_free`.
 
         It is seldom asked with something carried, and needs no clone for it.
         """
-        configuration = self.configuration(q, carried, rise, width)
+        moved = _checked(carried, moved_W)
+        configuration = self.configuration(q, carried, moved[2], width)
         held = self._diagram.free[carried] if carried else None
         checker = self.checker if carried else self._empty_handed
+        self._shifts.put(carried or "", moved[:2])
         checker.UpdatePositions(configuration)
         query = checker.model_context().GetQueryObject()  # with the checker's filters
         depths: dict[tuple[BodyIndex, BodyIndex], float] = {}
@@ -184,23 +193,15 @@ class ArmCollision:
             if held in (a, b) and self._in_hand & {a, b}:
                 continue
             depths[a, b] = max(depths.get((a, b), 0.0), pair.depth)
+        self._shifts.put("", STILL[:2])
         found = [self._overlap(a, b, depth) for (a, b), depth in depths.items()]
         return sorted(found, key=lambda o: (-o.depth, str(o)))
 
-    def _rise_of(self, carried: str) -> int:
-        if carried not in self._rise:
-            known = tuple(self._rise)
-            raise UnknownNameError(
-                f"no instance {carried!r} that can be carried; {nearest(carried, known)}"
-            )
-        return self._rise[carried]
-
-    def _checker(self, carried: str | None) -> SceneGraphCollisionChecker:
+    def _checker(self, carried: str) -> tuple[SceneGraphCollisionChecker, Shifts]:
         """The checker's clone that answers; what is carried is not held against the hand."""
-        if not carried:
-            return self._empty_handed
         if carried not in self._carrying:
-            self._carrying[carried] = self._answering(self._diagram.free[carried])
+            checker = self._answering(self._diagram.free[carried])
+            self._carrying[carried] = checker, self._carried.shifted(checker)
         return self._carrying[carried]
 
     def _answering(self, held: BodyIndex | None = None) -> SceneGraphCollisionChecker:
@@ -239,7 +240,7 @@ class ArmCollision:
         robot = self._diagram.robot_bodies
         if a not in robot or (b in robot and b > a):
             a, b = b, a
-        carried = a in self._carried and b not in robot
+        carried = a in self._with_hand and b not in robot
         return Overlap(self._names[a], self._names[b], depth, carried)
 
 
@@ -255,18 +256,16 @@ def _without_remarks() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _rise_positions(station_diagram: StationDiagram) -> dict[str, int]:
-    """Where in the plant's positions the instances are lifted off; none where they are free."""
-    plant = station_diagram.plant
-    models = {name: plant.get_body(i).model_instance() for name, i in station_diagram.free.items()}
-    return {
-        name: plant.GetJointByName(RISE, model).position_start()
-        for name, model in models.items()
-        if plant.HasJointNamed(RISE, model)
-    }
+def _checked(carried: str | None, moved_W: ArrayLike) -> Array:
+    moved = np.asarray(moved_W, dtype=float)
+    if not carried and moved.any():
+        raise InvalidInputError(
+            f"moved_W is {moved.tolist()} m, but nothing is carried; give `carried`"
+        )
+    return moved
 
 
-def _carried(station_diagram: StationDiagram) -> frozenset[BodyIndex]:
+def _with_hand(station_diagram: StationDiagram) -> frozenset[BodyIndex]:
     """Hand, fingers and the links that are welded to the hand."""
     plant = station_diagram.plant
     hand = plant.GetModelInstanceByName("hand")

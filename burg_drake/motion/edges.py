@@ -12,10 +12,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.frames import Array
-from burg_drake.motion.collision import ArmCollision
+from burg_drake.motion.collision import STILL, ArmCollision
 from burg_drake.motion.edge_screen import FINE, GRAZE, GUESS, Screened, screen_edges
 from burg_drake.motion.proximity import ArmProximity
 
@@ -86,7 +86,7 @@ class Edges:
         *,
         hand: bool = True,
         carried: str | None = None,
-        rise: Array | None = None,
+        moved_W: Array | None = None,
         width: float = np.nan,
     ) -> int | None:
         """Where a polyline in joint space is blocked.
@@ -97,8 +97,8 @@ class Edges:
                 the hand has been judged otherwise. Drake counts it all the same.
             carried: instance that the hand carries, if any. The fast tier, which sees it where the
                 scene has it, then proves nothing blocked, and Drake alone sees it against the arm.
-            rise: (M,) height of the carried instance over its place at each corner [m]; straight
-                between corners.
+            moved_W: (M, 3) how far the carried instance is from its place at each corner [m];
+                straight between corners.
             width: distance between the pads that carry it [m]; NaN if the hand is open.
 
         Returns:
@@ -109,7 +109,7 @@ class Edges:
             [q],
             hand=hand,
             carried=[carried],
-            rise=None if rise is None else [rise],
+            moved_W=None if moved_W is None else [moved_W],
             width=[width],
         )[0]
 
@@ -119,7 +119,7 @@ class Edges:
         *,
         hand: bool = True,
         carried: Sequence[str | None] | None = None,
-        rise: Sequence[Array] | None = None,
+        moved_W: Sequence[Array] | None = None,
         width: Sequence[float] | None = None,
         lower: Sequence[Array] | None = None,
     ) -> list[int | None]:
@@ -127,7 +127,7 @@ class Edges:
         said of one does not depend on the others.
 
         Args:
-            paths, carried, rise, width: one entry for each.
+            paths, carried, moved_W, width: one entry for each.
             hand: for all.
             lower: lower bounds of the clearance at the corners, if they have been found before,
                 where nothing spoke against them [m].
@@ -136,9 +136,9 @@ class Edges:
             return []
         names = carried or [None] * len(paths)
         corners = [np.asarray(q if len(q) > 1 else [*q, *q], dtype=float) for q in paths]
-        heights = [np.zeros(len(q)) for q in corners]
-        for height, given in zip(heights, rise or (), strict=False):
-            height[:] = given  # that of a single corner counts at both ends
+        places = [np.zeros((len(q), 3)) for q in corners]
+        for place, given in zip(places, moved_W or (), strict=False):
+            place[:] = given  # that of a single corner counts at both ends
         counts = [len(q) - 1 for q in corners]
         path = np.repeat(np.arange(len(paths)), counts)
         if lower is None and sum(counts) >= SHARED * len(paths):
@@ -162,9 +162,7 @@ class Edges:
         first = np.cumsum([0, *counts])
         widths = [np.nan] * len(paths) if width is None else width
         return [
-            self._first_blocked(
-                screened, int(first[k]), corners[k], names[k], heights[k], widths[k]
-            )
+            self._first_blocked(screened, int(first[k]), corners[k], names[k], places[k], widths[k])
             for k in range(len(paths))
         ]
 
@@ -182,7 +180,7 @@ class Edges:
         first: int,
         q: Array,
         carried: str | None,
-        rise: Array,
+        moved_W: Array,
         width: float,
     ) -> int | None:
         """The verdict on a polyline whose segments begin at the `first` of those screened."""
@@ -193,16 +191,20 @@ class Edges:
         for row, share in _rows(screened, first, len(q) - 1) if self.exact else ():
             edge = row - first
             place = q[edge] + share * (q[edge + 1] - q[edge])
-            height = float(rise[edge] + share * (rise[edge + 1] - rise[edge])) if carried else 0.0
-            if not self._is_free(place, carried, height, width):
+            moved = moved_W[edge] + share * (moved_W[edge + 1] - moved_W[edge])
+            if not self._is_free(place, carried, moved if carried else STILL, width):
                 return edge if share == 0.0 else edge + 1
         return None
 
     def _is_free(
-        self, q: Array, carried: str | None = None, rise: float = 0.0, width: float = np.nan
+        self,
+        q: Array,
+        carried: str | None = None,
+        moved_W: ArrayLike = STILL,
+        width: float = np.nan,
     ) -> bool:
         self.checks += 1
-        return self.collision.is_free(q, carried=carried, rise=rise, width=width)
+        return self.collision.is_free(q, carried=carried, moved_W=moved_W, width=width)
 
 
 def _rows(screened: Screened, first: int, count: int) -> Iterator[tuple[int, float]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
-from burg_drake.motion.candidates import APPROACH, GRASP, LIFT, WHOLE, Indices
+from burg_drake.motion.candidates import APPROACH, GRASP, LIFT, RETREAT, WHOLE, Indices
 from burg_drake.motion.line_poses import LinePoses
 
 Solve = Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]
@@ -46,49 +46,52 @@ class Follower:
 
     Attributes:
         lines: where the hand goes.
-        layers: (L,) lengths from the grasp [m].
-        at_grasp: which of them is the grasp.
         travel: most that a joint may move from one to the next [rad].
         solve: solves for postures.
         measure: measures their clearance.
     """
 
     lines: LinePoses
-    layers: Array
-    at_grasp: int
     travel: float
     solve: Solve
     measure: Measure
 
     def follow(self, X_AG: Array, q: Array) -> Followed:
-        """From the grasp down to the pregrasp, then up to the top.
+        """From the grasp to the pregrasp; then, from the grasp, back and up to the top.
 
         Args:
             X_AG: (S, 4, 4) grasps in the arm's base frame.
             q: (S, n) postures there.
         """
-        count, last = len(self.layers), len(self.layers) - 1
+        count, at_grasp = len(self.lines.layers), self.lines.at_grasp
+        at_retreated = self.lines.at_retreated
         lower, upper = np.full((2, len(q), count), np.inf)
         every = np.full((len(q), count, q.shape[1]), np.nan)
-        every[:, self.at_grasp] = q
+        every[:, at_grasp] = q
         found = Followed(every, lower, upper, np.full(len(q), WHOLE))
-        self._measure(found, [self.at_grasp], GRASP)
-        for stage, end in ((APPROACH, 0), (LIFT, last)):
-            step = -1 if stage == APPROACH else 1
-            poses = range(self.at_grasp + step, end + step, step)
+        self._measure(found, [at_grasp], GRASP)
+        for stage, begin, end in (
+            (APPROACH, at_grasp, 0),
+            (RETREAT, at_grasp, at_retreated),
+            (LIFT, at_retreated, count - 1),
+        ):
+            step = -1 if end < begin else 1
+            poses = range(begin + step, end + step, step)
             for pose in poses:
-                self._step(found, X_AG, pose, step, stage)
+                self._step(found, X_AG, pose, step, stage, bent=pose - step == begin)
             self._measure(found, poses, stage)
         return found
 
-    def _step(self, found: Followed, X_AG: Array, pose: int, step: int, stage: int) -> None:
-        """To the next pose, on from the last two."""
+    def _step(
+        self, found: Followed, X_AG: Array, pose: int, step: int, stage: int, *, bent: bool
+    ) -> None:
+        """To the next pose, on from the last two; from the last one alone where the way is bent."""
         alive = np.flatnonzero(found.stage == WHOLE)
         before = found.q[alive, pose - step]
         start = before
-        if 0 <= pose - 2 * step < len(self.layers) and pose - step != self.at_grasp:
+        if not bent:
             start = 2.0 * before - found.q[alive, pose - 2 * step]
-        X_AH = self.lines.X_AH(X_AG[alive], self.layers[pose])
+        X_AH = self.lines.X_AH(X_AG[alive], self.lines.layers[pose])
         q, met = self.solve(X_AH, start)
         met &= np.abs(q - before).max(axis=1, initial=0.0) <= self.travel
         found.q[alive[met], pose] = q[met]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core.frames import Array, inverse
+from burg_drake.core.outcome import Outcome
 from burg_drake.grasping.poses import Poses, rotate
 from burg_drake.station.grasp_motion import GraspMotion
 
@@ -61,6 +62,12 @@ class LinePoses:
     def at_retreated(self) -> int:
         """Which of the layers is the end of the retreat, where the lift begins."""
         return self.at_grasp + len(_layers(self.retreat)) - 1
+
+    def outcome(self, layer: int) -> Outcome:
+        """What is said of an arm that gets no further than to the layer before this one."""
+        if layer <= self.at_grasp:
+            return Outcome.APPROACH_LINE
+        return Outcome.RETREAT_LINE if layer <= self.at_retreated else Outcome.LIFT_LINE
 
     def X_AH(self, X_AG: Array, way: Array) -> Array:
         """Poses of the hand body.

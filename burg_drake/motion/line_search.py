@@ -1,8 +1,8 @@
 """What a search for the straight parts of a grasp's motion answers, whichever way it finds them.
 
-A chain is a motion of the arm from pregrasp to grasp and from there straight up. A search proposes
-chains, the most promising ones first; whoever asked holds them against the scene, and says which of
-them do not do, and where.
+A chain is a motion of the arm from pregrasp to grasp, back along the approach, and along the lift.
+A search proposes chains, the most promising ones first; whoever asked holds them against the scene,
+and says which of them do not do, and where.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from burg_drake.core.outcome import Outcome
 class Chain:
     """Arm positions along the straight parts of a grasp's motion.
 
-    Between two rows the arm moves straight in joint space, and the hand straight up to a small
+    Between two rows the arm moves straight in joint space, and the hand straight, up to a small
     deviation.
 
     Attributes:
         way: which of the two grasps with fingers swapped it is, 0 or 1.
         q: (M, n) from the pregrasp over the grasp to the top of the lift.
         at_grasp: row of the grasp.
-        rise: (M,) how far the target has risen [m]; 0 up to the grasp.
+        at_retreated: row at which the retreat ends and the lift begins.
+        moved_W: (M, 3) how far the target has been moved in the world [m]; 0 up to the grasp.
         lower: (M,) lower bound of the arm's clearance, without the hand [m].
         place: of the search, to know the chain again.
     """
@@ -36,7 +37,8 @@ class Chain:
     way: int
     q: Array
     at_grasp: int
-    rise: Array
+    at_retreated: int
+    moved_W: Array
     lower: Array
     place: Any = field(default=None, repr=False)
 
@@ -46,17 +48,18 @@ class Failure:
     """Why there is no chain.
 
     Attributes:
-        outcome: `NO_IK`, `JOINT_LIMIT`, `ARM_COLLISION`, `APPROACH_LINE` or `LIFT_LINE`.
+        outcome: `NO_IK`, `JOINT_LIMIT`, `ARM_COLLISION`, `APPROACH_LINE`, `RETREAT_LINE` or
+            `LIFT_LINE`.
         excess: how far the best configuration is beyond the joint limits that are kept [rad or m];
             NaN where that is not the reason.
         q: (K, n) configurations that are in the way of it, the nearest to being free first.
-        rise: (K,) how far the target has risen there [m].
+        moved_W: (K, 3) how far the target has been moved there [m].
     """
 
     outcome: Outcome
     excess: float = np.nan
     q: Array = field(default_factory=lambda: np.empty((0, 0)))
-    rise: Array = field(default_factory=lambda: np.empty(0))
+    moved_W: Array = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class Lines(Protocol):
@@ -90,6 +93,10 @@ class Lines(Protocol):
 
 class LineSearch(Protocol):
     """Looks for chains of an arm in a scene."""
+
+    def lifted(self, height: float) -> LineSearch:
+        """The same search with a lift to another height [m]."""
+        ...
 
     def begin(self, X_AG: Array, clearance: Array) -> Lines:
         """Begins with a batch.

@@ -9,7 +9,7 @@ against bounds of the arm's clearance; what collides is put out, and the next ta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
 from burg_drake.motion.arm_solutions import ArmSolutions, NumericSolutions
-from burg_drake.motion.candidates import APPROACH, GRASP, LIFT, WHOLE, Candidates, Indices
+from burg_drake.motion.candidates import (
+    APPROACH,
+    GRASP,
+    LIFT,
+    RETREAT,
+    WHOLE,
+    Candidates,
+    Indices,
+)
 from burg_drake.motion.closed_form_lines import DOUBT, ROWS_A_LAYER
 from burg_drake.motion.following import Follower
 from burg_drake.motion.ik import ArmKinematics, solve_ik
@@ -28,6 +36,13 @@ from burg_drake.motion.posture_grids import START, counted
 from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.straight_rows import JUMP, Filler, Rows, straighten
+
+WAYS = (
+    (APPROACH, Outcome.APPROACH_LINE),
+    (RETREAT, Outcome.RETREAT_LINE),
+    (LIFT, Outcome.LIFT_LINE),
+)
+"""The hand's straight ways in their order."""
 
 
 class NumericLines:
@@ -60,8 +75,18 @@ class NumericLines:
         self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
         self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
         self.layers, self.at_grasp = lines.layers, lines.at_grasp
-        self.follower = Follower(
-            lines, self.layers, self.at_grasp, settings.joint_travel, self.solve, self.measure
+        self.follower = Follower(lines, settings.joint_travel, self.solve, self.measure)
+
+    def lifted(self, height: float) -> NumericLines:
+        """See `LineSearch`."""
+        return NumericLines(
+            self.arm,
+            replace(self.lines, lift=height),
+            self.proximity,
+            self.home,
+            self.settings,
+            solutions=self.solutions,
+            beyond=self.beyond,
         )
 
     def begin(self, X_AG: Array, clearance: Array) -> _Lines:
@@ -136,8 +161,9 @@ class _Lines:
         if row is None:
             candidates.open[k] = False
             return
-        stage = GRASP if row in (0, chain.at_grasp) else APPROACH if row < chain.at_grasp else LIFT
-        candidates.block(k, stage, chain.q[row], float(chain.rise[row]), 0.0)
+        ends = chain.at_grasp, chain.at_retreated, len(chain.q)
+        stage = GRASP if row in (0, chain.at_grasp) else WAYS[int(np.searchsorted(ends, row))][0]
+        candidates.block(k, stage, chain.q[row], chain.moved_W[row], 0.0)
 
     def close(self, grasp: int, way: int) -> None:
         """See `Lines`."""
@@ -153,8 +179,8 @@ class _Lines:
             return self._explain(Outcome.ARM_COLLISION, candidates, GRASP)
         if stage == APPROACH:
             return self._no_approach(grasp)
-        if stage == LIFT:
-            return self._explain(Outcome.LIFT_LINE, candidates, LIFT)
+        if stage in (RETREAT, LIFT):
+            return self._explain(dict(WAYS)[stage], candidates, stage)
         return Failure(Outcome.NO_PATH)
 
     def _advance(self, grasps: list[int]) -> None:
@@ -193,9 +219,9 @@ class _Lines:
             elif blocked is None:
                 self._of[g].stop(j, stage)
             else:
-                rise = max(0.0, float(search.layers[blocked]))
+                moved_W = search.lines.carried(self._X_AG[g, way[s]], search.layers[blocked])
                 upper = float(found.upper[s, blocked])
-                self._of[g].block(j, stage, found.q[s, blocked], rise, upper)
+                self._of[g].block(j, stage, found.q[s, blocked], moved_W, upper)
 
     def _cost(self, q: Array, lower: Array) -> float:
         """Of a chain: the way of the joint that moves most from layer to layer, its distance from
@@ -220,25 +246,27 @@ class _Lines:
         lower, upper = search.measure(rows.q)
         chains = {}
         for i, (g, k) in enumerate(chosen):
-            chain = self._chain(self._of[g], k, rows, rows.of(i), lower, upper)
+            chain = self._chain(g, k, rows, rows.of(i), lower, upper)
             if chain is not None:
                 chains[g] = chain
         return chains
 
     def _chain(
-        self, of: Candidates, k: int, rows: Rows, own: slice, lower: Array, upper: Array
+        self, grasp: int, k: int, rows: Rows, own: slice, lower: Array, upper: Array
     ) -> Chain | None:
-        search = self._search
+        search, of = self._search, self._of[grasp]
         layer, q = rows.layer[own], rows.q[own]
-        rise = np.maximum(np.interp(layer, np.arange(len(search.layers)), search.layers), 0.0)
+        length = np.interp(layer, np.arange(len(search.layers)), search.layers)
+        moved_W = search.lines.carried(self._X_AG[grasp, of.way[k]], length)
         blocked = ~(upper[own] > 0.0)
         bad = np.flatnonzero(rows.broken[own] | blocked)
         if len(bad):
-            before = bad[layer[bad] <= search.at_grasp]
-            stage, bad = (APPROACH, before) if len(before) else (LIFT, bad)
+            ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
+            on = np.searchsorted(ends, layer[bad])  # which of the ways
+            stage, bad = WAYS[int(on.min())][0], bad[on == on.min()]
             row = bad[upper[own][bad].argmin()]
             if blocked[row]:
-                of.block(k, stage, q[row], float(rise[row]), float(upper[own][row]))
+                of.block(k, stage, q[row], moved_W[row], float(upper[own][row]))
             else:
                 of.stop(k, stage)
             return None
@@ -246,7 +274,8 @@ class _Lines:
             way=int(of.way[k]),
             q=q,
             at_grasp=int(np.searchsorted(layer, search.at_grasp)),
-            rise=rise,
+            at_retreated=int(np.searchsorted(layer, search.lines.at_retreated)),
+            moved_W=moved_W,
             lower=lower[own],
             place=k,
         )
@@ -264,13 +293,13 @@ class _Lines:
             _, upper = search.measure(q)
             if not (upper > 0.0).any():
                 order = np.argsort(-upper, kind="stable")[:EXPLAINED]
-                return Failure(Outcome.ARM_COLLISION, q=q[order], rise=np.zeros(len(order)))
+                return Failure(Outcome.ARM_COLLISION, q=q[order], moved_W=np.zeros((len(order), 3)))
         return self._explain(Outcome.APPROACH_LINE, self._of[grasp], APPROACH)
 
     def _explain(self, outcome: Outcome, candidates: Candidates, stage: int) -> Failure:
         """Names the postures that were in the way at a stage, the nearest to being free first."""
-        q, rise = candidates.in_the_way(stage, EXPLAINED)
-        return Failure(outcome, q=q, rise=rise)
+        q, moved_W = candidates.in_the_way(stage, EXPLAINED)
+        return Failure(outcome, q=q, moved_W=moved_W)
 
     def _beyond_limits(self, grasp: int, layer: int) -> Failure:
         """Whether there are postures beyond the joint limits, and by how much at least."""

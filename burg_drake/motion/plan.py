@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from burg_drake.core.frames import Array, check_pose
+from burg_drake.motion.corners import IsFree
 from burg_drake.motion.limits import ArmLimits
 from burg_drake.motion.reach import ArmReach, Reach
 from burg_drake.motion.reach_settings import ReachSettings
@@ -77,19 +78,25 @@ class Planner:
         edges, hand = self.reach.edges, self.reach.diagram.station.hand
         if len(witness.transfer) > 2:
             witness = replace(witness, transfer=self.reach.tree.shortcut(witness.transfer))
-        checks = PathChecks(
-            transfer=lambda q: edges.first_blocked(q) is None,
-            approach=lambda q: edges.first_blocked(q, hand=False) is None,
-            lift=lambda q: (
+        motion, back_W = self.reach.motion, -witness.X_WG[:3, 2]
+
+        def carrying(u_W: Array, start_W: Array) -> IsFree:
+            return lambda q: (
                 edges.first_blocked(
                     q,
                     hand=False,
                     carried=instance or None,
-                    rise=self._rise(instance, q),
+                    moved_W=start_W + self._along(u_W, q) if instance else None,
                     width=width,
                 )
                 is None
-            ),
+            )
+
+        checks = PathChecks(
+            transfer=lambda q: edges.first_blocked(q) is None,
+            approach=lambda q: edges.first_blocked(q, hand=False) is None,
+            retreat=carrying(back_W, np.zeros(3)),
+            lift=carrying(motion.direction_W, motion.retreat * back_W),
         )
         plan = time_motion(
             witness,
@@ -109,14 +116,14 @@ class Planner:
             origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),
         )
 
-    def _rise(self, instance: str, q: Array) -> Array | None:
-        """(M,) heights of the hand over its first pose [m], if it carries something."""
-        if not instance:
-            return None
+    def _along(self, u_W: Array, q: Array) -> Array:
+        """(M, 3) how far the hand has come from its first pose along a unit vector (3,) in the
+        world [m]."""
         arm = self.reach.diagram.station.document.arm
         assert arm is not None
         p_AH = self.reach.kinematics.forward(q)[0][:, :3, 3]
-        return np.asarray(np.maximum(0.0, (p_AH - p_AH[0]) @ arm.X_WA.matrix()[2, :3]))
+        u_A = u_W @ arm.X_WA.matrix()[:3, :3]
+        return np.asarray(np.maximum(0.0, (p_AH - p_AH[0]) @ u_A)[:, None] * u_W)
 
     @cached_property
     def _origin(self) -> Origin:

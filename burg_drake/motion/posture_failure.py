@@ -42,8 +42,7 @@ def failure(
     if not 0 < last < grid.poses:
         # Where there still are chains, they have been given up: the best of them got this far.
         last = int(np.ceil(farthest))
-    approach = last <= search.at_grasp
-    outcome = Outcome.APPROACH_LINE if approach else Outcome.LIFT_LINE
+    outcome = search.lines.outcome(last)
     return _in_the_way(search, X_AG, places, outcome, last)
 
 
@@ -78,8 +77,8 @@ def _in_the_way(
     order = np.argsort(-grid.upper[layer, i][blocked], kind="stable")[:EXPLAINED]
     chosen = tuple(where[order].T)
     q = grid.q[(slice(None), layer, i, *chosen)].T
-    rise = np.full(len(q), max(0.0, float(search.layers[layer])))
-    return Failure(outcome, q=q, rise=rise)
+    moved_W = search.lines.carried(X_AG[chosen[0]], search.layers[[layer]])
+    return Failure(outcome, q=q, moved_W=moved_W)
 
 
 def _beyond_limits(search: PostureGrids, X_AG: Array) -> Failure:

@@ -1,5 +1,5 @@
 """Whether the arm can execute a grasp, all the way: from home to the pregrasp, straight to the
-grasp, and straight up with the target in the hand.
+grasp, and with the target in the hand straight back and up.
 
 A yes carries the whole motion, and Drake's own collision checker has seen it; a no says what failed
 first and what was in the way. Both ways to put the fingers are tried, as they are the same grasp. A
@@ -9,6 +9,7 @@ verdict depends on the grasp alone: not on its neighbours, their order, or a ran
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +17,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, check_pose, inverse, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.grasping.body import TOUCHING
 from burg_drake.motion.attempt import Attempt, Task
 from burg_drake.motion.closed_form_lines import ClosedFormLines
 from burg_drake.motion.collision import ArmCollision
 from burg_drake.motion.edges import Edges
 from burg_drake.motion.focus import postures_over_objects
 from burg_drake.motion.hand_sweep import HandSweep
+from burg_drake.motion.hand_ways import HandVerdicts, HandWays
 from burg_drake.motion.home_check import require_free_home
 from burg_drake.motion.home_tree import HomeTree
 from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.ik_routine import IkRoutine, RoutineSolutions
+from burg_drake.motion.lift_room import as_high_as_there_is_room, heights
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.line_search import LineSearch
 from burg_drake.motion.numeric_lines import NumericLines
@@ -37,12 +38,12 @@ from burg_drake.motion.reach_settings import ReachSettings
 from burg_drake.motion.verdict import Reach as Reach
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
 BATCH = 128
 """Grasps whose motions are looked for together: enough that more would hardly be cheaper each."""
-APPROACH, LIFT = Outcome.HAND_COLLISION_APPROACH, Outcome.HAND_COLLISION_LIFT
+
+Indices = NDArray[np.intp]
 
 
 class ArmReach:
@@ -83,7 +84,6 @@ class ArmReach:
         station = station if isinstance(station, Station) else load_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         self.motion = self.settings.motion or station.document.motion
-        _require_plain(self.motion)
         arm = station.document.arm
         assert arm is not None  # build_station_diagram has seen to it
         self.diagram = diagram
@@ -101,6 +101,7 @@ class ArmReach:
         self._X_AW = inverse(X_WA)
         lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
         self._search = _line_search(self, lines, home, ik)
+        self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
         """Judges one grasp: as in a batch.
@@ -109,7 +110,7 @@ class ArmReach:
             instance: the target's name in the scene.
             X_WG: (4, 4) grasp in the world, at which the open hand is clear.
             width: distance between the pads that hold the target [m]; NaN if it is not known, and
-                the hand is lifted as wide as it is open then.
+                the hand goes back and up as wide as it is open then.
 
         Returns:
             The verdict; the same for a grasp and for the one with its fingers swapped.
@@ -145,69 +146,44 @@ class ArmReach:
                 f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)} widths;"
                 " give as many poses (N, 4, 4)"
             )
-        X_both = _both(X, self._X_AW)
-        found, clearance = self._swept(np.array(instances, dtype=object), X_both, widths)
-        left = np.flatnonzero([verdict is None for verdict in found])
+        ways = HandWays(
+            self._sweep,
+            np.array(instances, dtype=object),
+            _both(X, self._X_AW),
+            widths,
+            retreats=self.motion.retreat > 0.0,
+        )
+        before, motion = ways.before_lift(), self.motion
+
+        def judge(height: float, some: Indices) -> list[Reach]:
+            return self._lifted(ways[some], before[some], height)
+
+        def hand_is_free(height: float, some: Indices) -> NDArray[np.bool_]:
+            return ~ways[some].lifted(before[some], height).blocked
+
+        whole = judge(motion.lift_height, np.arange(len(X)))
+        if motion.least >= motion.lift_height:
+            return whole
+        tried = heights(motion.least, motion.lift_height)
+        return as_high_as_there_is_room(whole, tried, judge, hand_is_free)
+
+    def _lifted(self, ways: HandWays, before: HandVerdicts, height: float) -> list[Reach]:
+        """Verdicts on N grasps with a lift to one height [m]."""
+        hand = ways.lifted(before, height)
+        found: dict[int, Reach] = {int(k): hand.why(int(k)) for k in np.flatnonzero(hand.blocked)}
+        left = np.flatnonzero(~hand.blocked)
+        if height not in self._searches:
+            self._searches[height] = self._search.lifted(height)
         for k in range(0, len(left), BATCH):
             part = left[k : k + BATCH]
-            lines = self._search.begin(self._X_AW @ X_both[part], clearance[part])
-            task = Task([instances[i] for i in part], X_both[part], widths[part], clearance[part])
+            X_WG, clearance = ways.X_both[part], hand.clearance[part]
+            lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
+            task = Task(ways.instance[part].tolist(), X_WG, ways.width[part], clearance)
             verdicts = Attempt(task, lines, self.tree, self.settings).run()
-            for index, verdict in zip(part, verdicts, strict=True):
-                found[index] = verdict
-        return [verdict for verdict in found if verdict is not None]
-
-    def _swept(
-        self, names: NDArray[np.object_], X_both: Array, width: Array
-    ) -> tuple[list[Reach | None], Array]:
-        """What the hand's way decides.
-
-        Args:
-            names: (N,) of the targets.
-            X_both: (N, 2, 4, 4) grasps in the world with their fingers either way.
-            width: (N,) distances between the pads [m].
-
-        Returns:
-            N verdicts, None where the hand is free with its fingers either way; and (N, 2) its
-            clearance on the way, negative where it is not free [m].
-        """
-        found: list[Reach | None] = [None] * len(X_both)
-        clearance = np.full(X_both.shape[:2], np.inf)
-        ways = (0,) if self._sweep.symmetric else (0, 1)
-        for name in dict.fromkeys(names.tolist()):
-            every = np.flatnonzero(names == name)
-            said: dict[int, Reach] = {}
-            for way in ways:
-                for outcome in (APPROACH, LIFT):
-                    at = every[clearance[every, way] >= 0.0]
-                    if outcome is APPROACH:
-                        sweep = self._sweep.approach(name, X_both[at, way])
-                    else:
-                        sweep = self._sweep.lift(name, X_both[at, way], width[at])
-                    blocked = np.minimum(sweep.clearance, -TOUCHING)
-                    room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
-                    clearance[at, way] = np.minimum(clearance[at, way], room)
-                    for k in np.flatnonzero(~sweep.free):
-                        no = Reach(outcome, str(sweep.blocker[k]), float(sweep.clearance[k]))
-                        said.setdefault(int(at[k]), no)
-            if self._sweep.symmetric:
-                clearance[every, 1] = clearance[every, 0]
-            for k in every[(clearance[every] < 0.0).all(axis=1)]:
-                found[k] = said[int(k)]
-        return found, clearance
-
-
-def _require_plain(motion: GraspMotion) -> None:
-    """Checks that a motion is straight up at once by all of its height.
-
-    Raises:
-        InvalidInputError: it is not.
-    """
-    if motion.retreat > 0.0 or motion.least < motion.lift_height or motion.direction_W[2] < 1.0:
-        raise InvalidInputError(
-            "a retreat, a least_lift below lift_height and a lift_direction other than up are not"
-            " judged by the arm yet; leave them out"
-        )
+            for index, verdict in zip(part.tolist(), verdicts, strict=True):
+                reached = verdict.outcome is None
+                found[index] = replace(verdict, lift=height) if reached else verdict
+        return [found[k] for k in range(len(hand.blocked))]
 
 
 def _both(X_WG: Array, X_AW: Array) -> Array:

@@ -15,6 +15,7 @@ from burg_drake.motion.straight import HandSpeed, time_line
 from burg_drake.motion.timing_settings import TimingSettings
 from burg_drake.motion.trajectory import Motion, Plan, Trajectory
 from burg_drake.motion.witness import Witness
+from burg_drake.station.grasp_motion import GraspMotion
 
 ROUNDING = 1e-6
 """By how much samples and their differences may exceed a limit, relative to it."""
@@ -24,6 +25,8 @@ SLOWED = 20
 """How often that is done at most."""
 STRAIGHT = 2e-5
 """Distance of the hand from its line that is always allowed: a witness's is no straighter [m]."""
+LIFT = GraspMotion().lift_height
+"""Height that `TimingSettings.lift_time` is for [m]."""
 NARROW = 2e-4
 """Clearance of a hand on its lines where nobody has measured it [m]."""
 
@@ -36,12 +39,13 @@ class PathChecks:
     Attributes:
         transfer: with the hand open and empty.
         approach: the same, near the target.
-        lift: with the target in the hand.
+        lift, retreat: with the target in the hand.
     """
 
     transfer: IsFree | None = None
     approach: IsFree | None = None
     lift: IsFree | None = None
+    retreat: IsFree | None = None
 
 
 def time_motion(
@@ -53,7 +57,7 @@ def time_motion(
     checks: PathChecks | None = None,
     limit_margin: float = 0.0,
 ) -> Plan:
-    """Gives the three motions of a witness their time; each begins and ends at rest.
+    """Gives the motions of a witness their time; each begins and ends at rest.
 
     Args:
         witness: the paths.
@@ -99,10 +103,22 @@ def time_motion(
         is_free=checks.lift,
         limit_margin=limit_margin,
     )
+    retreat = None
+    if witness.retreat is not None:
+        back = time_line(
+            _within(witness.retreat, limits, "retreat"),
+            kinematics,
+            gentle,
+            _retreating(settings),
+            lines,
+            is_free=checks.retreat,
+        )
+        retreat = _sampled(back, witness.retreat, limits, settings)
     return Plan(
         _sampled(transfer, witness.transfer, limits, settings),
         _sampled(approach, witness.approach, limits, settings),
         _sampled(lift, witness.lift, limits, settings),
+        retreat=retreat,
     )
 
 
@@ -118,9 +134,17 @@ def _within(q: Array, limits: ArmLimits, name: str) -> Array:
 
 
 def _lifting(height: float, settings: TimingSettings) -> HandSpeed:
-    """Half of the time full acceleration, half of it full braking."""
-    time = settings.lift_time
-    return HandSpeed(2.0 * height / time, 4.0 * height / time**2, settings.ramp)
+    """Half of the time full acceleration, half of it full braking, as over `LIFT`: what the hand
+    holds feels the same load on any height."""
+    time = settings.lift_time * np.sqrt(height / LIFT)
+    acceleration = 4.0 * LIFT / settings.lift_time**2
+    return HandSpeed(float(acceleration * time / 2.0), acceleration, settings.ramp)
+
+
+def _retreating(settings: TimingSettings) -> HandSpeed:
+    """As slow as on the approach, and accelerated no more than on the lift."""
+    acceleration = min(settings.approach_acceleration, 4.0 * LIFT / settings.lift_time**2)
+    return HandSpeed(settings.approach_speed, acceleration, settings.ramp)
 
 
 def _way(rows: Array, kinematics: ArmKinematics) -> float:

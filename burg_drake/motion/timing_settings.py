@@ -25,11 +25,13 @@ class TimingSettings:
         corner_deviation: how far the transfer may cut a corner [rad].
         line_deviation: how far approach and lift may leave the joint path between two of its
             waypoints without a new check [rad].
-        straightness: how far the hand may leave a straight line on approach and lift [m], and no
-            farther than half of its clearance there.
+        straightness: how far the hand may leave a straight line on approach, retreat and lift
+            [m], and no farther than half of its clearance there.
         approach_speed, approach_acceleration: of the hand [m/s, m/s^2].
-        lift_time: time in which the hand rises with full acceleration in the first half and full
-            braking in the second one [s]; the ramps come on top.
+        lift_time: time in which the hand rises by 0.30 m with full acceleration in the first half
+            and full braking in the second one [s]; the ramps come on top. Another height has the
+            same acceleration, so that its time grows like the square root; the retreat has no more,
+            and the speed of the approach.
     """
 
     speed: float = 1.0

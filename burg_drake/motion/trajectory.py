@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from burg_drake.scene.scene import Scene
     from burg_drake.station.station import Station
 
-PHASES = ("transfer", "approach", "close", "lift")
-"""What happens one after the other; while the hand closes the arm rests."""
+PHASES = ("transfer", "approach", "close", "retreat", "lift")
+"""What happens one after the other; while the hand closes the arm rests, and without a retreat the
+lift follows at once."""
 
 DIGITS = 12
 """Of a content hash, in messages."""
@@ -164,11 +165,13 @@ class Plan:
     Attributes:
         transfer: from the home posture to the pregrasp.
         approach: straight from there to the grasp.
-        lift: straight up from the grasp.
-        close_time: time that the hand takes to close, between approach and lift [s].
+        lift: straight along the lift, which begins where the retreat ends.
+        close_time: time that the hand takes to close, after the approach [s].
         opening: distance between the pads before the hand closes [m] ...
         width: ... and once it holds the target [m]; NaN if nobody knows.
         origin: what it is for; None if nobody has said.
+        retreat: straight back from the grasp with what the hand holds; None if the lift begins at
+            the grasp.
     """
 
     transfer: Trajectory
@@ -178,14 +181,15 @@ class Plan:
     opening: float = np.nan
     width: float = np.nan
     origin: Origin | None = None
+    retreat: Trajectory | None = None
 
     @property
     def phases(self) -> dict[str, Trajectory]:
-        """All four of `PHASES`, in their order; each begins with the row that the last one ends
-        with."""
+        """Those of `PHASES` that there are, in their order; each begins with the row that the last
+        one ends with."""
         close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
-        parts = (self.transfer, self.approach, close, self.lift)
-        return dict(zip(PHASES, parts, strict=True))
+        parts = (self.transfer, self.approach, close, self.retreat, self.lift)
+        return {name: part for name, part in zip(PHASES, parts, strict=True) if part is not None}
 
     @property
     def whole(self) -> Trajectory:

@@ -18,13 +18,15 @@ class Reach:
     Attributes:
         outcome: what failed first; None if nothing did.
         blocker: what was in the way: a body, or an arm link and a body such as `panda_link5 vs
-            mug`, of the motion that came closest; empty if nothing was.
+            mug`, of the motion that came closest; empty if nothing was. Of a yes whose lift is not
+            whole, what was in the way of the whole one.
         clearance: of a yes, how far hand and arm stay away from everything on the straight parts,
             at least, where 0 means that no more than "free" is known; of a no, that of what was in
             the way, negative where it overlaps [m]; NaN where nothing was.
         excess: how far the best configuration is beyond a joint limit, less
             `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason.
         witness: the motion; None if there is none.
+        lift: of a yes, length of its lift [m]; NaN of a no.
     """
 
     outcome: Outcome | None
@@ -32,6 +34,7 @@ class Reach:
     clearance: float = np.nan
     excess: float = np.nan
     witness: Witness | None = None
+    lift: float = np.nan
 
     @property
     def q_grasp(self) -> Array | None:

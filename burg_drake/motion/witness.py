@@ -20,9 +20,11 @@ class Witness:
             for, or with the two swapped.
         transfer: (M, n) from the home posture to the pregrasp; M is at least 2.
         approach: (K, n) from pregrasp to grasp; the hand moves straight.
-        lift: (L, n) from the grasp straight up in the world.
-        clearance: of the hand, with what it holds, from everything on approach and lift, at least
-            [m]; NaN if it is not known.
+        lift: (L, n) from there along the lift; a single row if it has no height.
+        retreat: (J, n) from the grasp straight back along the approach, with the target; None if
+            the lift begins at the grasp.
+        clearance: of the hand, with what it holds, from everything on approach, retreat and
+            lift, at least [m]; NaN if it is not known.
     """
 
     X_WG: Array
@@ -30,3 +32,4 @@ class Witness:
     approach: Array
     lift: Array
     clearance: float = np.nan
+    retreat: Array | None = None

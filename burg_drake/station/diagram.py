@@ -155,8 +155,9 @@ def build_station_diagram(
             libraries. The board's markers are drawn with cameras or `meshcat` only; it is plain
             where nobody looks.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
-            stands where it is placed, and can only be lifted off, by a joint `RISE` of its model
-            along world z; rigid meshes are replaced by pieces (see `station.hollow`).
+            stands where it is placed, and can be lifted off by a joint `RISE` of its model along
+            world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
+            (see `station.hollow`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and

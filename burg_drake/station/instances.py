@@ -22,8 +22,9 @@ from burg_drake.station.robot import ROBOT_MODELS
 SAME_INERTIA = 1e-6
 """Masses and moments may differ by this share: Drake shifts moments to the origin and back."""
 
-RISE = "rise"
-"""The joint of an object that can only be lifted off [m], for a plant that is not simulated."""
+RISE, PLACE = "rise", "place"
+"""The joint of an object that does not turn [m], and the frame in the world that it stands on,
+which may be moved through the context; for a plant that is not simulated."""
 
 
 def add_instance(
@@ -74,6 +75,6 @@ def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
 def add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
     """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
     model = body.model_instance()
-    place = plant.AddFrame(FixedOffsetFrame("place", plant.world_frame(), X_WO, model))
+    place = plant.AddFrame(FixedOffsetFrame(PLACE, plant.world_frame(), X_WO, model))
     up_O = X_WO.rotation().matrix()[2]
     plant.AddJoint(PrismaticJoint(RISE, place, body.body_frame(), up_O))

@@ -48,7 +48,7 @@ GROUPS = (
     Group(
         "arm has no way",
         (0.10, 0.20, 0.45, 0.6),
-        (Outcome.APPROACH_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH),
+        (Outcome.APPROACH_LINE, Outcome.RETREAT_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH),
     ),
     Group(
         "arm cannot reach",
@@ -58,7 +58,11 @@ GROUPS = (
     Group(
         "hand collides on its way",
         (0.55, 0.32, 0.15, 0.5),
-        (Outcome.HAND_COLLISION_APPROACH, Outcome.HAND_COLLISION_LIFT),
+        (
+            Outcome.HAND_COLLISION_APPROACH,
+            Outcome.HAND_COLLISION_RETREAT,
+            Outcome.HAND_COLLISION_LIFT,
+        ),
     ),
     Group(
         "hand collides",

@@ -11,11 +11,13 @@ def test_stored_values_never_change():
         "collision_clutter",
         "collision_background",
         "hand_collision_approach",
+        "hand_collision_retreat",
         "hand_collision_lift",
         "no_ik",
         "joint_limit",
         "arm_collision",
         "approach_line",
+        "retreat_line",
         "lift_line",
         "no_path",
         "no_contact",
@@ -42,6 +44,7 @@ def test_each_outcome_is_decided_by_one_stage():
     }
     assert by_stage[Stage.REACHABLE] == {
         Outcome.HAND_COLLISION_APPROACH,
+        Outcome.HAND_COLLISION_RETREAT,
         Outcome.HAND_COLLISION_LIFT,
         Outcome.NO_IK,
         Outcome.JOINT_LIMIT,
@@ -49,6 +52,7 @@ def test_each_outcome_is_decided_by_one_stage():
     }
     assert by_stage[Stage.PLANNED] == {
         Outcome.APPROACH_LINE,
+        Outcome.RETREAT_LINE,
         Outcome.LIFT_LINE,
         Outcome.NO_PATH,
         Outcome.REACHABLE,

@@ -54,8 +54,11 @@ def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormL
     np.testing.assert_allclose(X[chain.at_grasp], goal, atol=1e-9)
     np.testing.assert_allclose(X[0, :3, 3], goal[:3, 3] - 0.1 * goal[:3, 2], atol=1e-9)
     np.testing.assert_allclose(X[-1, :3, 3], goal[:3, 3] + (0.0, 0.0, 0.3), atol=1e-9)
-    assert (chain.rise[: chain.at_grasp + 1] == 0.0).all() and chain.rise[-1] == 0.3
-    np.testing.assert_allclose(np.diff(X[:, 2, 3])[chain.at_grasp :], np.diff(chain.rise)[10:])
+    assert (chain.moved_W[: chain.at_grasp + 1] == 0.0).all()
+    np.testing.assert_array_equal(chain.moved_W[-1], (0.0, 0.0, 0.3))
+    np.testing.assert_allclose(
+        np.diff(X[:, 2, 3])[chain.at_grasp :], np.diff(chain.moved_W[10:, 2])
+    )
     np.testing.assert_array_less(np.abs(np.diff(chain.q, axis=0)).max(), 0.35)
 
 

@@ -158,17 +158,18 @@ def test_what_is_carried_counts_against_the_links_alone(station: Station) -> Non
     checked = collision(station, can)
     assert [str(o) for o in checked.overlaps(HOME)] == ["panda_hand vs can"]
     assert checked.overlaps(HOME, carried="can") == [] and checked.is_free(HOME, carried="can")
-    overlaps = checked.overlaps(HOME, carried="can", rise=0.15)
-    assert overlaps and not checked.is_free(HOME, carried="can", rise=0.15)
+    overlaps = checked.overlaps(HOME, carried="can", moved_W=(0.0, 0.0, 0.15))
+    assert overlaps and not checked.is_free(HOME, carried="can", moved_W=(0.0, 0.0, 0.15))
     assert {(o.link, o.other) for o in overlaps} == {("panda_link7", "can"), ("panda_link6", "can")}
     assert not checked.is_free(HOME)
 
 
-@pytest.mark.parametrize("rise", [0.0, 0.07, 0.3])
-def test_risen_is_as_if_placed_higher(station: Station, rise: float) -> None:
-    """Two tilted boxes; one is carried, against a diagram in which free ones stand higher."""
-    tilt = (20.0, -30.0, 50.0)
-    low, high = (scene_pose(station, (0.35, 0.1, 0.45 - z), tilt) for z in (rise, 0.0))
+@pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.3), (-0.08, 0.05, 0.07)])
+def test_moved_is_as_if_placed_there(station: Station, moved: tuple[float, float, float]) -> None:
+    """Two tilted boxes; one is carried, against a diagram in which free ones stand there."""
+    tilt, (x, y, z) = (20.0, -30.0, 50.0), moved
+    before = (0.35 - x, 0.1 - y, 0.45 - z)
+    low, high = (scene_pose(station, p, tilt) for p in (before, (0.35, 0.1, 0.45)))
     other = Instance(name="other", object="box", X_SO=scene_pose(station, (0.4, -0.2, 0.4), tilt))
     checked = collision(station, Instance(name="box", object="box", X_SO=low), other)
     scene = Scene(
@@ -186,9 +187,9 @@ def test_risen_is_as_if_placed_higher(station: Station, rise: float) -> None:
     for q in HOME + rng.uniform(-0.8, 0.8, (150, 7)):
         every = {(o.link, o.other) for o in oracle.overlaps(q)}
         counted = {(link, other) for link, other in every if other != "box" or link not in hand}
-        overlaps = checked.overlaps(q, carried="box", rise=rise)
+        overlaps = checked.overlaps(q, carried="box", moved_W=moved)
         assert {(o.link, o.other) for o in overlaps} == counted
-        assert checked.is_free(q, carried="box", rise=rise) is (not counted)
+        assert checked.is_free(q, carried="box", moved_W=moved) is (not counted)
         seen.add((bool(every), bool(counted)))
     assert seen == {(False, False), (True, False), (True, True)}
 
@@ -215,7 +216,7 @@ def test_clones_answer_as_drakes_own_checker_does(station: Station, carried: str
         for q in HOME + rng.uniform(-0.9, 0.9, (200, 7)):
             configuration = checked.configuration(q, carried, rise)
             free.append(plain.CheckConfigCollisionFree(configuration))
-            assert checked.is_free(q, carried=carried, rise=rise) is free[-1]
+            assert checked.is_free(q, carried=carried, moved_W=(0.0, 0.0, rise)) is free[-1]
         assert (20 < sum(free) < 180) if instances == (mug,) else not any(free)
 
 
@@ -226,8 +227,8 @@ def test_what_is_carried_does_not_count_against_the_scene(station: Station) -> N
     roof = Obstacle(X_WB=Pose((0.4, 0.2, 0.3)), size=(0.1, 0.1, 0.02))
     checked = collision(station, can, mug, roof=roof)
     for rise in (0.0, 0.2, 0.3):
-        assert checked.is_free(HOME, carried="can", rise=rise)
-        assert checked.overlaps(HOME, carried="can", rise=rise) == []
+        assert checked.is_free(HOME, carried="can", moved_W=(0.0, 0.0, rise))
+        assert checked.overlaps(HOME, carried="can", moved_W=(0.0, 0.0, rise)) == []
 
 
 def test_nothing_remains_of_what_was_carried(station: Station) -> None:
@@ -235,7 +236,7 @@ def test_nothing_remains_of_what_was_carried(station: Station) -> None:
     can = Instance(name="can", object="can", X_SO=scene_pose(station, (x, y, z - 0.1)))
     checked, fresh = collision(station, can), collision(station, can)
     for q in HOME + np.random.default_rng(5).uniform(-0.5, 0.5, (20, 7)):
-        checked.is_free(q, carried="can", rise=0.2)
+        checked.is_free(q, carried="can", moved_W=(0.1, -0.05, 0.2))
         assert checked.is_free(q) is fresh.is_free(q)
         assert checked.overlaps(q) == fresh.overlaps(q)
 
@@ -245,8 +246,10 @@ def test_what_cannot_be_carried(station: Station) -> None:
     checked = collision(station, can)
     with pytest.raises(UnknownNameError, match=r"no instance 'cam' that can be carried.*'can'"):
         checked.is_free(HOME, carried="cam")
-    with pytest.raises(InvalidInputError, match=r"rise is 0\.1 m, but nothing is carried"):
-        checked.overlaps(HOME, rise=0.1)
+    with pytest.raises(
+        InvalidInputError, match=r"moved_W is \[0\.0, 0\.0, 0\.1\] m, but nothing is"
+    ):
+        checked.overlaps(HOME, moved_W=(0.0, 0.0, 0.1))
 
 
 def test_an_arm_is_needed(station: Station) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from gantry import FINGERTIP, HALF_PAD, HOME, LOWER, UPPER, box, gantry_edges
+from numpy.typing import ArrayLike
 
 from burg_drake.core.frames import inverse
 from burg_drake.core.schema import Pose
@@ -133,11 +134,11 @@ class Recorder:
         q: np.ndarray,
         *,
         carried: str | None = None,
-        rise: float = 0.0,
+        moved_W: ArrayLike = (0.0, 0.0, 0.0),
         width: float = np.nan,
     ) -> bool:
         self._asked.append(q)
-        return self._collision.is_free(q, carried=carried, rise=rise, width=width)
+        return self._collision.is_free(q, carried=carried, moved_W=moved_W, width=width)
 
 
 def test_what_is_carried_counts_against_the_links_alone(tmp_path: Path) -> None:
@@ -147,13 +148,13 @@ def test_what_is_carried_counts_against_the_links_alone(tmp_path: Path) -> None:
     edges = gantry_edges(
         tmp_path, Instance(name="can", object="can", X_SO=Pose(tuple(p_S[:3].tolist())))
     )
-    rise = np.linspace(0.0, 0.3, 31)
+    rise, up = np.linspace(0.0, 0.3, 31), np.array((0.0, 0.0, 1.0))
     q = HOME + rise[:, None] * [0.0, 0.0, 1.0]
     assert edges.first_blocked(q, hand=False) == 0
-    assert edges.first_blocked(q, hand=False, carried="can", rise=rise) is None
-    found = edges.first_blocked(q, hand=False, carried="can", rise=1.5 * rise)
+    assert edges.first_blocked(q, hand=False, carried="can", moved_W=up * rise[:, None]) is None
+    found = edges.first_blocked(q, hand=False, carried="can", moved_W=up * 1.5 * rise[:, None])
     free = [
-        edges.collision.is_free(a, carried="can", rise=1.5 * b)
+        edges.collision.is_free(a, carried="can", moved_W=up * 1.5 * b)
         for a, b in zip(q, rise, strict=True)
     ]
     assert found is not None

@@ -149,8 +149,8 @@ def check_straight(arm: Arm, X_AG: np.ndarray, chain: Chain) -> None:
     np.testing.assert_allclose(p[0], -MOTION.standoff * approach, atol=1e-5)
     np.testing.assert_allclose(p[at], 0.0, atol=1e-5)
     np.testing.assert_allclose(p[len(q) - 1], MOTION.lift_height * up, atol=1e-5)
-    np.testing.assert_allclose(chain.rise[at:], p[at : len(q)] @ up, atol=1e-5)
-    assert (chain.rise[: at + 1] == 0.0).all()
+    np.testing.assert_allclose(chain.moved_W[at:, 2], p[at : len(q)] @ up, atol=1e-5)
+    assert (chain.moved_W[: at + 1] == 0.0).all()
     off = [
         np.linalg.norm(p - np.clip(p @ axis, low, high)[:, None] * axis, axis=1)
         for axis, low, high in (
@@ -260,7 +260,7 @@ def test_what_is_in_the_way_is_in_the_way(ur5e: Arm) -> None:
     blocked = [f for f in named if f.outcome is Outcome.ARM_COLLISION]
     assert blocked
     for failure in blocked:
-        assert 1 <= len(failure.q) == len(failure.rise) <= 3
+        assert 1 <= len(failure.q) == len(failure.moved_W) <= 3
         assert (ur5e.proximity.bounds(failure.q, hand=False).upper <= 0.0).all()
 
 

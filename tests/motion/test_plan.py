@@ -79,7 +79,7 @@ def test_drake_finds_its_samples_free(planned: Plan, planner: Planner) -> None:
     q = planned.lift.q[::EVERY]
     rises = arm.forward(q)[0][:, 2, 3] - arm.forward(q[:1])[0][0, 2, 3]
     for row, rise in zip(q, rises, strict=True):
-        assert collision.is_free(row, carried="box", rise=max(0.0, float(rise)))
+        assert collision.is_free(row, carried="box", moved_W=(0.0, 0.0, max(0.0, float(rise))))
 
 
 def test_it_keeps_the_limits(planned: Plan, planner: Planner) -> None:

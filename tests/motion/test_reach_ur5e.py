@@ -72,7 +72,7 @@ def test_motions_are_free_and_whole(
         rise = flange(witness.lift, station)[:, 2, 3] - flange(witness.lift[:1], station)[0, 2, 3]
         assert rise[-1] == pytest.approx(0.30, abs=1e-5)
         for q, height in zip(witness.lift, rise, strict=True):
-            assert collision.is_free(q, carried=name, rise=max(0.0, float(height)))
+            assert collision.is_free(q, carried=name, moved_W=(0.0, 0.0, max(0.0, float(height))))
         X_WG = flange(witness.approach[-1:], station)[0] @ X_FG
         np.testing.assert_allclose(X_WG, witness.X_WG, atol=1e-5)
 

@@ -14,13 +14,15 @@ from burg_drake.evaluation.table import Columns
 
 MEANING = {
     Outcome.HAND_COLLISION_APPROACH: "on the straight way in, the open hand meets something",
-    Outcome.HAND_COLLISION_LIFT: "on the straight way up, the hand or the object in it does",
+    Outcome.HAND_COLLISION_RETREAT: "on the straight way back, the hand or the object in it does",
+    Outcome.HAND_COLLISION_LIFT: "on the lift, the hand or the object in it does",
     Outcome.NO_IK: "no arm configuration puts the hand there, whatever the joint limits",
     Outcome.JOINT_LIMIT: "there are such configurations, but all are beyond a joint limit",
     Outcome.ARM_COLLISION: "within the limits, in each that was found the arm collides",
     Outcome.APPROACH_LINE: "the arm can be at both ends of the way in, but not take the hand"
     " straight along it",
-    Outcome.LIFT_LINE: "the arm cannot take the hand straight up",
+    Outcome.RETREAT_LINE: "the arm cannot take the hand straight back",
+    Outcome.LIFT_LINE: "the arm cannot take the hand along the lift",
     Outcome.NO_PATH: "no way from the home posture to the pregrasp was found",
 }
 BLOCKERS = 3

@@ -1,0 +1,114 @@
+"""How high the hand can be lifted where there is no room for the whole lift.
+
+A motion to some height holds one to every smaller height, so that the largest one is found by
+halving: first that of the hand alone, which is quick, then that of the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.frames import Array
+from burg_drake.core.outcome import Outcome
+from burg_drake.motion.verdict import Reach
+
+Booleans = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+STEP = 0.01
+"""Distance of the heights that are tried [m]."""
+WHATEVER_HEIGHT = (
+    Outcome.HAND_COLLISION_APPROACH,
+    Outcome.HAND_COLLISION_RETREAT,
+    Outcome.NO_IK,
+    Outcome.JOINT_LIMIT,
+)
+"""Outcomes that no smaller lift changes."""
+
+Judge = Callable[[float, Indices], Sequence[Reach]]
+"""Verdicts on some grasps (S,) that are lifted to a height [m]."""
+HandIsFree = Callable[[float, Indices], Booleans]
+"""Whether the hand alone is free on its ways (S,), lifted to a height [m]."""
+IsFree = Callable[[int, Indices], Booleans]
+"""Whether some rows (S,) are free up to a level."""
+
+
+def heights(least: float, most: float) -> Array:
+    """What is tried, rising from `least` by `STEP` to `most` [m]."""
+    return np.append(np.arange(least, most - 1e-9, STEP), most)
+
+
+def as_high_as_there_is_room(
+    whole: Sequence[Reach], tried: Array, judge: Judge, hand_is_free: HandIsFree
+) -> list[Reach]:
+    """Goes on with grasps whose lift is not whole.
+
+    Args:
+        whole: N verdicts with the whole lift.
+        tried: (H,) rising heights, of which the last is the whole lift [m].
+        judge: asks about others.
+        hand_is_free: likewise.
+
+    Returns:
+        N verdicts: where there is room for the first of the heights, a yes with the largest one
+        that was found, and as its `blocker` what is in the way of the whole lift; otherwise why
+        there is no room for the first.
+    """
+    found, top = list(whole), len(tried) - 1
+    asked = _where(
+        reach.outcome is not None and reach.outcome not in WHATEVER_HEIGHT for reach in whole
+    )
+
+    def reached(level: int, some: Indices) -> Booleans:
+        verdicts = judge(tried[level], some)
+        for k, reach in zip(some, verdicts, strict=True):
+            if reach.outcome is None:
+                found[k] = replace(reach, blocker=whole[k].blocker)
+            elif level == 0:
+                found[k] = reach
+        return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
+
+    left = asked[reached(0, asked)]
+    low, high = np.zeros(len(left), np.intp), np.full(len(left), top)
+    by_hand = _where(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in left)
+    free, _ = _halved(
+        low[by_hand],
+        high[by_hand],
+        lambda level, rows: hand_is_free(tried[level], left[by_hand[rows]]),
+    )
+    # As high as the hand gets by itself, the arm often does, too.
+    high[by_hand] = free + 1
+    low[by_hand], high[by_hand] = _narrowed(
+        low[by_hand], high[by_hand], free, lambda level, rows: reached(level, left[by_hand[rows]])
+    )
+    _halved(low, high, lambda level, rows: reached(level, left[rows]))
+    return found
+
+
+def _halved(low: Indices, high: Indices, is_free: IsFree) -> tuple[Indices, Indices]:
+    """Neighbouring levels of which the lower is free and the upper is not, for R rows, from levels
+    (R,) of which that is known."""
+    while (high - low > 1).any():
+        low, high = _narrowed(low, high, (low + high) // 2, is_free)
+    return low, high
+
+
+def _narrowed(
+    low: Indices, high: Indices, middle: Indices, is_free: IsFree
+) -> tuple[Indices, Indices]:
+    """The same with what is between them looked at at one level each (R,)."""
+    low, high = low.copy(), high.copy()
+    between = (low < middle) & (middle < high)
+    for level in np.unique(middle[between]).tolist():
+        rows = np.flatnonzero(between & (middle == level))
+        free = is_free(level, rows)
+        low[rows[free]], high[rows[~free]] = level, level
+    return low, high
+
+
+def _where(said: Iterable[bool]) -> Indices:
+    return np.flatnonzero(np.fromiter(said, dtype=bool))
