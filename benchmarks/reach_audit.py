@@ -81,11 +81,12 @@ class Audit:
                 longer than the arm [m].
         """
         parts = {"transfer": witness.transfer, "approach": witness.approach, "lift": witness.lift}
+        held_at = witness.lift[0]
         if witness.retreat is not None:
-            parts = {**parts, "retreat": witness.retreat}
+            parts["retreat"], held_at = witness.retreat, witness.retreat[0]
         target = self._built.free.get(instance)
         X_WO = RigidTransform(self._built.X_WO(instance)) if instance else RigidTransform()
-        X_HO = self._X_WH(witness.approach[-1]).inverse() @ X_WO
+        X_HO = self._X_WH(held_at).inverse() @ X_WO
         found = []
         for part, rows in parts.items():
             held = target if part in ("retreat", "lift") else None
