@@ -18,6 +18,8 @@ ARM_DAMPING_TIME = 0.05
 ACCELERATION_KP = 2000.0
 """[1/s^2]: the stiffest of the gains that Drake gives a simulated iiwa (sim_iiwa_driver.cc); its
 others go down to 500."""
+GAINS = (1e-3, 1e6)
+"""Of any kind; no drive is as stiff."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,8 +47,12 @@ class ArmControl:
     def __post_init__(self) -> None:
         for name in ("kp", "kd"):
             values = getattr(self, name)
-            if values is not None and not (values and min(values) > 0.0):
-                raise FieldError(f"{name} {list(values)} must be above 0", name)
+            low, high = GAINS
+            if values is not None and not (values and low <= min(values) <= max(values) <= high):
+                raise FieldError(
+                    f"{name} {list(values)} must be one number or one a joint, {low:g} to {high:g}",
+                    name,
+                )
 
     def gains(self, joints: int, where: str) -> tuple[Array, Array]:
         """`kp` and `kd`, (n,) each, of an arm with n joints.

@@ -19,8 +19,8 @@ class ArmDriver(LeafSystem):
     """Follows a plan that has begun, else a position or a desired state; without any of them it
     holds what was commanded last.
 
-    The velocity that goes with a position is its difference from that of one step before: 0 in the
-    first step, as in Drake's `StateInterpolatorWithDiscreteDerivative`.
+    The velocity that goes with a position is its difference from that of one step before, and 0 in
+    the first step. Drake's `StateInterpolatorWithDiscreteDerivative` does the same a step later.
 
     Ports:
         position: (n) [rad].

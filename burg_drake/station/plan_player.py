@@ -6,7 +6,7 @@ A plan comes from rooms further down, so that this one knows it by its shape alo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -39,8 +39,9 @@ class SampledMotion(Protocol):
 
 @runtime_checkable
 class PlayablePlan(Protocol):
-    """Phases by name, one after the other; the distance between the pads of the open hand [m]; and
-    what the plan is for (joints, scene, station), or None."""
+    """Phases by name, one after the other; the distance between the pads of the open hand [m]; what
+    the plan is for, with the names of its `joints`, or None; and whether that is this scene and
+    station, which is not asked without an origin."""
 
     @property
     def phases(self) -> Mapping[str, SampledMotion]: ...
@@ -50,6 +51,8 @@ class PlayablePlan(Protocol):
 
     @property
     def origin(self) -> Any: ...
+
+    def require_for(self, scene: Scene, station: Station) -> None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,35 +121,24 @@ class PlanPlayer:
 
     def _checked(self, plan: object) -> _Course:
         if not isinstance(plan, PlayablePlan):
-            raise InvalidInputError(
-                f"the port 'plan' got a {type(plan).__name__}; it takes a burg_drake Plan"
-            )
-        self._check_origin(plan.origin)
+            got = type(plan).__name__
+            if hasattr(plan, "outcome"):  # a planner's answer where it found no plan
+                got += f" ({plan.outcome})"
+            raise InvalidInputError(f"the port 'plan' got a {got}; it takes a burg_drake Plan")
+        if plan.origin is not None:
+            self._check_joints(plan.origin.joints)
+            plan.require_for(self._scene, self._station)
         opening = plan.opening
         if np.isnan(opening):
             opening = self._station.hand.opening[1]
         return _course(plan.phases, len(self._joints), opening)
 
-    def _check_origin(self, origin: Any) -> None:
-        if origin is None:
-            return
-        if tuple(origin.joints) != self._joints:
+    def _check_joints(self, joints: Sequence[str]) -> None:
+        if tuple(joints) != self._joints:
             raise InvalidInputError(
-                f"the plan moves the joints {', '.join(origin.joints)}; the arm of station"
+                f"the plan moves the joints {', '.join(joints)}; the arm of station"
                 f" {self._station.name!r} has {', '.join(self._joints)}"
             )
-        for kind, made_for, here in (
-            ("scene", origin.scene_content, self._scene.content),
-            ("station", origin.station_content, self._station.content),
-        ):
-            if made_for != here:
-                name = getattr(origin, kind)
-                own = self._scene.name if kind == "scene" else self._station.name
-                which = f"{kind} {name!r}" if name != own else f"another state of {kind} {name!r}"
-                raise InvalidInputError(
-                    f"the plan was made for {which}, not for {kind} {own!r} of this diagram; plan"
-                    " the grasp again here"
-                )
 
 
 def _course(phases: Mapping[str, SampledMotion], joints: int, opening: float) -> _Course:

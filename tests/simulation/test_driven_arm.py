@@ -15,8 +15,10 @@ from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
+from burg_drake.core.outcome import Outcome
 from burg_drake.motion.limits import ArmLimits
 from burg_drake.motion.trajectory import Origin, Plan
+from burg_drake.motion.verdict import Reach
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.arm_trial import ArmTrial
 from burg_drake.station.arm_control import ArmControl
@@ -119,6 +121,9 @@ def test_a_plan_is_played_and_lifts_the_box(
         def __init__(self) -> None:
             self.phases = phases
 
+        def require_for(self, scene: Scene, station: Station) -> None:
+            raise AssertionError("nobody knows")
+
     context = built.diagram.CreateDefaultContext()
     plant_context = built.plant.GetMyContextFromRoot(context)
     built.diagram.GetInputPort("plan").FixValue(context, Longer())
@@ -192,15 +197,16 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
         " panda_joint5, panda_joint6, panda_joint7"
     )
     other = replace(origin, scene="kitchen", scene_content="1")
-    assert message(replace(plan, origin=other)) == (
-        "the plan was made for scene 'kitchen', not for scene 'test' of this diagram; plan the"
-        " grasp again here"
+    assert "the plan is for scene 'kitchen' (content 1), not for 'test' (content" in message(
+        replace(plan, origin=other)
     )
     other = replace(origin, station_content="1")
-    assert "made for another state of station 'test', not for" in message(
+    assert "the plan is for station as it was before a change (content 1), not for" in message(
         replace(plan, origin=other)
     )
     assert "the port 'plan' got a Trajectory; it takes a burg_drake Plan" in message(plan.lift)
+    no = Reach(Outcome.NO_IK)
+    assert "the port 'plan' got a Reach (no_ik); it takes a burg_drake Plan" in message(no)
     six = replace(plan.transfer, q=plan.transfer.q[:, :6], v=plan.transfer.v[:, :6])
     assert "the plan's transfer moves 6 joints; the arm has 7" in message(
         replace(plan, transfer=six, origin=None)
@@ -220,6 +226,8 @@ def test_trials_follow_an_inverse_dynamics_controller(
     """One after the other with the same bits, and within its tracking error."""
     arm = replace(station.document.arm, control=ArmControl(kind="inverse_dynamics"))  # type: ignore[type-var]
     controlled = replace(station, document=replace(station.document, arm=arm))
+    assert plan.origin is not None
+    plan = replace(plan, origin=replace(plan.origin, station_content=controlled.content))
     trial = ArmTrial(scene, controlled)
     first = trial.run("box", CENTRE, plan)
     assert first.outcome == "lifted"

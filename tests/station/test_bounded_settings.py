@@ -10,6 +10,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.scene import Board
 from burg_drake.simulation.trial_settings import TrialSettings
+from burg_drake.station.arm_control import ArmControl
 from burg_drake.station.engine import Engine
 from burg_drake.station.hand import load_hand
 from burg_drake.station.station import Arm, Camera, Pose
@@ -26,6 +27,7 @@ from burg_drake.station.station import Arm, Camera, Pose
         (lambda: Engine(name="slow", time_step=1e-300), "time_step of engine 'slow' is 1e-300"),
         (lambda: replace(load_hand("panda_hand"), closing_speed=1e-9), "takes 4e\\+07 s to close"),
         (lambda: Arm(home=(0.0,), velocity=(1e-300,)), "velocity limits must be 0.001 or more"),
+        (lambda: ArmControl(kp=(1e300,)), "kp .* must be one number or one a joint, 0.001 to 1e"),
         (lambda: Camera(X_WC=Pose(), width=10**9), "a side has at most 16,384"),
         (lambda: Board(size=(1e9, 0.4)), "at most 100 m"),
     ],
