@@ -41,7 +41,13 @@ def iiwa_station(folder: Path) -> Path:
     """Writes model and station of the iiwa; returns the station's file."""
     (folder / "iiwa14.urdf").write_text(_iiwa_urdf(), encoding="utf-8")
     home = tuple(np.deg2rad([0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0]).tolist())
-    arm = Arm(model="iiwa14.urdf", base="link_0", flange="flange", X_FH=Pose(translation=(0.0, 0.0, 0.03)), home=home)
+    arm = Arm(
+        model="iiwa14.urdf",
+        base="link_0",
+        flange="flange",
+        X_FH=Pose(translation=(0.0, 0.0, 0.03)),
+        home=home,
+    )
     return _station(folder, "iiwa_tabletop", replace(load_station("panda_wsg").document, arm=arm))
 
 

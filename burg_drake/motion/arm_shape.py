@@ -1,7 +1,7 @@
 """What the quick bounds need to know of an arm and its hand, whatever stands around them.
 
-To find it takes longer than all else, and one process builds many diagrams of the same robot: so it
-is kept, by content.
+To find it takes longer than all else, and one process builds many diagrams of the same robot, one
+process after the other: so it is kept, by content, in memory and in the user's cache.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from pydrake.geometry import (
     Sphere,
 )
 
+from burg_drake.core.cache import Arrays, kept
 from burg_drake.core.content import content_hash
 from burg_drake.core.frames import Array
+from burg_drake.motion.arm_shape_arrays import from_arrays, to_arrays
 from burg_drake.motion.balls import BallTrees, bodies_with_shape
 from burg_drake.motion.links import ArmLinks
 from burg_drake.motion.self_clearance import SelfClearance, counted_pairs
@@ -45,12 +47,14 @@ class ArmShape:
         limits: (n, 2) of the joints' positions [rad or m].
         trees: balls that cover it.
         itself: its clearance from itself.
+        content: hash of all that these follow from.
     """
 
     links: ArmLinks
     limits: Array
     trees: BallTrees
     itself: SelfClearance
+    content: str
 
     @classmethod
     def of(cls, station_diagram: StationDiagram) -> ArmShape:
@@ -68,15 +72,19 @@ class ArmShape:
         )
         key = content_hash(*_content(station_diagram, links), limits)
         if key not in _kept:
-            trees = BallTrees.of(station_diagram, links)
-            _kept[key] = trees, SelfClearance.of(station_diagram, links, trees, limits)
+
+            def make() -> Arrays:
+                trees = BallTrees.of(station_diagram, links)
+                return to_arrays(trees, SelfClearance.of(station_diagram, links, trees, limits))
+
+            _kept[key] = from_arrays(kept("robot", key, make))
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
         trees, itself = _kept[key]
         own = dict(zip(bodies_with_shape(station_diagram, links), trees.bodies, strict=True))
         # Where a scene has other objects, the robot's bodies have other numbers, in the same order.
         bodies = tuple(replace(known, body=body) for body, known in own.items())
-        return cls(links, limits, replace(trees, bodies=bodies), itself)
+        return cls(links, limits, replace(trees, bodies=bodies), itself, key)
 
 
 def _content(station_diagram: StationDiagram, links: ArmLinks) -> Iterator[Any]:

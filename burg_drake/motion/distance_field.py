@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from burg_drake.core.cache import Arrays, kept
 from burg_drake.core.frames import Array
 from burg_drake.motion.links import Single
-from burg_drake.motion.solids import BoxSolid, HullSolid, Solid
+from burg_drake.motion.solids import BoxSolid, HullSolid, Solid, content_of
 
 CELL = 5e-3
 """Side of a cell [m]."""
@@ -50,27 +51,22 @@ class DistanceField:
 
     @classmethod
     def of(cls, solids: list[Solid]) -> DistanceField:
-        """The field of solids in the world."""
+        """The field of solids in the world; of solids seen before, from the user's cache."""
         boxes = tuple(s for s in solids if isinstance(s, BoxSolid) and 2 * max(s.half) >= LARGE)
         small = [s for s in solids if s not in boxes]
         if not small:
             far = np.full(1, np.inf, dtype=np.float32)
             return cls(np.zeros(3), CELL, (1, 1, 1), far, far, boxes)
-        low = np.min([s.low for s in small], axis=0)
-        high = np.max([s.high for s in small], axis=0)
-        low -= (MARGIN, MARGIN, np.clip(low[2] + CELL, 0.0, MARGIN))
-        high += MARGIN
-        cell = max(CELL, float(np.cbrt(np.prod(high - low) / MAX_CELLS)))
-        shape = np.ceil((high - low) / cell).astype(int) + 1
-        ticks = [a + cell * np.arange(n) for a, n in zip(low, shape, strict=True)]
-        lower, upper = _bounds_at(ticks, cell, small)
-        slack = np.float32(cell * np.sqrt(3.0) / 2)
-        lower -= slack
-        upper += slack
-        for axis in range(3):  # where points beyond the grid are looked up
-            np.moveaxis(upper, axis, 0)[[0, -1]] = np.inf
-        nx, ny, nz = (int(n) for n in shape)
-        return cls(low, cell, (nx, ny, nz), lower.reshape(-1), upper.reshape(-1), boxes)
+        arrays = kept("distances", content_of(small), lambda: _arrays(small))
+        nx, ny, nz = (int(n) for n in arrays["shape"])
+        return cls(
+            arrays["origin"],
+            float(arrays["cell"]),
+            (nx, ny, nz),
+            arrays["lower"],
+            arrays["upper"],
+            boxes,
+        )
 
     def index(self, p: Single) -> NDArray[np.intp]:
         """Cells of points (3, ...); of points beyond the grid the nearest cell."""
@@ -102,6 +98,25 @@ class DistanceField:
         for box in self.boxes:
             np.minimum(bound, box.distance(p), out=bound)
         return bound
+
+
+def _arrays(small: list[Solid]) -> Arrays:
+    """The grid around solids."""
+    low = np.min([s.low for s in small], axis=0)
+    high = np.max([s.high for s in small], axis=0)
+    low -= (MARGIN, MARGIN, np.clip(low[2] + CELL, 0.0, MARGIN))
+    high += MARGIN
+    cell = max(CELL, float(np.cbrt(np.prod(high - low) / MAX_CELLS)))
+    shape = np.ceil((high - low) / cell).astype(int) + 1
+    ticks = [a + cell * np.arange(n) for a, n in zip(low, shape, strict=True)]
+    lower, upper = _bounds_at(ticks, cell, small)
+    slack = np.float32(cell * np.sqrt(3.0) / 2)
+    lower -= slack
+    upper += slack
+    for axis in range(3):  # where points beyond the grid are looked up
+        np.moveaxis(upper, axis, 0)[[0, -1]] = np.inf
+    bounds = {"lower": lower.reshape(-1), "upper": upper.reshape(-1)}
+    return {"origin": low, "cell": np.array(cell), "shape": shape, **bounds}
 
 
 def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Single, Single]:

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.content import content_hash
 from burg_drake.core.frames import Array
 from burg_drake.motion.collision import STILL, ArmCollision
 from burg_drake.motion.edge_screen import FINE, GRAZE, GUESS, Screened, screen_edges
@@ -46,6 +47,11 @@ class Edges:
         self.collision = collision
         self.exact = exact
         self.checks = 0
+
+    @property
+    def content(self) -> str:
+        """Hash of what the fast tier's answers follow from."""
+        return content_hash(self.proximity.content, self.exact)
 
     def is_free(self, q_a: Array, q_b: Array) -> bool:
         """Whether the arm can move straight in joint space from `q_a` (n,) to `q_b` (n,)."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from burg_drake.core.content import rng_from
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash, rng_from
 from burg_drake.core.frames import Array
 from burg_drake.motion.links import ArmLinks
 from burg_drake.station.diagram import StationDiagram
@@ -49,13 +51,26 @@ def postures_over_objects(
     hand = plant.GetBodyByName(station.hand.body, plant.GetModelInstanceByName("hand")).index()
     X_FG = links.X_FB[hand] @ station.hand.X_HG.matrix()
     objects = [station_diagram.X_WO(name)[:3, 3] for name in station_diagram.scene.instances]
-    q = random_postures(home, lower, upper, DRAWN, rng_from("burg_drake postures over objects"))
+    frame = links.frame_of[hand]
+
+    def make() -> Arrays:
+        q = random_postures(home, lower, upper, DRAWN, rng_from("burg_drake postures over objects"))
+        return {"q": q[_look_at(links, frame, X_FG, objects, q)]}
+
+    asked = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
+    return np.asarray(kept("postures", content_hash(*asked), make)["q"])
+
+
+def _look_at(
+    links: ArmLinks, frame: int, X_FG: Array, objects: list[Array], q: Array
+) -> NDArray[np.bool_]:
+    """(N,) whether the hand looks at one of the objects in postures (N, n)."""
     looks = np.zeros(len(q), dtype=bool)
     for start in range(0, len(q), BLOCK):
         block = slice(start, start + BLOCK)
         poses = links.poses(q[block])
         points = np.stack([X_FG[:3, 3], X_FG[:3, 3] + X_FG[:3, 2]]).astype(np.float32)
-        p_WG, ahead = poses.place(links.frame_of[hand], points).swapaxes(0, 1)
+        p_WG, ahead = poses.place(frame, points).swapaxes(0, 1)
         approach = ahead - p_WG
         for p_WO in objects:
             way = p_WO.astype(np.float32)[:, None] - p_WG
@@ -63,4 +78,4 @@ def postures_over_objects(
             along = (way * approach).sum(axis=0)
             near = (distance > NEAREST) & (distance < FARTHEST)
             looks[block] |= near & (along > COSINE * distance)
-    return q[looks]
+    return looks

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.grasping.collision_geometry import shape_of
@@ -17,7 +18,7 @@ from burg_drake.motion.arm_shape import ArmShape
 from burg_drake.motion.displacement import ROUNDING, Displacement
 from burg_drake.motion.distance_field import DistanceField
 from burg_drake.motion.links import Indices, LinkPoses, Single
-from burg_drake.motion.solids import Solid, solid_of
+from burg_drake.motion.solids import Solid, content_of, solid_of
 from burg_drake.station.diagram import StationDiagram
 
 BLOCK = 2**12
@@ -69,6 +70,7 @@ class ArmProximity:
     Attributes:
         links: the arm's forward kinematics.
         field: distances from the scene.
+        content: hash of all that the bounds follow from.
         apart: pairs of the robot's bodies that are proven not to meet while its joints are within
             their limits.
     """
@@ -89,7 +91,9 @@ class ArmProximity:
         plant = station_diagram.plant
         shape = ArmShape.of(station_diagram)
         self.links = shape.links
-        self.field = DistanceField.of(_solids(station_diagram))
+        solids = _solids(station_diagram)
+        self.field = DistanceField.of(solids)
+        self.content = content_hash(shape.content, content_of(solids))
         self._trees, self._itself = shape.trees, shape.itself
         self._bodies = self._trees.bodies
         hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))

@@ -1,6 +1,6 @@
 """A graph of arm configurations around the home posture, and shortest ways in it from there.
 
-It is laid out once, by a few bounds of the fast tier per edge. An edge is judged when a way first
+It is laid out once, by a few bounds of the fast tier per edge, and kept in the user's cache. An edge is judged when a way first
 leads over it (Bohlin and Kavraki, "Path planning using lazy PRM", ICRA 2000), and the verdict is
 kept. The answer on a node is its shortest way of free edges, whoever has asked before.
 """
@@ -15,7 +15,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from burg_drake.core.content import rng_from
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash, rng_from
 from burg_drake.core.frames import Array
 from burg_drake.motion.edges import Edges
 from burg_drake.motion.focus import random_postures
@@ -65,38 +66,18 @@ class Roadmap:
                 dropped.
         """
         self._edges = edges
-        rng = rng_from("burg_drake home tree", seed, nodes)
-        self.scale = _levers(edges, rng.uniform(lower, upper, (POSTURES, len(home))))
-        at_home = float(edges.proximity.bounds(home[None]).lower[0])
-        self._clearance = min(CLEARANCE, at_home - BELOW)
-        wide = random_postures(home, lower, upper, 2 * nodes, rng)
-        near = self._clear(wide[:0] if focus is None else focus, 2 * nodes // 3)
-        q = np.concatenate([home[None], near, self._clear(wide, nodes - len(near))])
-        ends, length = self._connect(q)
-        reached = np.isfinite(_shortest(ends, length, len(q))[0])
-        number = np.cumsum(reached) - 1
-        keep = reached[ends[:, 0]]
-        self.q = q[reached]
-        self._ends, self._length = number[ends[keep]], length[keep]
+        near = np.empty((0, len(home))) if focus is None else focus
+        asked = (edges.content, home, lower, upper, near, seed, nodes)
+        arrays = kept(
+            "roadmap",
+            content_hash(*asked),
+            lambda: _laid_out(edges, home, lower, upper, near, seed, nodes),
+        )
+        self.q, self.scale = arrays["q"], arrays["scale"]
+        self._ends, self._length = arrays["ends"], arrays["length"]
         self._free: set[tuple[int, int]] = set()
         self._blocked: set[tuple[int, int]] = set()
         self._search()
-
-    def _clear(self, q: Array, count: int) -> Array:
-        """The first `count` configurations with clearance."""
-        q = q[: 3 * count]
-        return q[self._edges.proximity.bounds(q).lower > self._clearance][:count]
-
-    def _connect(self, q: Array) -> tuple[NDArray[np.intp], Array]:
-        """(E, 2) pairs of near nodes that seem to be connected, and the displacements [m]."""
-        scaled = q * self.scale
-        ranks = np.arange(1, min(NEIGHBOURS + 1, len(q)) + 1)
-        _, near = cKDTree(scaled).query(scaled, k=ranks, p=1.0)
-        pairs = np.stack([np.repeat(np.arange(len(q)), near.shape[1]), near.ravel()], axis=1)
-        pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
-        screened = self._edges.screen(q[pairs[:, 0]], q[pairs[:, 1]], fine=np.inf)
-        seems = self._edges.seem_free(screened)
-        return pairs[seems], screened.length[seems]
 
     def _search(self) -> None:
         self.distance, self._before = _shortest(self._ends, self._length, len(self.q))
@@ -144,6 +125,43 @@ class Roadmap:
             free = self._edges.is_free(self.q[first], self.q[second])
             (self._free if free else self._blocked).add((first, second))
         return (first, second) in self._free
+
+
+def _laid_out(
+    edges: Edges, home: Array, lower: Array, upper: Array, focus: Array, seed: object, nodes: int
+) -> Arrays:
+    """Nodes and edges of a roadmap; for the arguments see there."""
+    rng = rng_from("burg_drake home tree", seed, nodes)
+    scale = _levers(edges, rng.uniform(lower, upper, (POSTURES, len(home))))
+    at_home = float(edges.proximity.bounds(home[None]).lower[0])
+    clearance = min(CLEARANCE, at_home - BELOW)
+    wide = random_postures(home, lower, upper, 2 * nodes, rng)
+    near = _clear(edges, focus, 2 * nodes // 3, clearance)
+    q = np.concatenate([home[None], near, _clear(edges, wide, nodes - len(near), clearance)])
+    ends, length = _connect(edges, q, scale)
+    reached = np.isfinite(_shortest(ends, length, len(q))[0])
+    number = np.cumsum(reached) - 1
+    keep = reached[ends[:, 0]]
+    kept_ends = {"ends": number[ends[keep]], "length": length[keep]}
+    return {"q": q[reached], "scale": scale, **kept_ends}
+
+
+def _clear(edges: Edges, q: Array, count: int, clearance: float) -> Array:
+    """The first `count` configurations with clearance."""
+    q = q[: 3 * count]
+    return q[edges.proximity.bounds(q).lower > clearance][:count]
+
+
+def _connect(edges: Edges, q: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
+    """(E, 2) pairs of near nodes that seem to be connected, and the displacements [m]."""
+    scaled = q * scale
+    ranks = np.arange(1, min(NEIGHBOURS + 1, len(q)) + 1)
+    _, near = cKDTree(scaled).query(scaled, k=ranks, p=1.0)
+    pairs = np.stack([np.repeat(np.arange(len(q)), near.shape[1]), near.ravel()], axis=1)
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    screened = edges.screen(q[pairs[:, 0]], q[pairs[:, 1]], fine=np.inf)
+    seems = edges.seem_free(screened)
+    return pairs[seems], screened.length[seems]
 
 
 def _levers(edges: Edges, q: Array) -> Array:

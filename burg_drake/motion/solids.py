@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from burg_drake.core.content import content_hash
 from burg_drake.core.frames import Array
 from burg_drake.grasping.convex import Ball, Boxes, Cylinder
 from burg_drake.grasping.shape import Shape
@@ -146,6 +147,11 @@ class HullSolid:
 
 
 Solid = BoxSolid | BallSolid | HullSolid
+
+
+def content_of(solids: list[Solid]) -> str:
+    """Hash of solids."""
+    return content_hash([[type(solid).__name__, vars(solid)] for solid in solids])
 
 
 def solid_of(shape: Shape, X_WB: Array) -> Solid:

@@ -1,0 +1,51 @@
+"""Verdicts are the same to the last bit without the cache, with an empty one, and with a full one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.motion import arm_shape
+from burg_drake.motion.reach import ArmReach
+from burg_drake.scene.scene import load_scene
+from burg_drake.station.diagram import instance_pose
+
+KINDS = {"distances", "postures", "roadmap", "robot"}
+
+
+def grasps(count: int) -> tuple[list[str], np.ndarray]:
+    """From above, into instances of the scene and beside them."""
+    scene, rng = load_scene("tabletop_six"), np.random.default_rng(0)
+    names = [list(scene.instances)[k % len(scene.instances)] for k in range(count)]
+    X_OG = [
+        grasp_from_axes((np.cos(a), np.sin(a), 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, z))
+        for a, z in rng.uniform((0.0, 0.02), (np.pi, 0.12), (count, 2))
+    ]
+    return names, np.array([instance_pose(scene, n) @ X for n, X in zip(names, X_OG, strict=True)])
+
+
+def test_verdicts_do_not_depend_on_the_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    names, X_WG = grasps(24)
+    found = []
+    for place in ("off", str(tmp_path), str(tmp_path)):
+        monkeypatch.setenv("BURG_DRAKE_CACHE", place)
+        arm_shape._kept.clear()
+        reach = ArmReach("tabletop_six", "panda_tabletop")
+        lower, upper = reach.kinematics.lower, reach.kinematics.upper
+        q = np.random.default_rng(1).uniform(lower, upper, (500, 7))
+        verdicts = reach.check_all(names, X_WG)
+        bits = [reach.proximity.bounds(q).lower.tobytes(), reach.tree.roadmap.distance.tobytes()]
+        for verdict in verdicts:
+            bits += [verdict.outcome, verdict.blocker, np.array(verdict.clearance).tobytes()]
+            if way := verdict.witness:
+                bits += [x.tobytes() for x in (way.transfer, way.approach, way.lift)]
+        found.append(bits)
+    assert sum(verdict.witness is not None for verdict in verdicts) > 3
+    assert found[0] == found[1] == found[2]
+    assert {path.name.split("-")[0] for path in tmp_path.iterdir()} == KINDS
+    assert not caplog.messages
