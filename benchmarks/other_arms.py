@@ -2,8 +2,8 @@
 and a Panda on a base that slides along x and y.
 
 The iiwa's joints, their ranges and speeds are those of its data sheet (KUKA, "LBR iiwa 7 R800, LBR
-iiwa 14 R820, Specification"): 0.36, 0.42, 0.40 and 0.126 m from base to flange, no offsets. Capsules
-about these lengths stand in for its housings.
+iiwa 14 R820, Specification"): 0.36, 0.42, 0.40 and 0.126 m from base to flange, no offsets.
+Capsules about these lengths stand in for its housings.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ def _iiwa_urdf() -> str:
             f'<joint name="joint_{k}" type="revolute"><origin xyz="{_text(origin)}"'
             f' rpy="{_text(np.deg2rad(rpy))}"/><parent link="link_{k - 1}"/>'
             f'<child link="link_{k}"/><axis xyz="0 0 1"/><limit lower="{-np.deg2rad(turn)}"'
-            f' upper="{np.deg2rad(turn)}" velocity="{np.deg2rad(speed)}" effort="{torque}"/></joint>',
+            f' upper="{np.deg2rad(turn)}" velocity="{np.deg2rad(speed)}" effort="{torque}"/>'
+            "</joint>",
             f'<transmission name="t{k}"><type>SimpleTransmission</type><joint name="joint_{k}"/>'
             f'<actuator name="joint_{k}"/></transmission>',
         ]
@@ -97,7 +98,7 @@ def _iiwa_urdf() -> str:
 
 
 def _link(name: str, end: tuple[float, ...], radius: float, mass: float, start: float = 0.0) -> str:
-    """A capsule from the link's origin, or a height over it, to `end`, as hard to turn as a ball."""
+    """A capsule from the link's origin, or a height over it, to `end`; turns as a ball does."""
     way = np.array(end)
     length = float(np.linalg.norm(way)) - start
     rpy = (0.0, 0.0, 0.0) if way[2] else (-np.pi / 2, 0.0, 0.0)
@@ -131,7 +132,8 @@ def _mobile_sdf() -> str:
             "<velocity>0.5</velocity><effort>500</effort></limit></axis></joint>"
         )
     added.append(
-        '<joint name="mount" type="fixed"><parent>platform</parent><child>panda_link0</child></joint>'
+        '<joint name="mount" type="fixed"><parent>platform</parent><child>panda_link0</child>'
+        "</joint>"
     )
     first = '<link name="panda_link0">'
     placed = f'{first}<pose relative_to="platform">0 0 {PLATFORM[2]} 0 0 0</pose>'

@@ -20,7 +20,7 @@ from types import ModuleType
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# What is computed once for a robot or a scene serves all tests of a run, and none of it the next run.
+# What is computed once for a robot or a scene serves all tests of a run, but not the next run.
 if "BURG_DRAKE_CACHE" not in os.environ:
     os.environ["BURG_DRAKE_CACHE"] = tempfile.mkdtemp(prefix="burg_drake_cache_")
     atexit.register(shutil.rmtree, os.environ["BURG_DRAKE_CACHE"], ignore_errors=True)

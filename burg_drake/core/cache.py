@@ -1,9 +1,9 @@
 """What takes long to compute and follows from content alone, kept from one process to the next.
 
-A folder of the user's has one `.npz` file an entry, named by what its arrays were computed from. In
-it stand the hash of the code that has computed them and the versions of numpy and scipy: of others
-nothing is used. Whatever is wrong with an entry, the arrays are computed again, to the same bits, and
-take its place; whatever is wrong with the folder, they are computed each time.
+A folder of the user's has one `.npz` file an entry, named by what its arrays were computed from,
+with a hash of the code that has computed them and of the versions of numpy and scipy: of others
+nothing is used. Whatever is wrong with an entry, its arrays are computed again, to the same bits,
+and take its place; whatever is wrong with the folder, they are computed each time.
 
 The folder is `BURG_DRAKE_CACHE`, if that is set (`off`: none); else `burg_drake` in
 `XDG_CACHE_HOME`, `~/Library/Caches` on macOS, or `~/.cache`. It may be deleted at any time.
@@ -115,7 +115,8 @@ def _arrays(archive: NpzFile) -> Arrays:
 def _write(path: Path, arrays: Arrays, made_by: str) -> None:
     """Writes an entry, if that is possible."""
     buffer = io.BytesIO()
-    np.savez(buffer, **{MADE: np.array(made_by)}, **arrays)
+    every: dict[str, Any] = {MADE: np.array(made_by), **arrays}
+    np.savez(buffer, **every)
     try:
         atomic_write(path, buffer.getvalue())
     except InvalidInputError as error:

@@ -32,7 +32,7 @@ CELL = 1.8
 """Size of a cell over the overshoot. Up to 2.7 the ball about the middle of a cube in a corner of a
 box covers it: half its diagonal is half its side plus the overshoot."""
 MOST_CELLS = 2_000
-"""Of a shape; that of a larger one is cut more coarsely, as time and memory grow with the square."""
+"""Of a shape; a larger one is cut more coarsely, as time and memory grow with the square."""
 COARSER = 1.1
 """Factor by which the overshoot rises until there are few enough."""
 DEEPEST = 0.08

@@ -1,8 +1,9 @@
 """A graph of arm configurations around the home posture, and shortest ways in it from there.
 
-It is laid out once, by a few bounds of the fast tier per edge, and kept in the user's cache. An edge is judged when a way first
-leads over it (Bohlin and Kavraki, "Path planning using lazy PRM", ICRA 2000), and the verdict is
-kept. The answer on a node is its shortest way of free edges, whoever has asked before.
+It is laid out once, by a few bounds of the fast tier per edge, and kept in the user's cache. An
+edge is judged when a way first leads over it (Bohlin and Kavraki, "Path planning using lazy PRM",
+ICRA 2000), and the verdict is kept. The answer on a node is its shortest way of free edges, whoever
+has asked before.
 """
 
 from __future__ import annotations

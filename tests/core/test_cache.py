@@ -128,7 +128,7 @@ def test_several_processes_at_once(folder: Path) -> None:
     program = (
         "import numpy as np; from burg_drake.core.cache import kept\n"
         "for k in range(30):\n"
-        "    x = kept('thing', f'{k % 5:064d}', lambda: {'x': np.full(20_000, k % 5)})['x']\n"
+        "    x = kept('thing', f'{k % 5}' * 64, lambda: {'x': np.full(20_000, k % 5)})['x']\n"
         "    assert (x == k % 5).all() and len(x) == 20_000"
     )
     running = [

@@ -1,4 +1,4 @@
-"""Verdicts are the same to the last bit without the cache, with an empty one, and with a full one."""
+"""Verdicts are the same to the last bit without a cache, with an empty one, with a full one."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from burg_drake.motion import arm_shape
 from burg_drake.motion.reach import ArmReach
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.diagram import instance_pose
+from burg_drake.station.station import load_station
 
 KINDS = {"distances", "postures", "roadmap", "robot"}
 
 
 def grasps(count: int) -> tuple[list[str], np.ndarray]:
     """From above, into instances of the scene and beside them."""
-    scene, rng = load_scene("tabletop_six"), np.random.default_rng(0)
+    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    rng = np.random.default_rng(0)
     names = [list(scene.instances)[k % len(scene.instances)] for k in range(count)]
     X_OG = [
         grasp_from_axes((np.cos(a), np.sin(a), 0.0), (0.0, 0.0, -1.0), (0.0, 0.0, z))
         for a, z in rng.uniform((0.0, 0.02), (np.pi, 0.12), (count, 2))
     ]
-    return names, np.array([instance_pose(scene, n) @ X for n, X in zip(names, X_OG, strict=True)])
+    X_WO = [instance_pose(scene, station, name) for name in names]
+    return names, np.array(X_WO) @ np.array(X_OG)
 
 
 def test_verdicts_do_not_depend_on_the_cache(
