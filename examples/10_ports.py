@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
@@ -22,6 +24,11 @@ def give(port: str, value: object) -> None:
     diagram.GetInputPort(port).FixValue(context, value)
 
 
+def read(port: str) -> Any:
+    """What a port says now."""
+    return diagram.GetOutputPort(port).Eval(context)
+
+
 home = np.array(station.document.arm.home)
 for time in np.arange(0.0, 0.8, 0.02):  # the wrist swings, the hand half closes and opens
     simulator.AdvanceTo(time)
@@ -29,8 +36,7 @@ for time in np.arange(0.0, 0.8, 0.02):  # the wrist swings, the hand half closes
     give("hand.position", [0.04 if time < 0.4 else 0.08])
 simulator.AdvanceTo(1.0)
 
-image = diagram.GetOutputPort("camera.board.color_image").Eval(context).data
-cloud = diagram.GetOutputPort("camera.board.point_cloud").Eval(context)
+image, cloud = read("camera.board.color_image").data, read("camera.board.point_cloud")
 meshcat.SetObject("cloud", cloud, point_size=0.003)
 print(f"image of {image.shape[1]} x {image.shape[0]} pixels, cloud of {cloud.size()} points")
 
@@ -43,12 +49,11 @@ give("plan", plan)
 give("plan.start_time", [end := 1.0])
 for name, phase in plan.phases.items():
     simulator.AdvanceTo(end := end + phase.duration)
-    outputs = ("arm.estimated_state", "arm.external_torque", "wrist.force_torque")
-    state, torque, wrist = (diagram.GetOutputPort(port).Eval(context) for port in outputs)
-    contacts = diagram.GetOutputPort("contact_results").Eval(context).num_hydroelastic_contacts()
+    state, torque = read("arm.estimated_state"), read("arm.external_torque")
+    wrist, force = read("wrist.force_torque"), read("hand.force_measured")
+    contacts = read("contact_results").num_hydroelastic_contacts()
     print(
         f"{name}: joints {1e3 * np.abs(state[:7] - phase.q[-1]).max():.1f} mrad off and with up to"
         f" {np.abs(torque).max():.1f} Nm of the world, {np.linalg.norm(wrist[3:]):.1f} N at the"
-        f" wrist, {contacts} contacts, pads press with"
-        f" {diagram.GetOutputPort('hand.force_measured').Eval(context)[0]:.1f} N"
+        f" wrist, {contacts} contacts, pads press with {np.abs(force[0]):.1f} N"
     )

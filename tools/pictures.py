@@ -1,15 +1,16 @@
-"""`python -m tools.pictures [station] [board] [overlay] [pages]`: makes pictures for the docs.
+"""`python -m tools.pictures [station] [board] [overlay] [pages] [ports]`: pictures for the docs.
 
 `station` renders those of stations and the built-in objects by Drake, `board` what a camera over
 the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
 of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
-pages that the commands write with --html, by a Chromium that runs without a display. The others are
-screenshots by hand.
+pages that the commands write with --html, by a Chromium that runs without a display; `ports` what
+the example of the ports shows in Meshcat. The others are screenshots by hand.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import runpy
 import shutil
 import subprocess
 import sys
@@ -137,6 +138,18 @@ def pages() -> None:
         photograph(page, "reachability.png", (1200, 760))
 
 
+def ports() -> None:
+    """Runs the example of the ports, and looks at the end of its plan."""
+    meshcat = runpy.run_path(str(IMAGES.parents[1] / "examples" / "10_ports.py"))["meshcat"]
+    meshcat.SetCameraPose([1.0, -0.75, 0.7], [0.35, 0.0, 0.2])
+    for hidden in ("/Grid", "/Axes", "/Background"):
+        meshcat.SetProperty(hidden, "visible", False)
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "page.html"
+        page.write_text(meshcat.StaticHtml())
+        photograph(page, "ports.png", (1000, 700))
+
+
 def station() -> None:
     """Writes the pictures of the station and the built-in objects."""
     panda = load_station("panda_tabletop")
@@ -200,7 +213,7 @@ def overlay() -> None:
 
 def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
-    kinds = {"station": station, "board": board, "overlay": overlay, "pages": pages}
+    kinds = {"station": station, "board": board, "overlay": overlay, "pages": pages, "ports": ports}
     for name in sys.argv[1:] or kinds:
         if name not in kinds:
             raise SystemExit(f"there are no pictures {name!r}, only {', '.join(kinds)}")
