@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from burg_drake.apps.arguments import (
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.grasp_output import Output, add_format, output_of
 from burg_drake.apps.motion_options import add_motion, chosen_motion
+from burg_drake.apps.reach_tables import print_tables
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
 from burg_drake.apps.sampling_options import (
     add_sampling,
@@ -28,20 +28,17 @@ from burg_drake.apps.sampling_options import (
 )
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import require_writable
-from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
-    from burg_drake.core.outcome import Outcome
     from burg_drake.scene.scene import Scene
     from burg_drake.station.station import Station
 
 DEFAULT_GRASPS = 100
 """Sampled for each object, unless grasps are given."""
+FRAME = "x, y, z: the grasp frame's origin in the frame of its object"
 TABLES = (".csv", ".parquet")
 """Suffixes of tables, which have a row for each grasp and no provenance."""
-BLOCKERS = 3
-"""Most frequent bodies that are listed for each outcome."""
 
 
 def add_to(verbs: Any) -> None:
@@ -148,7 +145,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
         progress=not arguments.quiet,
     )
     answered = judged.column("outcome") != ""
-    _print_tables(judged.select(answered))
+    names = [scene.instance(name).object for name in grasps]
+    print_tables(judged.select(answered), names)
     lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
     if lifts is not None:
         print(lifts)
@@ -237,66 +235,4 @@ def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
         return
     provenance = with_told_references(grasps.provenance, output.absolute().parent)
     write_table(output, reach_columns(grasps), provenance)
-    print(f"wrote {len(grasps)} grasps to {output}")
-
-
-def _print_tables(grasps: GraspSet) -> None:
-    """Counts by object and by outcome, what was in the way, and how fast that was found out."""
-    from burg_drake.core.figures import figure
-    from burg_drake.core.outcome import Outcome, Stage
-
-    outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
-    by_object: dict[str, Counter[Outcome]] = {}
-    for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
-        by_object.setdefault(name, Counter())[outcome] += 1
-    total = Counter(outcomes)
-    reach_table(by_object, total).show()
-    outcome_table(grasps, by_object, total).show()
-    asked = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
-    seconds = float(grasps.column("cpu").sum())
-    if asked and seconds > 0.0:
-        rate = f"{figure(asked / seconds)} clear grasps per CPU second"
-        print(f"{rate}; {figure(seconds)} CPU seconds without set-up")
-
-
-def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
-    """How many grasps of each object the arm can execute."""
-    from burg_drake.core.figures import count, percent
-    from burg_drake.core.outcome import Outcome, Stage
-
-    table = TextTable("Grasps that the arm can execute").names("object")
-    table.numbers("grasps", "clear", "reachable", "of clear")
-    rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
-    for name, counts in rows.items():
-        if name == "all":
-            table.gap()
-        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
-        good = counts[Outcome.REACHABLE]
-        share = percent(good / clear) if clear else "-"
-        table.row(name, count(counts.total()), count(clear), count(good), share)
-    return table
-
-
-def outcome_table(
-    grasps: GraspSet, by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]
-) -> TextTable:
-    """Outcomes by object where they fit, with what was mostly in the way."""
-    from rich.console import Console
-
-    from burg_drake.core.figures import count, percent
-    from burg_drake.core.outcome import Outcome
-
-    room = Console().width - 70
-    names = [name for name in by_object if len(by_object) > 1]
-    names = names if sum(len(name) + 2 for name in names) <= room else []
-    table = TextTable("What became of them").texts("outcome")
-    table.numbers(*names, "all", "share").texts("mostly in the way")
-    order = [Outcome.REACHABLE, *Outcome]
-    for outcome in sorted(total, key=order.index):
-        mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
-        blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(BLOCKERS)
-        counts = [count(n) if (n := by_object[name][outcome]) else "·" for name in names]
-        share = percent(total[outcome] / len(grasps))
-        way = ", ".join(f"{name} ({count(n)})" for name, n in blockers)
-        table.row(outcome.value, *counts, count(total[outcome]), share, way)
-    return table
+    print(f"wrote {len(grasps)} grasps to {output}; {FRAME}")

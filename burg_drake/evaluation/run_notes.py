@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.run_store import Run
@@ -55,20 +56,52 @@ def _unexecuted(run: Run) -> list[str]:
 
 
 def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray) -> str:
-    causes = Counter(
-        zip(columns["outcome"][mine].tolist(), columns["blocker"][mine].tolist(), strict=True)
-    )
     stages = Counter(columns["stage"][mine].tolist())
-    named = causes.most_common(CAUSES)
-    parts = [f"{_words(Outcome(what), body)} in {count:,}" for (what, body), count in named]
-    rest = int(mine.sum()) - sum(count for _, count in named)
-    parts += [f"others in {rest:,}"] if rest else []
     remedy = REMEDIES[Stage(stages.most_common(1)[0][0])]
-    if Outcome(named[0][0][0]) in NO_LIFT:
+    outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
+    if Outcome(_counted(outcomes, blockers)[0][0][0]) in NO_LIFT:
         remedy = f"{REMEDY_OF_LIFT}; {remedy}"
+    causes = _causes(outcomes, blockers)
+    return f"{name}: nothing executed of {_grasps(mine)}: {causes}; {remedy}"
+
+
+def unclear_notes(
+    objects: NDArray[np.str_], outcomes: NDArray[np.str_], blockers: NDArray[np.str_]
+) -> tuple[str, ...]:
+    """A sentence for each object whose grasps all end because the open hand collides.
+
+    Args:
+        objects, outcomes, blockers: (N,) of each grasp.
+    """
+    clear = ~np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.CLEAR])
+    notes = []
+    for name in dict.fromkeys(objects.tolist()):
+        mine = objects == name
+        if not clear[mine].any():
+            causes = _causes(outcomes[mine], blockers[mine])
+            remedy = REMEDIES[Stage.CLEAR]
+            notes.append(f"{name}: none of {_grasps(mine)} is clear: {causes}; {remedy}")
+    return tuple(notes)
+
+
+def _grasps(mine: np.ndarray) -> str:
     count = int(mine.sum())
-    grasps = f"{count:,} grasp{'' if count == 1 else 's'}"
-    return f"{name}: nothing executed of {grasps}: {', '.join(parts)}; {remedy}"
+    return f"{count:,} grasp{'' if count == 1 else 's'}"
+
+
+def _causes(outcomes: NDArray[np.str_], blockers: NDArray[np.str_]) -> str:
+    """The most frequent outcomes, with what was in the way."""
+    named = _counted(outcomes, blockers)
+    parts = [f"{_words(Outcome(what), body)} in {count:,}" for (what, body), count in named]
+    rest = len(outcomes) - sum(count for _, count in named)
+    return ", ".join([*parts, *([f"others in {rest:,}"] if rest else [])])
+
+
+def _counted(
+    outcomes: NDArray[np.str_], blockers: NDArray[np.str_]
+) -> list[tuple[tuple[str, str], int]]:
+    """The most frequent pairs of outcome and blocker, with their counts."""
+    return Counter(zip(outcomes.tolist(), blockers.tolist(), strict=True)).most_common(CAUSES)
 
 
 def _words(outcome: Outcome, blocker: str) -> str:

@@ -17,7 +17,7 @@ from burg_drake.apps.grasp_tables import comparison_table, ranking_table, summar
 from burg_drake.apps.grasps_sample import sampled_table
 from burg_drake.apps.library_view import library_table
 from burg_drake.apps.number_tables import number_table
-from burg_drake.apps.reach import outcome_table, reach_table
+from burg_drake.apps.reach_tables import outcome_table, print_tables, reach_table
 from burg_drake.apps.scene import displacement_table
 from burg_drake.cameras.placement_document import Placement
 from burg_drake.core.frames import make_pose
@@ -187,4 +187,27 @@ def test_what_does_not_fit_side_by_side_goes_on_below() -> None:
         "object    [mm]     third",
         "────────────────────────",
         "mug          1  -1.23e-9",
+    ]
+
+
+def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    """One without any grasp counts 0; one whose grasps all collide is told with what they hit."""
+    judged = GraspSet.create(
+        np.tile(np.eye(4), (4, 1, 1)),
+        object=["box", "mug", "mug", "mug"],
+        columns={
+            "outcome": ["reachable", "collision_table", "collision_target", "collision_table"],
+            "blocker": ["", "table", "mug", "table"],
+            "cpu": [0.0] * 4,
+        },
+    )
+    print_tables(judged, ["box", "marble", "mug"])
+    out = capsys.readouterr().out
+    rows = [line.split() for line in out.splitlines()]
+    for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 4 1 1 100 %"):
+        assert row.split() in rows
+    assert [line for line in out.splitlines() if line.startswith("note: ")] == [
+        "note: mug: none of 3 grasps is clear: the open hand hits the table in 2, the open hand"
+        " hits the object itself in 1; sample grasps at which the hand is clear, which is the"
+        " default"
     ]

@@ -71,7 +71,9 @@ def _text(document: RunDocument) -> str:
     return (
         "Results follow from the inputs, the seed and the versions below; not from the number of"
         " workers or the order of their work. In a folder that is complete the command returns at"
-        f" once; give another -o to judge again.{by_hand}"
+        f" once; give another -o to judge again.{by_hand} In the table of results x, y, z and qw to"
+        " qz are the grasp frame G in the object frame O; the file beside it says what each column"
+        " is."
     )
 
 
