@@ -17,7 +17,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
 from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.trajectory import Origin, Plan
+from burg_drake.motion.trajectory import Origin, Plan, Trajectory
 from burg_drake.motion.verdict import Reach
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.arm_trial import ArmTrial
@@ -62,7 +62,8 @@ def plan(scene: Scene, station: Station) -> Plan:
     return replace(found, close_time=0.6, opening=0.08, origin=origin)
 
 
-def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram) -> None:
+@pytest.mark.parametrize("limit", [FORCE, 20.0])
+def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram, limit: float) -> None:
     """Its weight and lever arm at the wrist, and by virtual work in every joint."""
     context = built.diagram.CreateDefaultContext()
     plant, hand = built.plant, MountedHand(built)
@@ -75,6 +76,7 @@ def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram) -> None:
     X_WO = RigidTransform(hand.X_WG(plant_context) @ X_GO)
     plant.SetFreeBodyPose(plant_context, box, X_WO)
     built.diagram.GetInputPort("hand.position").FixValue(context, [0.0])
+    built.diagram.GetInputPort("hand.force_limit").FixValue(context, [limit])
     Simulator(built.diagram, context).AdvanceTo(0.6)
 
     p_WCo = plant.EvalBodyPoseInWorld(plant_context, box).multiply(box.default_com())
@@ -98,7 +100,7 @@ def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram) -> None:
     torque = built.diagram.GetOutputPort("arm.external_torque").Eval(context)
     assert torque == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
     force = built.diagram.GetOutputPort("hand.force_measured").Eval(context)
-    assert force == pytest.approx(FORCE, rel=0.01)
+    assert force == pytest.approx(limit, rel=0.01)
 
 
 @pytest.mark.parametrize(("kind", "lag"), [("impedance", 2e-3), ("inverse_dynamics", 4e-3)])
@@ -147,7 +149,7 @@ def test_a_plan_is_played_and_lifts_the_box(
     assert height == pytest.approx(LIFT, abs=2e-3)
 
 
-def _at(pause, transfer):
+def _at(pause: Trajectory, transfer: Trajectory) -> Trajectory:
     """A pause where a motion ends."""
     return replace(pause, q=np.repeat(transfer.q[-1:], len(pause.t), axis=0))
 
