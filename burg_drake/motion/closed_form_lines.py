@@ -17,7 +17,7 @@ from burg_drake.motion.line_search import Chain, Failure
 from burg_drake.motion.posture_failure import GridPlace, failure
 from burg_drake.motion.posture_grid import Indices, Place, PostureGrid
 from burg_drake.motion.posture_grids import START, PostureGrids, counted
-from burg_drake.motion.straight_rows import ClosedFormFiller, Rows, straighten
+from burg_drake.motion.straight_rows import ClosedFormFiller, NumericFiller, Rows, straighten
 
 ROWS_A_LAYER = 5
 """Rows of a chain from one layer to the next: 1 cm."""
@@ -39,11 +39,29 @@ class ClosedFormLines(PostureGrids):
     def lifted(self, height: float) -> ClosedFormLines:
         """See `LineSearch`."""
         lines = replace(self.lines, lift=height)
-        return ClosedFormLines(self.ik, lines, self.proximity, self.home, self.settings)
+        return ClosedFormLines(
+            *(self.arm, self.ik, lines, self.proximity, self.home, self.settings)
+        )
 
     def begin(self, X_AG: Array, clearance: Array) -> _Lines:
         """See `LineSearch`."""
         return _Lines(self, X_AG, clearance)
+
+    def straight(self, X_AG: Array, corners: Array, at: Array, tolerance: Array) -> Rows:
+        """Fills in rows between the postures of chains at the layers; see `straighten`.
+
+        The redundant joint goes straight from layer to layer. Where no postures follow each other
+        that way, at a fold or past the upright upper arm, all joints are solved for together.
+        """
+        every = ClosedFormFiller(self.lines, X_AG, corners, self.layers, self.ik)
+        rows = straighten(every, at, tolerance)
+        broken = np.unique(rows.chain[rows.broken])
+        if not len(broken):
+            return rows
+        bent = NumericFiller(
+            *(self.lines, X_AG[broken], corners[broken], self.layers, self.arm, self.settings)
+        )
+        return rows.replaced(broken, straighten(bent, at, tolerance[broken]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,11 +211,8 @@ class _Lines:
                 for _, grid, i, p in rows
             ]
         )
-        straight = straighten(
-            ClosedFormFiller(search.lines, X_AG, corners, search.layers, search.ik),
-            at,
-            np.clip(0.5 * self._tolerance[grasp, way], *search.settings.deviation),
-        )
+        tolerance = np.clip(0.5 * self._tolerance[grasp, way], *search.settings.deviation)
+        straight = search.straight(X_AG, corners, at, tolerance)
         bounds = search.proximity.bounds(straight.q, hand=False)
         upper = counted(bounds, search.settings.exact)
         return {

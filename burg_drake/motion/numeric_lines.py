@@ -9,7 +9,7 @@ against bounds of the arm's clearance; what collides is put out, and the next ta
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +28,14 @@ from burg_drake.motion.candidates import (
 )
 from burg_drake.motion.closed_form_lines import DOUBT, ROWS_A_LAYER
 from burg_drake.motion.following import Follower
-from burg_drake.motion.ik import ArmKinematics, solve_ik
+from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.line_search import Chain, Failure
 from burg_drake.motion.posture_failure import EXPLAINED
 from burg_drake.motion.posture_grids import START, counted
 from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.motion.straight_rows import JUMP, Filler, Rows, straighten
+from burg_drake.motion.straight_rows import NumericFiller, Rows, near_ik, straighten
 
 WAYS = (
     (APPROACH, Outcome.APPROACH_LINE),
@@ -96,39 +96,13 @@ class NumericLines:
     def solve(self, X_AH: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they
         meet them (S,)."""
-        s = self.settings
-        return solve_ik(
-            self.arm,
-            X_AH,
-            start,
-            iterations=s.iterations,
-            tolerance=s.tolerance,
-            margin=s.limit_margin,
-        )
+        return near_ik(self.arm, X_AH, start, self.settings)
 
     def measure(self, q: Array) -> tuple[Array, Array]:
         """Clearances of postures (S, n): lower bounds, and what has to be positive for a posture to
         count (S,) [m]: the upper bound where the last word is Drake's, else the best guess."""
         bounds = self.proximity.bounds(q, hand=False)
         return bounds.lower, counted(bounds, self.settings.exact)
-
-
-@dataclass(frozen=True, eq=False)
-class NumericFiller(Filler):
-    """By steps from what lies between the layers."""
-
-    search: NumericLines
-
-    def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """See `Filler`."""
-        expected = self.between(chain, layer)
-        q, met = self.search.solve(self.X_AH(chain, layer), expected)
-        broken = ~met | (np.abs(q - expected).max(axis=1) > JUMP)
-        return np.where(broken[:, None], expected, q), broken
-
-    def forward(self, q: Array) -> Array:
-        """See `Filler`."""
-        return self.search.arm.forward(q)[0]
 
 
 class _Lines:
@@ -240,7 +214,10 @@ class _Lines:
         grasp = np.array([g for g, _ in chosen])
         way = np.array([self._of[g].way[k] for g, k in chosen])
         corners = np.array([self._of[g].q[k] for g, k in chosen])
-        filler = NumericFiller(search.lines, self._X_AG[grasp, way], corners, search.layers, search)
+        X_AG = self._X_AG[grasp, way]
+        filler = NumericFiller(
+            *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
+        )
         at = np.linspace(0.0, count - 1.0, (count - 1) * ROWS_A_LAYER + 1)
         rows = straighten(filler, at, self._deviation[grasp, way])
         lower, upper = search.measure(rows.q)

@@ -2,9 +2,9 @@
 
 A posture at one pose of the line is a branch of the inverse kinematics at one value of the
 redundant joint. Those of neighbouring poses are joined where they are near in the redundant joint,
-no joint jumps, and they are of one branch, or of two that meet in a fold, where the sign of the
-turn of joint 6 changes. The best chain from the first pose to the last is found by dynamic
-programming, for many grasps at once.
+no joint jumps, and they are of one branch, or of two that meet: in a fold, where the sign of the
+turn of joint 6 changes, or where the upper arm is upright. The best chain from the first pose to
+the last is found by dynamic programming, for many grasps at once.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
 from burg_drake.motion.panda_ik import BRANCHES, PandaIk
-from burg_drake.motion.posture_steps import FAR, OTHER_SIDE, PostureSteps, Rows
+from burg_drake.motion.posture_steps import CROSSINGS, FAR, PostureSteps, Rows
 
 Indices = NDArray[np.intp]
 Booleans = NDArray[np.bool_]
@@ -60,7 +60,14 @@ class PostureGrid:
     """
 
     def __init__(
-        self, ik: PandaIk, X_AH: Array, parameter: Array, *, travel: float, offsets: int
+        self,
+        ik: PandaIk,
+        X_AH: Array,
+        parameter: Array,
+        *,
+        travel: float,
+        offsets: tuple[int, ...],
+        crossing: tuple[int, ...],
     ) -> None:
         """Makes room; see `solve`.
 
@@ -69,12 +76,12 @@ class PostureGrid:
             X_AH: (L, n, 2, 4, 4) hand poses.
             parameter: (Q,) values of the redundant joint [rad].
             travel: most that a joint may move from one pose to the next [rad].
-            offsets: by how many values the redundant joint may change there; by half as many where
-                the branch changes.
+            offsets: by how many values the redundant joint may change there ...
+            crossing: ... and where the branch changes.
         """
         shape = (*X_AH.shape[:3], BRANCHES, len(parameter))
         self._ik, self._X_AH, self.parameter = ik, X_AH, parameter
-        self._travel, self._offsets = travel, offsets
+        self._travel, self._offsets, self._crossing = travel, offsets, crossing
         self.q = np.full((len(ik.lower), *shape), np.nan, dtype=np.float32)
         self.exists = np.zeros(shape, dtype=bool)
         self.joined = np.zeros(shape, dtype=bool)
@@ -102,7 +109,9 @@ class PostureGrid:
     def join(self) -> None:
         """Finds what postures are joined, once all have been found."""
         here = np.asarray(self.exists.any(axis=-1))
-        self._rows = Rows.where(np.all(here | here[..., OTHER_SIDE], axis=0))
+        for crossing in CROSSINGS:
+            here = here | here[..., crossing]
+        self._rows = Rows.where(np.all(here, axis=0))
         self._steps = self._steps_of(self._rows)
         self.joined[self._rows.index] = self._steps.joined(self.exists[self._rows.index])
 
@@ -130,10 +139,11 @@ class PostureGrid:
 
     def cut(self, grasp: int, pose: int, place: Place) -> None:
         """Parts the postures of a chain at `pose` and the next one."""
-        branch, k = int(place.branch[pose]), int(place.parameter[pose])
+        (branch, there), k = place.branch[pose : pose + 2].tolist(), int(place.parameter[pose])
         step = int(place.parameter[pose + 1]) - k
         row = self._rows.number(grasp, place.way, branch)
-        self._steps.cut(pose, row, k, step, bool(place.branch[pose + 1] != branch))
+        crossing = None if there == branch else CROSSINGS[:, branch].tolist().index(there)
+        self._steps.cut(pose, row, k, step, crossing)
 
     def best(self, grasps: Indices, doubt: float) -> list[Place | None]:
         """The cheapest chain of each of some grasps.
@@ -179,11 +189,12 @@ class PostureGrid:
         usable = self.usable(slice(None), grasp)
         only = np.zeros(self.q.shape[2:-1], dtype=bool)
         only[grasp] = usable.any(axis=(0, -1))
-        only[grasp] |= only[grasp][:, OTHER_SIDE]
         rows = Rows.where(only)
         led = self._steps_of(rows).reached(usable[:, rows.way, rows.branch]).any(axis=(1, 2))
         return int(np.flatnonzero(led).max(initial=-1))
 
     def _steps_of(self, rows: Rows) -> PostureSteps:
         q = self.q[(slice(None), *rows.index)]
-        return PostureSteps.of(q, rows.other, travel=self._travel, offsets=self._offsets)
+        return PostureSteps.of(
+            *(q, rows.other), travel=self._travel, offsets=self._offsets, crossing=self._crossing
+        )

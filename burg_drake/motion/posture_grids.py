@@ -6,16 +6,19 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.panda_ik import PandaIk
 from burg_drake.motion.posture_grid import Booleans, Indices, PostureGrid
 from burg_drake.motion.proximity import LIKELY, ArmProximity, ClearanceBounds
 from burg_drake.motion.reach_settings import ReachSettings
 
-CHANGE = 0.38
+CHANGE = 0.75
 """Most that the redundant joint may change from layer to layer [rad] ..."""
-OFFSETS = 4
-"""... and by how many of its values."""
+CROSSING = 0.38
+"""... and where the branch changes."""
+OFFSETS = (1, 2, 4, 8, 16, 24)
+"""By how many of its values the redundant joint may change: large changes need no fine choice."""
 START = 0.3
 """Cost of a start for each radian of the joint that is farthest from home."""
 
@@ -24,6 +27,7 @@ class PostureGrids:
     """Opens grids of postures.
 
     Args:
+        arm: the arm on its own.
         ik: the inverse kinematics, within the limits that are to be kept.
         lines: where the hand goes.
         proximity: bounds of the arm's clearance.
@@ -33,13 +37,14 @@ class PostureGrids:
 
     def __init__(
         self,
+        arm: ArmKinematics,
         ik: PandaIk,
         lines: LinePoses,
         proximity: ArmProximity,
         home: Array,
         settings: ReachSettings,
     ) -> None:
-        self.ik, self.lines, self.proximity = ik, lines, proximity
+        self.arm, self.ik, self.lines, self.proximity = arm, ik, lines, proximity
         self.home, self.settings = home, settings
         self.layers, self.at_grasp = lines.layers, lines.at_grasp
 
@@ -52,9 +57,12 @@ class PostureGrids:
         """Room for the postures of grasps (n, 2, 4, 4)."""
         X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
         values = self.parameters(count)
-        offsets = min(OFFSETS, int(CHANGE / (values[1] - values[0]))) if count > 1 else 0
+        spacing = values[1] - values[0] if count > 1 else np.inf
         return PostureGrid(
-            self.ik, X_AH, values, travel=self.settings.joint_travel, offsets=offsets
+            *(self.ik, X_AH, values),
+            travel=self.settings.joint_travel,
+            offsets=_offsets(CHANGE / spacing),
+            crossing=_offsets(CROSSING / spacing),
         )
 
     def measure(self, grid: PostureGrid, poses: Indices, grasps: Indices, wanted: Booleans) -> None:
@@ -70,6 +78,12 @@ class PostureGrids:
         lower, upper = grid.lower[where], grid.upper[where]
         lower[new], upper[new] = bounds.lower, counted(bounds, self.settings.exact)
         grid.lower[where], grid.upper[where] = lower, upper
+
+
+def _offsets(most: float) -> tuple[int, ...]:
+    """Those of `OFFSETS`, up and down, that are no larger, and 0; rising."""
+    up = [k for k in OFFSETS if k <= most]
+    return (*(-k for k in reversed(up)), 0, *up)
 
 
 def counted(bounds: ClearanceBounds, exact: bool) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from burg_drake.motion.panda_ik import BRANCHES
@@ -20,9 +19,10 @@ Booleans = NDArray[np.bool_]
 Single = NDArray[np.float32]
 
 FAR = np.float32(np.inf)
-OTHER_SIDE = np.arange(BRANCHES) ^ 2
-"""The branches that branches can go over into: those with the other sign in problem 2 of
-`motion.panda_ik`."""
+CROSSINGS = np.arange(BRANCHES) ^ np.array([[2], [1]])
+"""(2, 8) the branches that branches can go over into: those with the other sign in problem 2 of
+`motion.panda_ik`, which meet in a fold, and those with the other sign in problem 3, which meet
+where the upper arm is upright."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Rows:
 
     Attributes:
         grasp, way, branch: (R,) of each row.
-        other: (R,) number of the row with the other branch.
+        other: (2, R) numbers of the rows with the other branches.
     """
 
     grasp: Indices
@@ -41,10 +41,12 @@ class Rows:
 
     @classmethod
     def where(cls, wanted: Booleans) -> Rows:
-        """Those wanted (n, 2, 8); of two branches that go over into each other both or none."""
+        """Those wanted (n, 2, 8), with all that they can go over into."""
+        for crossing in CROSSINGS:
+            wanted = wanted | wanted[..., crossing]
         grasp, way, branch = np.nonzero(wanted)
         number = np.cumsum(wanted).reshape(wanted.shape) - 1
-        return cls(grasp, way, branch, number[grasp, way, OTHER_SIDE[branch]])
+        return cls(grasp, way, branch, number[grasp, way, CROSSINGS[:, branch]])
 
     @property
     def index(self) -> tuple[slice, Indices, Indices, Indices]:
@@ -53,7 +55,7 @@ class Rows:
 
     def some(self, chosen: Indices) -> Rows:
         """All the rows of some grasps, by their numbers, rising."""
-        other = np.searchsorted(chosen, self.other[chosen])
+        other = np.searchsorted(chosen, self.other[:, chosen])
         return Rows(self.grasp[chosen], self.way[chosen], self.branch[chosen], other)
 
     def number(self, grasp: int, way: int, branch: int) -> int:
@@ -69,28 +71,36 @@ class PostureSteps:
     Attributes:
         length: (L - 1, S, R, Q) way of the joint that moves most [rad]; infinite where there is no
             step. The S kinds are those in the row, by the offset of the value, then those that go
-            over into the other row.
-        other: (R,) the row that each may go over into.
-        offsets, crossing: by how many values a step may lead up or down in its row, and to the
-            other.
+            over into each of the other rows.
+        other: (2, R) the rows that each may go over into.
+        offsets, crossing: by how many values a step may lead up in its row, and to the others;
+            negative ones down.
     """
 
     length: Single
     other: Indices
-    offsets: int
-    crossing: int
+    offsets: tuple[int, ...]
+    crossing: tuple[int, ...]
 
     @classmethod
-    def of(cls, q: Single, other: Indices, *, travel: float, offsets: int) -> PostureSteps:
+    def of(
+        cls,
+        q: Single,
+        other: Indices,
+        *,
+        travel: float,
+        offsets: tuple[int, ...],
+        crossing: tuple[int, ...],
+    ) -> PostureSteps:
         """Between postures (n, L, R, Q), NaN where there is none, by steps in which no joint moves
         more than `travel` [rad]."""
-        steps = cls(np.empty(0, dtype=np.float32), other, offsets, offsets // 2)
+        steps = cls(np.empty(0, dtype=np.float32), other, offsets, crossing)
         here, after = q[:, :-1], steps._padded(q[:, 1:], np.float32(np.nan))
         kinds = steps._kinds()
         length = np.empty((here.shape[1], len(kinds), *here.shape[2:]), dtype=np.float32)
-        for kind, (offset, crosses) in enumerate(kinds):
-            there = after[..., offsets + offset : offsets + offset + q.shape[-1]]
-            there = there[..., other, :] if crosses else there
+        for kind, (offset, side) in enumerate(kinds):
+            there = steps._shifted(after, offset)
+            there = there if side is None else there[..., other[side], :]
             way = np.abs(there[0] - here[0])
             for joint in range(1, len(q)):
                 np.maximum(way, np.abs(there[joint] - here[joint]), out=way)
@@ -98,13 +108,13 @@ class PostureSteps:
         return replace(steps, length=length)
 
     def some(self, rows: Indices) -> PostureSteps:
-        """Those of some rows, each with its other one."""
-        other = np.searchsorted(rows, self.other[rows])
+        """Those of some rows, each with its other ones."""
+        other = np.searchsorted(rows, self.other[:, rows])
         return replace(self, length=self.length[:, :, rows], other=other)
 
-    def cut(self, pose: int, row: int, value: int, offset: int, crosses: bool) -> None:
-        """Takes a step out."""
-        self.length[pose, self._kinds().index((offset, crosses)), row, value] = FAR
+    def cut(self, pose: int, row: int, value: int, offset: int, crossing: int | None) -> None:
+        """Takes a step out; `crossing` is the number of the other row, None in the same row."""
+        self.length[pose, self._kinds().index((offset, crossing)), row, value] = FAR
 
     def onwards(self, cost: Single) -> list[Single]:
         """Least costs (R, Q) of ways from the postures of each pose to the last pose, with the
@@ -118,13 +128,14 @@ class PostureSteps:
         """Rows and values (m, L) of the least ways from (m,) postures of the first pose."""
         kinds = self._kinds()
         offset = np.array([offset for offset, _ in kinds])
-        crosses = np.array([crosses for _, crosses in kinds])
+        target = np.array([0 if crossing is None else 1 + crossing for _, crossing in kinds])
+        to = np.concatenate([np.arange(self.other.shape[1])[None], self.other])
         rows, ks = [row], [value]
         for length, onwards in zip(self.length, values[1:], strict=True):
             row, value = rows[-1], ks[-1]
-            there = np.where(crosses, self.other[row][:, None], row[:, None])
+            there = to[target][:, row].T
             k = value[:, None] + offset
-            total = length[:, row, value].T + self._padded(onwards, FAR)[there, k + self.offsets]
+            total = length[:, row, value].T + self._padded(onwards, FAR)[there, k + self._margin]
             best = total.argmin(axis=1)
             every = np.arange(len(row))
             rows.append(there[every, best])
@@ -141,32 +152,40 @@ class PostureSteps:
         """(L, R, Q) which usable postures are led to from the first pose over usable ones."""
         led = np.zeros_like(usable)
         led[0] = usable[0]
-        count = usable.shape[-1]
+        count, margin = usable.shape[-1], self._margin
         for pose, length in enumerate(self.length):
             begun = np.isfinite(length) & led[pose]
-            to = np.zeros((2, *usable.shape[1:-1], count + 2 * self.offsets), dtype=bool)
-            for kind, (offset, crosses) in enumerate(self._kinds()):
-                shift = self.offsets + offset
-                to[int(crosses), :, shift : shift + count] |= begun[kind]
-            there = to[0] | to[1][self.other]
-            led[pose + 1] = there[:, self.offsets : self.offsets + count] & usable[pose + 1]
+            there = np.zeros((*usable.shape[1:-1], count + 2 * margin), dtype=bool)
+            for kind, (offset, crossing) in enumerate(self._kinds()):
+                shift = margin + offset
+                come = begun[kind] if crossing is None else begun[kind][self.other[crossing]]
+                there[:, shift : shift + count] |= come
+            led[pose + 1] = there[:, margin : margin + count] & usable[pose + 1]
         return led
 
-    def _kinds(self) -> list[tuple[int, bool]]:
-        kinds = [(offset, False) for offset in range(-self.offsets, self.offsets + 1)]
-        return kinds + [(offset, True) for offset in range(-self.crossing, self.crossing + 1)]
+    @property
+    def _margin(self) -> int:
+        return max(self.offsets[-1], self.crossing[-1])
+
+    def _kinds(self) -> list[tuple[int, int | None]]:
+        """By how many values a step leads up, and to which of the other rows."""
+        kinds: list[tuple[int, int | None]] = [(k, None) for k in self.offsets]
+        return kinds + [(k, i) for i in range(len(self.other)) for k in self.crossing]
 
     def _onwards(self, length: Single, value: Single) -> Single:
         """(S, R, Q) costs of going on by each kind of step."""
-        count = value.shape[-1]
-        near = sliding_window_view(self._padded(value, FAR), count, axis=-1).swapaxes(0, 1)
-        side = near[self.offsets - self.crossing : self.offsets + self.crossing + 1]
-        total = np.empty_like(length)
-        straight = len(near)
-        np.add(length[:straight], near, out=total[:straight])
-        np.add(length[straight:], side[:, self.other], out=total[straight:])
+        padded, total = self._padded(value, FAR), np.empty_like(length)
+        for kind, (offset, crossing) in enumerate(self._kinds()):
+            there = self._shifted(padded, offset)
+            there = there if crossing is None else there[self.other[crossing]]
+            np.add(length[kind], there, out=total[kind])
         return total
 
     def _padded(self, values: Single, outside: np.float32) -> Single:
-        width = [(0, 0)] * (values.ndim - 1) + [(self.offsets, self.offsets)]
+        width = [(0, 0)] * (values.ndim - 1) + [(self._margin, self._margin)]
         return np.pad(values, width, constant_values=outside)
+
+    def _shifted(self, padded: Single, offset: int) -> Single:
+        """The values that are up by an offset, of an array with margins."""
+        count = padded.shape[-1] - 2 * self._margin
+        return padded[..., self._margin + offset : self._margin + offset + count]

@@ -35,6 +35,7 @@ from burg_drake.motion.numeric_lines import NumericLines
 from burg_drake.motion.panda_ik import PandaIk
 from burg_drake.motion.proximity import ArmProximity
 from burg_drake.motion.reach_settings import ReachSettings
+from burg_drake.motion.successive_lines import SuccessiveLines
 from burg_drake.motion.verdict import Reach as Reach
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.diagram import build_station_diagram
@@ -200,7 +201,7 @@ def _both(X_WG: Array, X_AW: Array) -> Array:
 def _line_search(
     reach: ArmReach, lines: LinePoses, home: Array, routine: IkRoutine | None
 ) -> LineSearch:
-    """By the closed form where the arm has one and it is wanted, else numerically."""
+    """By the closed form first where the arm has one and it is wanted, else numerically."""
     arm, settings = reach.kinematics, reach.settings
     margin = settings.limit_margin
     if routine is not None:
@@ -212,4 +213,7 @@ def _line_search(
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:
         return NumericLines(arm, lines, reach.proximity, home, settings)
-    return ClosedFormLines(ik.within(margin), lines, reach.proximity, home, settings)
+    rest = lines, reach.proximity, home, settings
+    return SuccessiveLines(
+        ClosedFormLines(arm, ik.within(margin), *rest), lambda: NumericLines(arm, *rest)
+    )

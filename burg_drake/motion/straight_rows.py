@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
+from burg_drake.motion.ik import ArmKinematics, solve_ik
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.panda_ik import BRANCHES, PandaIk, panda_forward
+from burg_drake.motion.reach_settings import ReachSettings
 
 JUMP = 0.35
 """Joint positions that differ by more than this from row to row are on other branches [rad]."""
@@ -41,6 +43,18 @@ class Rows:
     def of(self, chain: int) -> slice:
         """Rows of one chain."""
         return slice(*np.searchsorted(self.chain, [chain, chain + 1]))
+
+    def replaced(self, chains: Indices, other: Rows) -> Rows:
+        """With those of some chains, which are numbered from 0 there, in place of the own ones."""
+        kept = ~np.isin(self.chain, chains)
+        chain = np.append(self.chain[kept], chains[other.chain])
+        order = np.argsort(chain, kind="stable")
+        return Rows(
+            chain[order],
+            np.append(self.layer[kept], other.layer)[order],
+            np.concatenate([self.q[kept], other.q])[order],
+            np.append(self.broken[kept], other.broken)[order],
+        )
 
 
 def straighten(every: Filler, at: Array, tolerance: Array) -> Rows:
@@ -149,3 +163,37 @@ class ClosedFormFiller(Filler):
     def forward(self, q: Array) -> Array:
         """See `Filler`."""
         return panda_forward(q) @ self.ik.X_FH
+
+
+@dataclass(frozen=True, eq=False)
+class NumericFiller(Filler):
+    """By steps from what lies between the layers."""
+
+    arm: ArmKinematics
+    settings: ReachSettings
+
+    def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """See `Filler`."""
+        expected = self.between(chain, layer)
+        q, met = near_ik(self.arm, self.X_AH(chain, layer), expected, self.settings)
+        broken = ~met | (np.abs(q - expected).max(axis=1) > JUMP)
+        return np.where(broken[:, None], expected, q), broken
+
+    def forward(self, q: Array) -> Array:
+        """See `Filler`."""
+        return self.arm.forward(q)[0]
+
+
+def near_ik(
+    arm: ArmKinematics, X_AH: Array, start: Array, settings: ReachSettings
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they meet
+    them (S,)."""
+    return solve_ik(
+        arm,
+        X_AH,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        margin=settings.limit_margin,
+    )

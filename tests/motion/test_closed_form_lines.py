@@ -33,12 +33,13 @@ def search() -> ClosedFormLines:
     diagram = build_station_diagram(
         load_scene("tabletop_six"), STATION, robot="arm", weld_objects=True
     )
-    ik = PandaIk.of(ArmKinematics.of(diagram))
+    arm = ArmKinematics.of(diagram)
+    ik = PandaIk.of(arm)
     assert ik is not None and STATION.document.arm is not None
     lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3), GraspMotion())
     home = np.array(STATION.document.arm.home)
     settings = ReachSettings()
-    return ClosedFormLines(ik.within(0.01), lines, ArmProximity(diagram), home, settings)
+    return ClosedFormLines(arm, ik.within(0.01), lines, ArmProximity(diagram), home, settings)
 
 
 def begin(search: ClosedFormLines, *grasps: Array) -> Lines:
@@ -101,7 +102,9 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
 ) -> None:
     """Postures with a joint beyond its limit; where no other posture is within, that is said."""
     still = replace(search.lines, standoff=0.0, lift=0.0)
-    ends = ClosedFormLines(search.ik, still, search.proximity, search.home, search.settings)
+    ends = ClosedFormLines(
+        search.arm, search.ik, still, search.proximity, search.home, search.settings
+    )
     rng = np.random.default_rng(5)
     q = rng.uniform(search.ik.lower, search.ik.upper, (400, 7))
     excess = rng.uniform(0.1, 0.5, 400)

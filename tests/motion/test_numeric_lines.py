@@ -171,7 +171,9 @@ def test_verdicts_are_those_of_the_closed_form(panda: Arm) -> None:
     ik = PandaIk.of(panda.kinematics)
     assert ik is not None
     ik = ik.within(SETTINGS.limit_margin)
-    swept = ClosedFormLines(ik, panda.lines, panda.proximity, panda.home, SETTINGS)
+    swept = ClosedFormLines(
+        panda.kinematics, ik, panda.lines, panda.proximity, panda.home, SETTINGS
+    )
     expected, found = outcomes(swept, X_AG), outcomes(panda.numeric(), X_AG)
     assert sum(a == b for a, b in zip(expected, found, strict=True)) >= 23
     assert expected.count(None) >= 10 and len(set(expected)) >= 2

@@ -12,7 +12,8 @@ from burg_drake.motion.posture_grid import DEEP, Place, PostureGrid
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
 IK = PandaIk(np.eye(4), LOWER, UPPER)
-TRAVEL, OFFSETS, DOUBT = 0.6, 2, 0.5
+TRAVEL, DOUBT = 0.6, 0.5
+OFFSETS, CROSSING = (-3, -1, 0, 1, 3), (-1, 0, 1)
 
 
 def line(x: float, tilt: float) -> np.ndarray:
@@ -28,7 +29,7 @@ def line(x: float, tilt: float) -> np.ndarray:
 def grid() -> PostureGrid:
     X_AH = np.stack([line(0.45, 0.2), line(0.6, -0.4), line(1.2, 0.0)], axis=1)
     values = np.linspace(-2.8, 2.8, 14)
-    grid = PostureGrid(IK, X_AH, values, travel=TRAVEL, offsets=OFFSETS)
+    grid = PostureGrid(IK, X_AH, values, travel=TRAVEL, offsets=OFFSETS, crossing=CROSSING)
     grid.solve(np.arange(5), np.arange(3))
     grid.join()
     return grid
@@ -49,8 +50,9 @@ def cheapest(grid: PostureGrid, i: int, last: int) -> float:
         if (pose, way, branch, k) in done:
             continue
         done.add((pose, way, branch, k))
-        for j in range(max(0, k - OFFSETS), min(count, k + OFFSETS + 1)):
-            for other in (branch, branch ^ 2) if 2 * abs(j - k) <= OFFSETS else (branch,):
+        for offset in OFFSETS:
+            j, crossed = k + offset, (branch ^ 2, branch ^ 1) if offset in CROSSING else ()
+            for other in (branch, *crossed) if 0 <= j < count else ():
                 if not usable[pose + 1, way, other, j]:
                     continue
                 q, after = grid.q[:, pose, i, way, branch, k], grid.q[:, pose + 1, i, way, other, j]
@@ -122,7 +124,14 @@ def test_joined_are_all_postures_of_chains(grid: PostureGrid) -> None:
 
 
 def test_postures_between_deep_ones_are_taken_for_blocked(grid: PostureGrid) -> None:
-    fine = PostureGrid(IK, grid._X_AH, np.linspace(-2.8, 2.8, 40), travel=TRAVEL, offsets=OFFSETS)
+    fine = PostureGrid(
+        IK,
+        grid._X_AH,
+        np.linspace(-2.8, 2.8, 40),
+        travel=TRAVEL,
+        offsets=OFFSETS,
+        crossing=CROSSING,
+    )
     fine.solve(np.arange(5), np.arange(3))
     grid.upper[:] = np.random.default_rng(7).uniform(-3.0 * DEEP, DEEP, grid.upper.shape)
     fine.take_over(1, grid, 1, [0, 3])

@@ -7,11 +7,12 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.motion.line_poses import LinePoses
 from burg_drake.motion.panda_ik import PandaIk, panda_forward
 from burg_drake.motion.straight_rows import ClosedFormFiller, Rows, straighten
+from burg_drake.station.grasp_motion import GraspMotion
 
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
 IK = PandaIk(np.eye(4), LOWER, UPPER)
-LINES = LinePoses.of(np.eye(4), np.eye(3))
+LINES = LinePoses.of(np.eye(4), np.eye(3), GraspMotion())
 LAYERS = np.array([-0.1, -0.05, 0.0, 0.05, 0.1])
 START = -1.0
 X_AG = grasp_from_axes((0.0, 1.0, 0.0), (0.3, 0.1, -1.0), (0.5, 0.1, 0.3))
