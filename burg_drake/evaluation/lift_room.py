@@ -6,12 +6,10 @@ import numpy as np
 
 from burg_drake.core.frames import Array
 from burg_drake.motion.hand_sweep import HandSweep
+from burg_drake.motion.lift_room import heights
 from burg_drake.scene.scene import Scene
 from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station
-
-STEP = 0.01
-"""Distance of the lengths that are tried [m]."""
 
 
 class LiftRoom:
@@ -25,8 +23,7 @@ class LiftRoom:
 
     def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
         self._sweep = HandSweep(scene, station, motion)
-        lengths = np.arange(motion.least, motion.lift_height - 1e-9, STEP)
-        self._heights = np.append(lengths, motion.lift_height)
+        self._heights = heights(motion.least, motion.lift_height)
 
     def length(self, instance: str, X_WG: Array, width: Array) -> Array:
         """(N,) lengths of lifts on which the hand meets nothing, with the target in it [m].

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.motion_numbers import motion_in
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.shortfall import SELF, TABLE, shortfall
 from burg_drake.evaluation.table import Columns
+from burg_drake.station.grasp_motion import GraspMotion
 
 CAUSES = 3
 """So many outcomes are named."""
@@ -24,7 +26,7 @@ REMEDIES = {
 }
 """What would help, by the stage that stopped most grasps."""
 NO_LIFT = (Outcome.HAND_COLLISION_LIFT, Outcome.LIFT_LINE)
-REMEDY_OF_LIFT = "a shorter lift (--least-lift-mm) or a retreat first (--retreat-mm) may help"
+NO_RETREAT = (Outcome.HAND_COLLISION_RETREAT, Outcome.RETREAT_LINE)
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
@@ -45,24 +47,37 @@ def _shortfalls(run: Run) -> list[str]:
 
 def _unexecuted(run: Run) -> list[str]:
     columns, notes = run.results, []
+    motion = motion_in(run.document.trial)
     for name, count in run.document.grasps.objects.items():
         mine = columns["object"] == name
         outcomes = columns["outcome"][mine]
         tried = np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.EXECUTED])
         executed = tried & (outcomes != Outcome.SIMULATION_FAILED)
         if count and len(outcomes) == count and not executed.any():
-            notes.append(_unexecuted_note(name, columns, mine))
+            notes.append(_unexecuted_note(name, columns, mine, motion))
     return notes
 
 
-def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray) -> str:
+def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray, motion: GraspMotion) -> str:
     stages = Counter(columns["stage"][mine].tolist())
     remedy = REMEDIES[Stage(stages.most_common(1)[0][0])]
     outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
-    if Outcome(_counted(outcomes, blockers)[0][0][0]) in NO_LIFT:
-        remedy = f"{REMEDY_OF_LIFT}; {remedy}"
+    if other := _other_motion(Outcome(_counted(outcomes, blockers)[0][0][0]), motion):
+        remedy = f"{other} may help; {remedy}"
     causes = _causes(outcomes, blockers)
     return f"{name}: nothing executed of {_grasps(mine)}: {causes}; {remedy}"
+
+
+def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
+    """Another motion of the hand that may avoid an outcome; "" if there is none."""
+    ways = []
+    if outcome in NO_LIFT and motion.least >= motion.lift_height:
+        ways.append("a shorter lift (--least-lift-mm)")
+    if outcome in NO_LIFT and not motion.retreat:
+        ways.append("a retreat first (--retreat-mm)")
+    if outcome in NO_RETREAT:
+        ways.append("a shorter retreat (--retreat-mm)")
+    return " or ".join(ways)
 
 
 def unclear_notes(

@@ -78,7 +78,7 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
             placed(grasps, X_WO),
             np.array([grasp.width for grasp in grasps]),
         )
-        return [_decision(answer, motions, reach.motion.lift_height) for answer in found]
+        return [_decision(answer, motions) for answer in found]
 
     return Screen(Stage.REACHABLE, ask, ARM_BATCH)
 
@@ -91,10 +91,12 @@ def placed(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
     return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
 
 
-def _decision(answer: Reach, motions: bool, lift: float) -> Decision:
-    margins = {"arm_clearance": answer.clearance, "joint_excess": answer.excess}
-    if answer.outcome is None:
-        margins[LIFT_HEIGHT] = lift
+def _decision(answer: Reach, motions: bool) -> Decision:
+    margins = {
+        "arm_clearance": answer.clearance,
+        "joint_excess": answer.excess,
+        LIFT_HEIGHT: answer.lift,
+    }
     return Decision(
         answer.outcome,
         answer.blocker,

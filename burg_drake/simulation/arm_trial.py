@@ -19,7 +19,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, rotation_angle, swap_fingers
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.trajectory import Plan
+from burg_drake.motion.trajectory import Plan, Trajectory
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.arm_carrier import ArmCarrier
 from burg_drake.simulation.arm_rise import ArmRise
@@ -163,7 +163,7 @@ class ArmTrial(Trial):
         steps = 1 if self._transfer else self._steps_a_look
         rest = max(1, round(REST / (steps * step)))
         approach = Course(to_grasp, step, steps, self._p_WG, rest)
-        ways = [Course([part], step, self._steps_a_look, self._p_WG) for part in (plan.lift,)]
+        ways = [Course([way], step, self._steps_a_look, self._p_WG) for way in _ways(plan)]
         plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
         self.hand.place(plant_context, approach.q_at_look(0))
         self.command("arm", approach.at(0))
@@ -187,8 +187,11 @@ class ArmTrial(Trial):
         if plan.origin is not None:
             plan.require_for(self.diagram.scene, self.diagram.station)
         joints = len(self.diagram.arm_joints)
-        parts = {"approach": plan.approach, "lift": plan.lift}
-        parts = {"transfer": plan.transfer, **parts} if self._transfer else parts
+        parts = {name: part for name, part in plan.phases.items() if name != "close"}
+        if not self._transfer:
+            del parts["transfer"]
+        if not _ways(plan):
+            raise InvalidInputError("the plan does not move the hand with what it holds")
         for name, part in parts.items():
             if part.q.shape[1] != joints:
                 raise InvalidInputError(
@@ -218,3 +221,9 @@ class ArmTrial(Trial):
 
     def _p_WG(self, q: Array) -> Array:
         return self._X_WG_at(q)[:, :3, 3]
+
+
+def _ways(plan: Plan) -> list[Trajectory]:
+    """Those of retreat and lift that move the hand."""
+    parts = [plan.retreat, plan.lift]
+    return [part for part in parts if part is not None and (part.q[-1] != part.q[0]).any()]

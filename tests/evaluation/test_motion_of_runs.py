@@ -18,6 +18,7 @@ from burg_drake.evaluation.origin import read_origin
 from burg_drake.evaluation.report.provenance import reproduce_command
 from burg_drake.evaluation.rerun import differences, rerun
 from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.summary import summarize
 from burg_drake.evaluation.table import table_row
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.evaluation.trial import read_trial
@@ -27,6 +28,8 @@ from burg_drake.station.station import load_station
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
+HANDLE = grasp_from_axes((0.0, 1.0, 0.0), (-0.18, 0.0, -0.98), (-0.071, 0.0, 0.012))
+"""Across the handle of the household screwdriver, almost from above."""
 MOTION = GraspMotion(retreat=0.02, lift_height=0.06, lift_direction=(0.0, -0.6, 0.8))
 GRASPS = GraspSet.create(ABOVE[None], object="box", width=0.06)
 
@@ -66,3 +69,22 @@ def test_the_report_says_how_to_ask_for_it_again(run: Run) -> None:
     at = words.index("--retreat-mm")
     assert words[at : at + 4] == ["--retreat-mm", "20", "--lift-mm", "60"]
     np.testing.assert_array_equal([float(w) for w in words[at + 5 : at + 8]], MOTION.lift_direction)
+
+
+def test_the_lift_for_which_the_arm_has_room_is_executed_and_repeated(tmp_path: Path) -> None:
+    """Under the roof of the shelf there is no room for the whole lift; the row alone tells how far
+    the hand was lifted, and the arm is not asked again."""
+    scene, station = load_scene("tabletop_six"), load_station("panda_shelf")
+    run = evaluate(
+        scene, station, tmp_path / "run",
+        grasps=GraspSet.create(HANDLE[None], object="screwdriver", width=0.03),
+        motion=GraspMotion(least_lift=0.02), engine="screening", workers=1, progress=False,
+    )  # fmt: skip
+    row = table_row(read_table(run.table_path), 0)
+    assert row["mode"] == "reach" and row["outcome"] == Outcome.LIFTED
+    assert 0.02 <= row["lift_height"] < 0.3
+    assert row["lift"] == pytest.approx(row["lift_height"], abs=0.005)
+    assert str(summarize(run).lifts).startswith("In 1 of 1 grasps there is no room for the whole")
+    trial, origin = read_trial(row, "row"), read_origin(row, "row")
+    verdict, _ = rerun(scene, station, trial, origin)
+    assert trial.verdict is not None and not differences(trial.verdict, verdict)

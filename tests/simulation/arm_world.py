@@ -46,9 +46,11 @@ def timed(q: Array, duration: float) -> Trajectory:
     return Trajectory(t, way(s), v, a)
 
 
-def straight_plan(trial: ArmTrial, X_WG: Array, near: ArrayLike = HOME) -> Plan:
-    """Straight to a grasp (4, 4) and straight up, with a fixed last joint; of what is possible the
-    one with the grasp closest to some posture (7,)."""
+def straight_plan(
+    trial: ArmTrial, X_WG: Array, near: ArrayLike = HOME, retreat: float = 0.0
+) -> Plan:
+    """Straight to a grasp (4, 4), back by a retreat [m] and straight up, with a fixed last joint;
+    of what is possible the one with the grasp closest to some posture (7,)."""
     arm = trial.diagram.station.document.arm
     joints = trial.diagram.arm_joints
     ik = PandaIk(
@@ -56,8 +58,10 @@ def straight_plan(trial: ArmTrial, X_WG: Array, near: ArrayLike = HOME) -> Plan:
         np.array([joint.position_lower_limits()[0] for joint in joints]),
         np.array([joint.position_upper_limits()[0] for joint in joints]),
     )
-    back = np.append(np.linspace(STANDOFF, 0.0, 11), np.zeros(30))
-    up = np.append(np.zeros(11), np.linspace(0.01, LIFT, 30))
+    steps = round(retreat / 0.01)
+    back = [np.linspace(STANDOFF, 0.0, 11), np.linspace(0.0, retreat, steps + 1)[1:]]
+    back = np.concatenate([*back, np.full(30, retreat)])
+    up = np.append(np.zeros(11 + steps), np.linspace(0.01, LIFT, 30))
     X = np.repeat(X_WG[None], len(back), axis=0)
     X[:, :3, 3] += up[:, None] * (0.0, 0.0, 1.0) - back[:, None] * X_WG[:3, 2]
     X_AH = inverse(arm.X_WA.matrix()) @ trial.diagram.station.hand.X_AH(X)
@@ -70,5 +74,6 @@ def straight_plan(trial: ArmTrial, X_WG: Array, near: ArrayLike = HOME) -> Plan:
     return Plan(
         transfer=timed(np.linspace(HOME, q[0], 5), 2.0),
         approach=timed(q[:11], APPROACH_TIME),
-        lift=timed(q[10:], LIFT_TIME),
+        retreat=timed(q[10 : 11 + steps], LIFT_TIME) if steps else None,
+        lift=timed(q[10 + steps :], LIFT_TIME),
     )

@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, POST, from_above
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
+from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
 from burg_drake.motion.limits import ArmLimits
@@ -29,6 +29,7 @@ from burg_drake.simulation.touches import Touches
 from burg_drake.station.arm_control import ARM_STIFFNESS
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.engine import ENGINES
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Obstacle
 
 WHOLE = replace(ENGINES["standard"], whole_trial=True)
@@ -111,6 +112,25 @@ def test_ends_as_the_hand_alone_does(arm_trial, hand_trial, X_OG: Array, overrid
         assert result.margins.lift == pytest.approx(alone.margins.lift, abs=0.002)
         assert result.margins.slip == pytest.approx(alone.margins.slip, abs=0.002)
         assert result.margins.tilt == pytest.approx(alone.margins.tilt, abs=0.02)
+
+
+def test_goes_back_and_then_up_as_the_hand_alone_does(arm_trial, box_scene: Scene) -> None:
+    motion = GraspMotion(retreat=0.1)
+    hand = HandTrial(box_scene, make_arm_station(), motion=motion)
+    tilted = from_above(0.07) @ make_pose(rotation_from_rpy((0.3, 0.0, 0.0)))  # about its closing
+    alone = hand.run("box", tilted)
+    plan = straight_plan(arm_trial, arm_trial.X_WG("box", tilted), retreat=motion.retreat)
+    result = arm_trial.run("box", tilted, plan)
+    assert result.outcome is alone.outcome is Outcome.LIFTED
+    assert result.margins.lift == pytest.approx(0.1 + LIFT, abs=0.004)
+    assert result.margins.lift == pytest.approx(alone.margins.lift, abs=0.002)
+    assert result.margins.slip == pytest.approx(alone.margins.slip, abs=0.002)
+    whole = ArmTrial(box_scene, make_arm_station(), engine=WHOLE).run("box", tilted, plan)
+    assert whole.outcome is result.outcome
+    assert whole.margins.lift == pytest.approx(result.margins.lift, abs=0.001)
+    gap = replace(plan, retreat=replace(plan.retreat, q=plan.retreat.q + 0.1))
+    with pytest.raises(InvalidInputError, match=r"retreat begins 0\.1 rad from where its approach"):
+        arm_trial.run("box", tilted, gap)
 
 
 def test_margins_of_a_lift(arm_trial: ArmTrial) -> None:
