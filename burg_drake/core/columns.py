@@ -86,7 +86,11 @@ _MARGINS = {
     "duration": Column("s", "of the planned motion"),
     "tracking_error": Column("rad", "largest deviation of a joint from its command"),
     "tracking_distance": Column("m", "largest deviation of the origin of G from where commanded"),
-    "pushed": Column("m", "largest displacement of any free object before the hand closed"),
+    "pushed": Column(
+        "m",
+        "largest displacement of any free object before the hand closed; of one that hovers, its"
+        " fall once it is touched",
+    ),
     "friction": Column(PLAIN, "coefficient of the target; empty in results: the library's"),
     "mass": Column("kg", "of the target; empty in results: the library's"),
     "cpu": Column("s", "CPU time of all stages"),

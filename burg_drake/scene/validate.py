@@ -21,8 +21,12 @@ IN_BOUNDS_TOLERANCE = 1e-4
 """How far an object may stick out over the board's edge [m]: rounding of documents."""
 TOUCH_TOLERANCE = 1e-3
 """How deep an object may start in the ground or in another one [m]: it settles within a step."""
-HOVER_TOLERANCE = 5e-3
-"""How far an object may start above its support [m] before that is worth a word."""
+HOVER_TOLERANCE = 1e-3
+"""How far an object may start above the board [m] before that is worth a word: trials count its
+fall among what was moved."""
+SUPPORT_TOLERANCE = 5e-3
+"""How far an object may start above another one that it may rest on [m]; only bounds are looked
+at."""
 MILLIMETRES_SUSPECTED = 5.0
 """A coordinate on a table of this size [m] or more was probably meant in millimetres."""
 
@@ -160,7 +164,7 @@ def _may_support(below: Array, above: Array) -> bool:
     """Whether the bounding boxes let `above` rest on `below`; both (N, 3) points."""
     overlap = (below.min(axis=0) < above.max(axis=0)) & (above.min(axis=0) < below.max(axis=0))
     lowest = above[:, 2].min()
-    reach = below[:, 2].min() < lowest < below[:, 2].max() + HOVER_TOLERANCE
+    reach = below[:, 2].min() < lowest < below[:, 2].max() + SUPPORT_TOLERANCE
     return bool(overlap[:2].all() and reach)
 
 

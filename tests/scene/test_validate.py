@@ -78,7 +78,9 @@ def test_upside_down_is_in_the_ground(make_scene: MakeScene) -> None:
 
 
 def test_hovering_is_a_warning(make_scene: MakeScene) -> None:
-    assert validate_scene(make_scene(("cube", (0.3, 0.2, 0.0049)))) == ()
+    assert validate_scene(make_scene(("cube", (0.3, 0.2, 0.0009)))) == ()
+    (issue,) = validate_scene(make_scene(("cube", (0.3, 0.2, 0.0011))))
+    assert issue.amount == pytest.approx(0.0011)
     (issue,) = validate_scene(make_scene(("cube", (0.3, 0.2, 0.02))))
     assert (issue.kind, issue.is_error) == ("hovering", False)
     assert issue.amount == pytest.approx(0.02)

@@ -202,6 +202,31 @@ def test_the_load_turns_the_joints_against_their_servos(box_scene: Scene) -> Non
     assert actuation == pytest.approx(torque, abs=0.05)
 
 
+@pytest.mark.parametrize("mass", [BOX_MASS, 1.5])
+def test_the_lag_is_that_of_the_loads(box_scene: Scene, mass: float) -> None:
+    """Rigid-body dynamics over stiffness: what the links' inertia and, on the way up, the box ask
+    for turns the joints against their servos by as much."""
+    trial = ArmTrial(box_scene, make_arm_station(), engine=WHOLE)
+    plan = straight_plan(trial, trial.X_WG("box", CENTRE))
+    margins = trial.run("box", CENTRE, plan, friction=0.9, mass=mass).margins
+    plant = trial.diagram.plant
+    context, world = plant.CreateDefaultContext(), plant.world_frame()
+    where = [joint.position_start() for joint in trial.diagram.arm_joints]
+    moving = [joint.velocity_start() for joint in trial.diagram.arm_joints]
+    p_HG, positions, lag = trial.hand.document.X_HG.translation, plant.GetPositions(context), 0.0
+    for way, load in ((plan.approach, 0.0), (plan.lift, mass)):
+        for q, a in zip(way.q[::20], way.a[::20], strict=True):
+            positions[where] = q
+            plant.SetPositions(context, positions)
+            J = plant.CalcJacobianTranslationalVelocity(
+                context, JacobianWrtVariable.kV, trial.hand.body.body_frame(), p_HG, world, world
+            )[:, moving]
+            torque = plant.CalcMassMatrix(context)[np.ix_(moving, moving)] @ a
+            torque += load * J.T @ (J @ a + [0.0, 0.0, GRAVITY])
+            lag = max(lag, float(np.linalg.norm(J @ (torque / ARM_STIFFNESS))))
+    assert margins.tracking_distance == pytest.approx(lag, rel=0.1)
+
+
 def test_a_torque_is_limited(arm_trial: ArmTrial) -> None:
     """A jump of the command saturates the joints at Franka's limits; what they get accelerates the
     arm as the equations of motion say."""
