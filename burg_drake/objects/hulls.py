@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.core.frames import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 QHULL_OPTIONS = ("Qt", "Qt Q12", "QJ Pp")
 """What Qhull is asked in turn: plain; allowing wide facets; joggling the input by some 1e-13."""
@@ -35,6 +39,8 @@ def convex_hull(points: Array) -> ConvexHull:
 
 def hull_mesh(points: Array) -> trimesh.Trimesh:
     """Hull with outward winding, vertices in the order of `points`; QhullError if flat."""
+    import trimesh
+
     hull = convex_hull(points)
     faces = hull.simplices.copy()
     triangle = points[faces]

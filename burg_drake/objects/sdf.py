@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import PurePosixPath
-from xml.sax.saxutils import escape
 
 from burg_drake.core.frames import quaternion_from_rotation
 from burg_drake.objects.entry import ContactGeometry, MassProperties, Primitive
@@ -64,7 +64,7 @@ def model_sdf(
     collisions = "".join(_collisions(pieces, friction, contact, material))
     return f"""<?xml version="1.0"?>
 <sdf version="1.9" xmlns:drake="http://drake.mit.edu">
-  <model name="{escape(name)}">
+  <model name="{escape(name, quote=False)}">
     <link name="{LINK}">
       <inertial>
         <pose>{x} {y} {z} 0 0 0</pose>
@@ -81,7 +81,7 @@ def model_sdf(
       <visual name="visual">
         <geometry>
           <mesh>
-            <uri>{escape(visual)}</uri>
+            <uri>{escape(visual, quote=False)}</uri>
           </mesh>
         </geometry>
       </visual>
@@ -154,7 +154,7 @@ def _collision(
 def _mesh(uri: str, convex: bool) -> str:
     declared = "            <drake:declare_convex/>\n" if convex else ""
     return f"""          <mesh>
-            <uri>{escape(uri)}</uri>
+            <uri>{escape(uri, quote=False)}</uri>
 {declared}          </mesh>
 """
 

@@ -10,8 +10,8 @@ import logging
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.tree import ModelInstanceIndex
@@ -48,7 +48,7 @@ def add_models(
         text = ""
     if path.suffix != ".sdf" or not text or "<include" in text:
         return list(parser.AddModels(str(path)))
-    folder = Path(escape(str(path.parent.resolve())))
+    folder = Path(escape(str(path.parent.resolve()), quote=False))
     whole = PATH.sub(lambda found: f"<uri>file://{folder / found[1]}</uri>", text)
     try:
         return list(parser.AddModelsFromString(whole, "sdf"))
