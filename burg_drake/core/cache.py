@@ -1,7 +1,7 @@
 """What takes long to compute and follows from content alone, kept from one process to the next.
 
 A folder of the user's has one `.npz` file an entry, named by what its arrays were computed from,
-with a hash of the code that has computed them and of the versions of numpy and scipy: of others
+with a hash of the code that has computed them and of the versions of numpy, scipy and Drake: of others
 nothing is used. Whatever is wrong with an entry, its arrays are computed again, to the same bits,
 and take its place; whatever is wrong with the folder, they are computed each time.
 
@@ -42,8 +42,10 @@ TOUCHED = 86_400.0
 """An entry in use is marked as such no more often than that [s]."""
 ABANDONED = 3_600.0
 """A file that has not got its name for so long [s] is of a process that was killed."""
-ROOMS = ("core", "grasping", "motion")
+ROOMS = ("core", "objects", "scene", "station", "grasping", "motion")
 """Packages whose code decides about what is kept."""
+MAKERS = ("numpy", "scipy", "drake")
+"""Packages whose version does."""
 MADE = "made_by"
 """Name of the array that says what an entry was computed by, and from what."""
 
@@ -150,4 +152,4 @@ def _makers() -> tuple[str, ...]:
     package = Path(__file__).parents[1]
     files = [file for room in ROOMS for file in sorted((package / room).glob("*.py"))]
     code = content_hash([file.name for file in files], files)
-    return code, *(metadata.version(name) for name in ("numpy", "scipy"))
+    return code, *(metadata.version(name) for name in MAKERS)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from burg_drake.core.frames import Array, inverse, transform_points
 from burg_drake.motion.ik import ArmKinematics
@@ -42,6 +41,8 @@ class ArmSpan:
             arm: the arm's kinematics.
             station: the station that it stands on.
         """
+        from scipy.optimize import minimize  # takes 0.1 s
+
         assert station.document.arm is not None  # whose kinematics these are
         turns = arm.turns == 1.0
         axis, p_AJ = arm.axis[turns], arm.p_AJ[turns]

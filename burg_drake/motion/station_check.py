@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import data_root
 from burg_drake.motion.arm_span import ArmSpan, unreachable_board, unreachable_objects
@@ -108,7 +110,8 @@ def inspect_station(
 
 
 def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
-    """Refuses an arm of which no grasp of a scene needs to be asked; done in a moment.
+    """Refuses an arm of which no grasp of a scene needs to be asked; done in a moment, and one that
+    was not refused before is known from the user's cache.
 
     Args:
         scene: what stands on the station.
@@ -124,8 +127,14 @@ def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
     """
     if station.document.arm is None:
         return ()
-    diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
-    span = _require_usable(diagram, ArmKinematics.of(diagram))
+
+    def check() -> Arrays:
+        diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+        span = _require_usable(diagram, ArmKinematics.of(diagram))
+        return {"p_WJ": span.p_WJ, "radius": np.array(span.radius)}
+
+    found = kept("usable-arm", content_hash(scene.content, station.content), check)
+    span = ArmSpan(found["p_WJ"], float(found["radius"]))
     return tuple(unreachable_objects(span, scene, station).values())
 
 

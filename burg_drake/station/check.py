@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE, SceneIssue, require_sound, validate_scene
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram, instance_pose
@@ -42,12 +44,18 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
 
 
 def require_sound_scene(scene: Scene, station: Station) -> None:
-    """Refuses a scene whose grasps would be judged in a world other than the document's.
+    """Refuses a scene whose grasps would be judged in a world other than the document's; one that was
+    not refused before is known from the user's cache.
 
     Raises:
         InvalidInputError: one line with the first error found.
     """
-    require_sound(scene, check_scene(scene, station))
+
+    def check() -> Arrays:
+        require_sound(scene, check_scene(scene, station))
+        return {}
+
+    kept("sound-scene", content_hash(scene.content, station.content), check)
 
 
 def overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:
