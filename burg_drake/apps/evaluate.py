@@ -92,9 +92,9 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.evaluation.mode import mode_for
-    from burg_drake.motion.station_check import require_usable_arm
+    from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
-    from burg_drake.station.check import require_sound_scene
+    from burg_drake.station.sound_scene import require_sound_scene
     from burg_drake.station.station import load_station
 
     require_file(arguments)

@@ -107,9 +107,9 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.core.outcome import Outcome
     from burg_drake.evaluation.feasibility import reach
     from burg_drake.evaluation.short_lifts import short_lifts
-    from burg_drake.motion.station_check import require_usable_arm
+    from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
-    from burg_drake.station.check import require_sound_scene
+    from burg_drake.station.sound_scene import require_sound_scene
     from burg_drake.station.station import load_station
 
     require_file(arguments)

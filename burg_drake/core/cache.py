@@ -1,9 +1,10 @@
 """What takes long to compute and follows from content alone, kept from one process to the next.
 
 A folder of the user's has one `.npz` file an entry, named by what its arrays were computed from,
-with a hash of the code that has computed them and of the versions of numpy, scipy and Drake: of others
-nothing is used. Whatever is wrong with an entry, its arrays are computed again, to the same bits,
-and take its place; whatever is wrong with the folder, they are computed each time.
+with a hash of the code that has computed them and of the versions of numpy, scipy and Drake: an
+entry of another version is not used. Whatever is wrong with an entry, its arrays are computed
+again, to the same bits, and take its place; whatever is wrong with the folder, they are computed
+each time.
 
 The folder is `BURG_DRAKE_CACHE`, if that is set (`off`: none); else `burg_drake` in
 `XDG_CACHE_HOME`, `~/Library/Caches` on macOS, or `~/.cache`. It may be deleted at any time.

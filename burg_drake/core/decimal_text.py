@@ -6,6 +6,7 @@ sides are the floating-point number nearest to the same decimal one.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from typing import Any
 
@@ -65,12 +66,12 @@ def _written(units: Array, separator: str) -> list[str]:
     upper, lower = _split(np.abs(units).astype(np.int64), GROUP**2)
     groups = [*_split(upper.astype(np.int32), GROUP), *_split(lower.astype(np.int32), GROUP)]
     text = np.empty((*units.shape, 5), dtype=np.uint32)
-    text[..., :2] = _WHOLE[groups[0] + GROUP * (units < 0.0)]
+    text[..., :2] = _whole()[groups[0] + GROUP * (units < 0.0)]
     text[..., 0] |= _word(separator)
     text[:, 0, 0] ^= _word(separator) ^ _word("\n")
     after = np.zeros(units.shape, dtype=bool)  # whether there are digits further to the right
     for k in (3, 2, 1):
-        text[..., 1 + k] = _DECIMALS[min(k, 2) - 1, groups[k] + GROUP * after]
+        text[..., 1 + k] = _decimals()[min(k, 2) - 1, groups[k] + GROUP * after]
         after |= groups[k] > 0
     return text.tobytes().translate(None, PAD).decode("ascii").split("\n")[1:]
 
@@ -90,19 +91,17 @@ def _words(texts: Iterable[str]) -> Words:
     return np.frombuffer("".join(texts).encode("ascii"), dtype=np.uint32)
 
 
-_WHOLE = _words(f"{sign}{k}.".rjust(8, "\0") for sign in ("", "-") for k in range(GROUP)).reshape(
-    -1, 2
-)
-"""Two words for what stands before the decimals; the first bytes are free for a separator."""
-_DECIMALS = np.stack(
-    [
-        _words(
-            f"{k:04d}"[:least] + end(f"{k:04d}"[least:]).ljust(4 - least, "\0")
-            for end in (lambda digits: digits.rstrip("0"), str)
-            for k in range(GROUP)
-        )
-        for least in (1, 0)
-    ]
-)
-"""Four decimals: the first ones, of which one stays, and later ones; without the zeros at the end,
-and with them if more follows."""
+@functools.cache
+def _whole() -> Words:
+    """Two words for what stands before the decimals; the first bytes are free for a separator."""
+    numbers = (f"{sign}{k}.".rjust(8, "\0") for sign in ("", "-") for k in range(GROUP))
+    return _words(numbers).reshape(-1, 2)
+
+
+@functools.cache
+def _decimals() -> Words:
+    """Four decimals: the first ones, of which one stays, and later ones; without the zeros at the
+    end, and with them if more follows."""
+    digits = [f"{k:04d}" for k in range(GROUP)]
+    least = [[d[:n] + d[n:].rstrip("0").ljust(4 - n, "\0") for d in digits] for n in (1, 0)]
+    return np.stack([_words([*short, *digits]) for short in least])

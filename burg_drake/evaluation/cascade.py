@@ -274,7 +274,7 @@ def _with_grasps(
 
 
 def _require_sound(scene: Scene, station: Station, mode: Mode) -> None:
-    from burg_drake.motion.station_check import require_usable_arm
+    from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.station.check import require_sound_scene
 
     require_sound_scene(scene, station)

@@ -102,7 +102,7 @@ def reach(
         UnknownNameError: a reference, instance or object that does not exist.
         SimulationError: the worker processes die.
     """
-    from burg_drake.motion.station_check import require_usable_arm
+    from burg_drake.motion.usable_arm import require_usable_arm
 
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, transform_points
@@ -85,6 +84,8 @@ def _distance_beside(scene: Scene, name: str, p_SG: Array) -> Array:
 
     mesh = scene.library.surface(scene.instance(name).object)
     points, _ = subdivide_to_size(mesh.vertices, mesh.faces, SPACING, max_iter=20)
+    from scipy.spatial import cKDTree
+
     distance, _ = cKDTree(points).query(transform_points(inverse(scene.X_SO(name)), p_SG))
     return np.asarray(distance)
 

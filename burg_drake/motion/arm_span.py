@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from burg_drake.core.frames import Array, inverse, transform_points
-from burg_drake.motion.ik import ArmKinematics
 from burg_drake.scene.scene import Board, Scene
 from burg_drake.scene.validate import placed_vertices
 from burg_drake.station.station import Station
+
+if TYPE_CHECKING:
+    from burg_drake.motion.ik import ArmKinematics
 
 SOFTNESS = 1e-5
 """Rounds off the kinks of lengths while their sum is made small [m]."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from burg_drake.core.cache import Arrays, kept
 from burg_drake.core.frames import Array
@@ -142,6 +141,8 @@ def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Si
         view[occupied] = np.minimum(view[occupied], solid.above(at.T))
     if not hulls:
         return exact, exact.copy()
+    from scipy.ndimage import distance_transform_edt  # not needed for what is in the cache
+
     occupied = np.isfinite(seed)
     distance, nearest = distance_transform_edt(
         ~occupied, sampling=cell, return_distances=True, return_indices=True

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.cache import Arrays, kept
-from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.resources import data_root
 from burg_drake.motion.arm_span import ArmSpan, unreachable_board, unreachable_objects
@@ -109,33 +107,14 @@ def inspect_station(
     return StationReport(hand, arm, seen, tuple(warnings))
 
 
-def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
-    """Refuses an arm of which no grasp of a scene needs to be asked; done in a moment, and one that
-    was not refused before is known from the user's cache.
-
-    Args:
-        scene: what stands on the station.
-        station: with or without an arm.
-
-    Returns:
-        A line for each object of the scene that is certainly out of the arm's reach.
+def usable_span(scene: Scene, station: Station) -> ArmSpan:
+    """The span of a station's arm.
 
     Raises:
-        InvalidInputError: the whole board is out of reach, the arm stands in something solid, or
-            it collides in its home posture, or limits of its joints are missing; one line says
-            where.
+        InvalidInputError: it cannot be used; see `usable_arm.require_usable_arm`.
     """
-    if station.document.arm is None:
-        return ()
-
-    def check() -> Arrays:
-        diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
-        span = _require_usable(diagram, ArmKinematics.of(diagram))
-        return {"p_WJ": span.p_WJ, "radius": np.array(span.radius)}
-
-    found = kept("usable-arm", content_hash(scene.content, station.content), check)
-    span = ArmSpan(found["p_WJ"], float(found["radius"]))
-    return tuple(unreachable_objects(span, scene, station).values())
+    diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+    return _require_usable(diagram, ArmKinematics.of(diagram))
 
 
 def _require_usable(diagram: StationDiagram, kinematics: ArmKinematics) -> ArmSpan:

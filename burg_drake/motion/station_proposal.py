@@ -20,7 +20,8 @@ from burg_drake.core.names import name_from
 from burg_drake.core.resources import builtin_names
 from burg_drake.core.schema import Pose
 from burg_drake.motion.reachability import ReachabilitySettings
-from burg_drake.motion.station_check import inspect_station, require_usable_arm
+from burg_drake.motion.station_check import inspect_station
+from burg_drake.motion.usable_arm import require_usable_arm
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE, placed_vertices
 from burg_drake.station.check import require_sound_scene

@@ -12,11 +12,11 @@ import numpy as np
 from burg_drake.core.decimal_text import on_grid
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.motion.limits import ArmLimits
 
 if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
 
+    from burg_drake.motion.limits import ArmLimits
     from burg_drake.scene.scene import Scene
     from burg_drake.station.station import Station
 

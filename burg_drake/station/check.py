@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core.cache import Arrays, kept
-from burg_drake.core.content import content_hash
 from burg_drake.scene.scene import Scene
-from burg_drake.scene.validate import TOUCH_TOLERANCE, SceneIssue, require_sound, validate_scene
+from burg_drake.scene.validate import TOUCH_TOLERANCE, SceneIssue, validate_scene
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram, instance_pose
 from burg_drake.station.hollow import mesh_by_pieces
+from burg_drake.station.sound_scene import require_sound_scene as require_sound_scene
 from burg_drake.station.station import Station
 
 
@@ -41,21 +40,6 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
         message = _overlap(a, b, depth, parts, station.path)
         issues.append(SceneIssue(instance=a, kind="overlap", amount=depth, message=message))
     return tuple(issues)
-
-
-def require_sound_scene(scene: Scene, station: Station) -> None:
-    """Refuses a scene whose grasps would be judged in a world other than the document's; one that was
-    not refused before is known from the user's cache.
-
-    Raises:
-        InvalidInputError: one line with the first error found.
-    """
-
-    def check() -> Arrays:
-        require_sound(scene, check_scene(scene, station))
-        return {}
-
-    kept("sound-scene", content_hash(scene.content, station.content), check)
 
 
 def overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:

@@ -10,7 +10,7 @@ import yaml
 
 from burg_drake.apps.cli import main
 from burg_drake.core.resources import builtin_names
-from burg_drake.motion.station_check import require_usable_arm
+from burg_drake.motion.usable_arm import require_usable_arm
 from burg_drake.pipeline.check import check_library
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.check import check_scene

@@ -13,7 +13,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
-from burg_drake.motion.station_check import require_usable_arm
+from burg_drake.motion.usable_arm import require_usable_arm
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.station import Obstacle, Station, load_station
 

@@ -1,0 +1,25 @@
+"""Refuses scenes that cannot stand on a station; one that was not refused before is known."""
+
+from __future__ import annotations
+
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash
+from burg_drake.scene.scene import Scene
+from burg_drake.scene.validate import require_sound
+from burg_drake.station.station import Station
+
+
+def require_sound_scene(scene: Scene, station: Station) -> None:
+    """Refuses a scene whose grasps would be judged in a world other than the document's.
+
+    Raises:
+        InvalidInputError: one line with the first error found.
+    """
+
+    def check() -> Arrays:
+        from burg_drake.station.check import check_scene  # which builds a diagram
+
+        require_sound(scene, check_scene(scene, station))
+        return {}
+
+    kept("sound-scene", content_hash(scene.content, station.content), check)
