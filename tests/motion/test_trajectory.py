@@ -115,6 +115,21 @@ def written(plan: Plan, folder: Path, suffix: str) -> Path:
     return path
 
 
+RETREAT = {
+    "retreat": motion([0.7, 0.2], [0.65, 0.25]),
+    "lift": motion([0.65, 0.25], [0.1, 0.3]),
+}
+
+
+@pytest.mark.parametrize("suffix", ["json", "csv"])
+def test_files_bring_a_retreat_back(plan: Plan, tmp_path: Path, suffix: str) -> None:
+    plan = replace(plan, **RETREAT)
+    back = load_plan(written(plan, tmp_path, suffix))
+    assert tuple(back.phases) == PHASES
+    for name, phase in plan.phases.items():
+        assert_same(back.phases[name], phase)
+
+
 @pytest.mark.parametrize("suffix", ["json", "csv"])
 @pytest.mark.parametrize("changes", [{}, {"width": np.nan, "opening": np.nan}, {"origin": None}])
 def test_files_bring_it_back_bit_by_bit(
