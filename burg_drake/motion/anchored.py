@@ -7,7 +7,7 @@ of a check. Geometry of the world itself costs next to nothing. Verdicts stay th
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from pydrake.geometry import (
     CollisionFilterDeclaration,
@@ -73,3 +73,43 @@ def anchor(
 
     checker.PerformOperationAgainstAllModelContexts(tie_all)
     return body_of
+
+
+def release(
+    checker: SceneGraphCollisionChecker,
+    station_diagram: StationDiagram,
+    body: BodyIndex,
+    anchored: Mapping[GeometryId, BodyIndex],
+    ignored: Collection[BodyIndex],
+) -> None:
+    """Takes the collision geometry of a body back from the world, so that the body moves again.
+
+    Args:
+        checker: all its contexts are changed, in which `anchor` has been at work.
+        station_diagram: what it checks; it stays as it is.
+        body: the body.
+        anchored: what `anchor` has returned.
+        ignored: bodies that it does not collide with.
+    """
+    plant, graph = station_diagram.plant, station_diagram.scene_graph
+    inspector, source = graph.model_inspector(), plant.get_source_id()
+    own = plant.GetCollisionGeometriesForBody(plant.get_body(body))
+    free = {*ignored} - {*anchored.values()}
+    others = {g for b in free for g in plant.GetCollisionGeometriesForBody(plant.get_body(b))}
+    others |= {geometry for geometry, of in anchored.items() if of in ignored}
+    tied = {geometry for geometry, of in anchored.items() if of == body}
+
+    def untie(_: RobotDiagram, context: CollisionCheckerContext) -> None:
+        graph_context = context.scene_graph_context()
+        known = {*context.GetQueryObject().inspector().GetAllGeometryIds()}  # each has its own
+        for geometry in tied & known:
+            graph.RemoveRole(graph_context, source, geometry, Role.kProximity)
+        for geometry in own if tied else ():
+            properties = inspector.GetProximityProperties(geometry)
+            graph.AssignRole(graph_context, source, geometry, properties)
+        declaration = CollisionFilterDeclaration()
+        declaration.ExcludeWithin(GeometrySet(own))
+        declaration.ExcludeBetween(GeometrySet(own), GeometrySet([*(others & known)]))
+        graph.collision_filter_manager(graph_context).Apply(declaration)
+
+    checker.PerformOperationAgainstAllModelContexts(untie)

@@ -16,7 +16,7 @@ from pydrake.planning import SceneGraphCollisionChecker
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.motion.anchored import anchor
+from burg_drake.motion.anchored import anchor, release
 from burg_drake.motion.carried import Carried, Shifts
 from burg_drake.station.diagram import StationDiagram
 
@@ -200,22 +200,27 @@ class ArmCollision:
     def _checker(self, carried: str) -> tuple[SceneGraphCollisionChecker, Shifts]:
         """The checker's clone that answers; what is carried is not held against the hand."""
         if carried not in self._carrying:
-            checker = self._answering(self._diagram.free[carried])
+            checker = self._releasing(self._diagram.free[carried])
             self._carrying[carried] = checker, self._carried.shifted(checker)
         return self._carrying[carried]
 
-    def _answering(self, held: BodyIndex | None = None) -> SceneGraphCollisionChecker:
+    def _answering(self) -> SceneGraphCollisionChecker:
         """A clone of the checker, with all tied to the world that does not move in it."""
         diagram, checker = self._diagram, self.checker.Clone()
-        pairs = list(self._apart)
-        if held is not None:
-            pairs += [(held, body) for body in self._in_hand]
         filtered = checker.GetFilteredCollisionMatrix().copy()  # set once: that costs 1 ms
-        for a, b in pairs:
+        for a, b in self._apart:
             filtered[int(a), int(b)] = filtered[int(b), int(a)] = FILTERED
         checker.SetCollisionFilterMatrix(filtered)
         still = {*diagram.free.values(), *diagram.fixed.values(), diagram.table}
-        self._anchored |= anchor(checker, diagram, still - self._in_base - {held})
+        self._anchored |= anchor(checker, diagram, still - self._in_base)
+        return checker
+
+    def _releasing(self, held: BodyIndex) -> SceneGraphCollisionChecker:
+        """A clone of that one in which a body moves, and is not held against the hand."""
+        checker = self._empty_handed.Clone()
+        filtered = checker.GetFilteredCollisionMatrix()[int(held)] != 0
+        ignored = {BodyIndex(int(k)) for k in np.flatnonzero(filtered)} | self._in_hand
+        release(checker, self._diagram, held, self._anchored, ignored - {held})
         return checker
 
     def _overlapping_base(self) -> set[BodyIndex]:
