@@ -106,6 +106,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
     from burg_drake.core.outcome import Outcome
     from burg_drake.evaluation.feasibility import reach
+    from burg_drake.evaluation.instance_names import chosen_instances
+    from burg_drake.evaluation.run_notes import ungiven_note
     from burg_drake.evaluation.short_lifts import short_lifts
     from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
@@ -145,8 +147,10 @@ def run_reach(arguments: argparse.Namespace) -> int:
         progress=not arguments.quiet,
     )
     answered = judged.column("outcome") != ""
-    names = [scene.instance(name).object for name in grasps]
+    names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
     print_tables(judged.select(answered), names)
+    if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
+        print(f"note: {note}")
     lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
     if lifts is not None:
         print(lifts)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.errors import listing
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.motion_numbers import motion_in
 from burg_drake.evaluation.run_store import Run
@@ -30,15 +32,24 @@ NO_RETREAT = (Outcome.HAND_COLLISION_RETREAT, Outcome.RETREAT_LINE)
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
-    """A sentence for each instance with fewer grasps than asked, and for each object of which
-    nothing could be executed, once all of its grasps are judged."""
+    """A sentence for each instance with fewer grasps than asked, or for those that no grasps were
+    given for, and for each object of which nothing could be executed, once all of its grasps are
+    judged."""
     return (*_shortfalls(run), *_unexecuted(run))
 
 
+def ungiven_note(objects: Iterable[str], given: Iterable[str]) -> str:
+    """Which of the objects have no given grasp; "" if all have some."""
+    missing = sorted({*objects} - {*given})
+    return f"no grasps to judge for {listing(missing)}" if missing else ""
+
+
 def _shortfalls(run: Run) -> list[str]:
-    asked = run.document.grasps.per_object
+    grasps = run.document.grasps
+    asked = grasps.per_object
     if asked is None:
-        return []
+        note = ungiven_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
+        return [note] if note else []
     found = Counter(run.candidates.instance.tolist())
     parts = run.candidates.grasps.provenance.get("parts", {})
     notes = (shortfall(name, asked, part, found[name]) for name, part in parts.items())

@@ -37,7 +37,8 @@ def test_a_table_and_plans(grasps: Path, tmp_path: Path, capsys: Capture) -> Non
     assert reach(grasps, "-o", str(table), "--plans", str(plans)) == 0
     out = capsys.readouterr().out
     rows = [line.split() for line in out.splitlines() if line.strip()]
-    assert ["box", "2", "1", "1", "100", "%"] in rows
+    assert ["box", "2", "1", "1", "100", "%"] in rows and ["mug", "0", "0", "0", "-"] in rows
+    assert "note: no grasps to judge for banana, bottle, bowl, mug, screwdriver" in out
     assert ["reachable", "1", "50.0", "%"] in rows
     assert ["collision_target", "1", "50.0", "%", "box", "(1)"] in rows
     assert "clear grasps per CPU second" in out and f"1 plans are in {plans}" in out
