@@ -58,34 +58,35 @@ def as_high_as_there_is_room(
         that was found, and as its `blocker` what is in the way of the whole lift; otherwise why
         there is no room for the first.
     """
-    found, top = list(whole), len(tried) - 1
+    found = list(whole)
     asked = _where(
         reach.outcome is not None and reach.outcome not in WHATEVER_HEIGHT for reach in whole
     )
+    low, high = np.full(len(asked), -1), np.full(len(asked), len(tried) - 1)
 
-    def reached(level: int, some: Indices) -> Booleans:
-        verdicts = judge(tried[level], some)
-        for k, reach in zip(some, verdicts, strict=True):
+    def reached(level: int, rows: Indices) -> Booleans:
+        verdicts = judge(tried[level], asked[rows])
+        for k, reach in zip(asked[rows], verdicts, strict=True):
             if reach.outcome is None:
                 found[k] = replace(reach, blocker=whole[k].blocker)
             elif level == 0:
                 found[k] = reach
         return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
 
-    left = asked[reached(0, asked)]
-    low, high = np.zeros(len(left), np.intp), np.full(len(left), top)
-    by_hand = _where(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in left)
+    by_hand = _where(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in asked)
     free, _ = _halved(
         low[by_hand],
         high[by_hand],
-        lambda level, rows: hand_is_free(tried[level], left[by_hand[rows]]),
+        lambda level, rows: hand_is_free(tried[level], asked[by_hand[rows]]),
     )
     # As high as the hand gets by itself, the arm often does, too.
-    high[by_hand] = free + 1
-    low[by_hand], high[by_hand] = _narrowed(
-        low[by_hand], high[by_hand], free, lambda level, rows: reached(level, left[by_hand[rows]])
-    )
-    _halved(low, high, lambda level, rows: reached(level, left[rows]))
+    guess = np.full(len(asked), -1)
+    guess[by_hand] = np.maximum(free, 0)
+    high[by_hand] = guess[by_hand] + 1
+    low, high = _narrowed(low, high, guess, reached)
+    # Where there is no room for the first of the heights, there is none for any.
+    low, high = _narrowed(low, high, np.where(low < 0, 0, -1), reached)
+    _halved(low, high, reached)
     return found
 
 

@@ -157,7 +157,7 @@ class ArmReach:
         before, motion = ways.before_lift(), self.motion
 
         def judge(height: float, some: Indices) -> list[Reach]:
-            return self._lifted(ways[some], before[some], height)
+            return self._lifted(ways[some], before[some], float(height))
 
         def hand_is_free(height: float, some: Indices) -> NDArray[np.bool_]:
             return ~ways[some].lifted(before[some], height).blocked

@@ -20,6 +20,7 @@ from burg_drake.station.station import Obstacle, Station, load_station
 
 MOTION = GraspMotion()
 STANDOFF, LIFT = MOTION.standoff, MOTION.lift_height
+AWAY = GraspMotion(retreat=0.06, lift_height=0.2, lift_direction=(0.3, -0.4, 1.0))
 CAN = Instance(name="can", object="can", X_SO=Pose((0.4, 0.0, 0.0)))
 """34 mm in radius, 102 mm high."""
 X_WG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, 0.0, 0.09))
@@ -195,6 +196,64 @@ def test_dense_samples_in_drake_agree(shelf: tuple[Scene, Station], swept: HandS
     assert len(seen) == 4
 
 
+def test_dense_samples_in_drake_agree_on_the_way_back_and_aside(
+    shelf: tuple[Scene, Station],
+) -> None:
+    """Of the hand alone, which counts against all: without a target."""
+    clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
+    swept, seen = HandSweep(*shelf, AWAY), set[tuple[bool, bool]]()
+    rng = np.random.default_rng(2)
+    for name, X in random_grasps(*shelf, 6):
+        width = rng.uniform(0.0, 0.08, len(X))
+        retreat, lift = swept.retreat("", X, width), swept.lift("", X, width)
+        for i, X_WG in enumerate(X):
+            back = np.repeat(X_WG[None], 61, axis=0)
+            back[:, :3, 3] -= np.linspace(0.0, AWAY.retreat, 61)[:, None] * X_WG[:3, 2]
+            away = np.repeat(back[-1:], 201, axis=0)
+            away[:, :3, 3] += np.linspace(0.0, 0.2, 201)[:, None] * AWAY.direction_W
+            for way, path in ((retreat, back), (lift, away)):
+                met = overlapped(clearance, path, 1.0 - width[i] / 0.08)
+                assert way.free[i] == (not met) and (not met or way.blocker[i] in met), name
+                seen.add((way is lift, bool(way.free[i])))
+    assert len(seen) == 4
+
+
+BOX = Instance(name="box", object="box", X_SO=Pose((0.4, 0.0, 0.0)))
+"""60 x 158 x 210 mm."""
+
+
+@pytest.mark.parametrize(
+    ("slope", "others", "blocker", "depth"),
+    [
+        (0.0, {}, "", 0.0),  # dragged over the table that it stands on
+        (0.1, {}, "", 0.0),  # lifted a little
+        (-0.1, {}, "table", 0.005),  # into it
+        (0.0, {"sill": block((0.34, 0.0, 0.005), (0.02, 0.3, 0.01))}, "sill", 0.01),
+        (0.5, {"sill": block((0.34, 0.0, 0.005), (0.02, 0.3, 0.01))}, "", 0.0),
+        (0.0, {"near": block((0.35, 0.0, 0.05), (0.0395, 0.3, 0.1))}, "near", 0.04975),
+    ],
+)
+def test_the_target_goes_back_with_the_hand(
+    slope: float, others: dict[str, Obstacle], blocker: str, depth: float
+) -> None:
+    """From a height at which the hand meets nothing: horizontally, or rising by a share of it."""
+    motion = GraspMotion(retreat=0.05 * np.hypot(1.0, slope))
+    swept = HandSweep(*place(BOX, **others), motion)
+    X = grasp_from_axes((0, 1, 0), (1, 0, -slope), (0.4, 0.0, 0.18))
+    back = swept.retreat("box", X[None], np.array([np.nan]))
+    assert back.blocker[0] == blocker and back.free[0] is np.bool_(not blocker)
+    if blocker:
+        assert back.clearance[0] == pytest.approx(-depth, abs=2e-4)
+
+
+def test_lower_heights_are_free_below_what_ends_the_whole_lift(hand_top: float) -> None:
+    swept = sweep(CAN, roof=roof_at(hand_top + 0.137))
+    width = np.array([0.068])
+    free = [swept.lift("can", X_WG[None], width, h).free[0] for h in (0.02, 0.13, 0.136, 0.138)]
+    assert free == [True, True, True, False]
+    assert not swept.lift("can", X_WG[None], width).free[0]
+
+
 def test_a_bound_below_every_sample(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
     """Signed clearances of the open hand on the way: none below, and one that is nearly it."""
     clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
@@ -210,13 +269,14 @@ def test_a_bound_below_every_sample(shelf: tuple[Scene, Station], swept: HandSwe
     assert tested > 10
 
 
-def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station]) -> None:
     name, X = random_grasps(*shelf, 24)[0]
     width = np.random.default_rng(3).uniform(0.0, 0.08, len(X))
     order = np.random.default_rng(4).permutation(len(X))
-    for way in ("approach", "lift"):
+    swept = HandSweep(*shelf, AWAY)
+    for way in ("approach", "retreat", "lift"):
         rows = (lambda i: (X[i],)) if way == "approach" else (lambda i: (X[i], width[i]))
-        ask = getattr(HandSweep(*shelf, MOTION), way)
+        ask = getattr(HandSweep(*shelf, AWAY), way)
         alone = [ask(name, *rows(np.array([i]))) for i in range(len(X))]
         for chosen in (np.arange(len(X)), order):
             batch = getattr(swept, way)(name, *rows(chosen))
@@ -255,8 +315,13 @@ def test_an_empty_hand(swept: HandSweep, shelf: tuple[Scene, Station]) -> None:
         np.testing.assert_array_equal(empty.blocker[others], full.blocker[others])
 
 
-def test_swapped_fingers_and_a_turned_world(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
+@pytest.mark.parametrize("motion", [MOTION, AWAY], ids=["up", "away"])
+def test_swapped_fingers_and_a_turned_world(
+    shelf: tuple[Scene, Station], motion: GraspMotion
+) -> None:
+    """The direction of the lift turns with the world."""
     scene, station = shelf
+    swept = HandSweep(*shelf, motion)
     turn = Pose((0.1, -0.05, 0.0), (0.0, 0.0, 37.0)).matrix()
     moved = {
         name: replace(o, X_WB=Pose.from_matrix(turn @ o.X_WB.matrix(), quaternion=True))
@@ -264,11 +329,14 @@ def test_swapped_fingers_and_a_turned_world(shelf: tuple[Scene, Station], swept:
     }
     X_WS = Pose.from_matrix(turn @ station.document.X_WS.matrix(), quaternion=True)
     document = replace(station.document, X_WS=X_WS, background=moved)
-    turned = HandSweep(scene, replace(station, document=document), MOTION)
+    direction = tuple((turn[:3, :3] @ motion.direction_W).tolist())
+    turned = HandSweep(
+        scene, replace(station, document=document), replace(motion, lift_direction=direction)
+    )
     for name, X in random_grasps(scene, station, 8):
         width = np.full(len(X), 0.05)
         ways = [
-            (s.approach(name, Y), s.lift(name, Y, width))
+            (s.approach(name, Y), s.retreat(name, Y, width), s.lift(name, Y, width))
             for s, Y in ((swept, X), (swept, swap_fingers(X)), (turned, turn @ X))
         ]
         for one, *others in zip(*ways, strict=True):
