@@ -148,7 +148,7 @@ def test_hand_and_target_go_back_and_up(
     reach: ArmReach, grasps: Grasps, found: list[Reach]
 ) -> None:
     reached = [reach for reach in found if reach.outcome is None]
-    assert len(reached) > 5 and len({round(reach.lift, 3) for reach in reached}) > 2
+    assert len(reached) > 5 and len({round(reach.lift, 3) for reach in reached}) > 1
     X_WA, X_HG = reach.diagram.station.document.arm.X_WA.matrix(), reach.diagram.station.hand.X_HG
     for one in reached:
         witness = one.witness
