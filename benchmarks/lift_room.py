@@ -2,9 +2,9 @@
 
     python benchmarks/lift_room.py [--scene S] [--grasps N] [--audit N]
 
-The stations are those of `benchmarks/confined`, the grasps those of `benchmarks/reach.py`: antipodal
-ones at which the open hand is clear. Motions are audited as there, in a diagram of their own with
-the target in the hand.
+The stations are those of `benchmarks/confined`, the grasps those of `benchmarks/reach.py`:
+antipodal ones at which the open hand is clear. Motions are audited as there, in a diagram of their
+own with the target in the hand.
 """
 
 from __future__ import annotations
