@@ -115,7 +115,7 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
             sizes = shape.size().tolist()
         case Convex() | Mesh():
             hull = inspector.GetConvexHull(geometry)
-            sizes = [hull.vertex(i).tolist() for i in range(hull.num_vertices())]
+            sizes = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
         case _:
             sizes = []  # not known; to cover it raises an error
     return [type(shape).__name__, sizes]
