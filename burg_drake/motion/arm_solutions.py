@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from burg_drake.core.content import rng_from
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash, rng_from
 from burg_drake.core.frames import Array
 from burg_drake.motion.ik import ArmKinematics, solve_ik
 from burg_drake.motion.panda_ik import PandaIk
@@ -109,10 +110,16 @@ class NumericSolutions:
             limited: whether configurations have to be within the joint limits; the postures of the
                 table are in either case.
         """
-        rng = rng_from("burg_drake arm solutions", POSTURES)
         lower, upper = arm.lower + limit_margin, arm.upper - limit_margin
-        self._q = rng.uniform(lower, upper, (POSTURES, len(lower)))
-        self._tree = cKDTree(_features(arm.forward(self._q)[0]))
+
+        def make() -> Arrays:
+            rng = rng_from("burg_drake arm solutions", POSTURES)
+            q = rng.uniform(lower, upper, (POSTURES, len(lower)))
+            return {"q": q, "features": _features(arm.forward(q)[0])}
+
+        follows = (arm.turns, arm.axis, arm.p_AJ, arm.X_AH0, lower, upper)
+        table = kept("hand-poses", content_hash(*follows), make)
+        self._q, self._tree = table["q"], cKDTree(table["features"])
         self._arm = arm if limited else arm.unlimited()
         self._margin = limit_margin
         self._starts = starts
