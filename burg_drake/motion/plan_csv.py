@@ -36,6 +36,10 @@ from burg_drake.motion.plan_parts import (
 )
 from burg_drake.motion.trajectory import PHASES, Plan
 
+Rows = Sequence[tuple[int, list[str]]]
+"""Cells of samples, with the line of the file that they are on."""
+WIDTH_TOLERANCE = 1e-6
+"""What rounding by other programs may change of a width [m]."""
 KINDS = {
     "q": ("rad", "position of joint {}; m of a joint that slides"),
     "v": ("rad/s", "velocity of joint {}; m/s of a joint that slides"),
@@ -72,8 +76,8 @@ def read_csv(path: Path) -> Plan:
     Raises:
         InvalidInputError: see `load_plan`.
     """
-    rows = [row for _, row in read_rows(path, GRASP_FILE)]
-    header = rows.pop(0) if rows else []
+    rows = read_rows(path, GRASP_FILE)
+    header = rows.pop(0)[1] if rows else []
     joints = tuple(name[2:] for name in header if name.startswith("q_"))
     if not joints or header != list(_meanings(joints)):
         raise InvalidInputError(
@@ -103,62 +107,75 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
     return dict(data)
 
 
-def _plan(rows: Sequence[Sequence[str]], joints: tuple[str, ...], data: Any) -> Plan:
+def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> Plan:
     n = len(joints)
-    for k, row in enumerate(rows):
+    for line, row in rows:
         if len(row) != 3 * n + 3:
-            raise InvalidInputError(f"row {k + 1} has {len(row)} cells, not {3 * n + 3}")
-    phases = [row[1] for row in rows]
-    spans = _read_spans(phases)
-    t = np.array([_number(row[0], "t", k) for k, row in enumerate(rows)])
+            raise InvalidInputError(f"line {line} has {len(row)} cells, not {3 * n + 3}")
+    spans = _read_spans(rows)
+    t = np.array([_number(row[0], "t", line) for line, row in rows])
     names = [f"{kind}_{joint}" for kind in KINDS for joint in joints]
     values = np.empty((len(rows), 3 * n))
-    for k, row in enumerate(rows):
+    for k, (line, row) in enumerate(rows):
         try:
             values[k] = row[2:-1]
         except ValueError:
-            values[k] = [_number(c, m, k) for c, m in zip(row[2:-1], names, strict=True)]
+            values[k] = [_number(c, m, line) for c, m in zip(row[2:-1], names, strict=True)]
     if not np.isfinite(values).all():
         k, column = np.argwhere(~np.isfinite(values))[0]
-        raise InvalidInputError(f"{names[column]} in row {k + 1} is no finite number")
+        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is no finite number")
     q, v, a = np.hsplit(values, 3)
     if data is None:
         data = _told_by_rows(rows, t, spans)
-    return assembled(read_data(data, joints), t, spans, (q, v, a))
+    plan = assembled(read_data(data, joints), t, spans, (q, v, a))
+    _require_widths(plan, rows)
+    return plan
 
 
-def _read_spans(phases: Sequence[str]) -> dict[str, tuple[int, int]]:
+def _require_widths(plan: Plan, rows: Rows) -> None:
+    """The hand is open until it closes, and then as wide as the target in all rows."""
+    for line, (_, phase, *_, text) in rows:
+        wanted = _width(plan, phase)
+        if text == wanted:
+            continue
+        if not (wanted and abs(_number(text, "width", line) - float(wanted)) <= WIDTH_TOLERANCE):
+            raise InvalidInputError(
+                f"width in line {line} is {quoted(text)}; in phase {phase!r} of this plan it is"
+                f" {quoted(wanted)}"
+            )
+
+
+def _read_spans(rows: Rows) -> dict[str, tuple[int, int]]:
     """First and last row of each phase."""
     spans: dict[str, tuple[int, int]] = {}
-    for k, name in enumerate(phases):
+    for k, (line, row) in enumerate(rows):
+        name = row[1]
         if name not in PHASES:
-            raise InvalidInputError(f"row {k + 1} has phase {quoted(name)}, not one of {PHASES}")
+            raise InvalidInputError(f"line {line} has phase {quoted(name)}, not one of {PHASES}")
         if name in spans and spans[name][1] != k - 1:
-            raise InvalidInputError(f"phase {name!r} begins again in row {k + 1}")
+            raise InvalidInputError(f"phase {name!r} begins again in line {line}")
         spans[name] = (spans[name][0] if name in spans else max(0, k - 1), k)
     return spans
 
 
-def _told_by_rows(
-    rows: Sequence[Sequence[str]], t: Array, spans: dict[str, tuple[int, int]]
-) -> dict[str, Any]:
+def _told_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
     """What a table alone tells of its plan."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:
         raise InvalidInputError("t does not rise from 0")
     near = round(1.0 / step, 6)
     first, last = spans.get("close", (0, 0))
-    widths = [_number(rows[k][-1], "width", k) if rows[k][-1] else None for k in (0, -1)]
+    widths = [_number(r[-1], "width", n) if r[-1] else None for n, r in (rows[0], rows[-1])]
     rate = near if near and 1.0 / near == step else 1.0 / step
     hand = {"opening": widths[0], "width": widths[1] or None, "close_time": (last - first) / rate}
     return {"rate": rate, "hand": hand, "origin": None}
 
 
-def _number(text: str, name: str, row: int) -> float:
+def _number(text: str, name: str, line: int) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise InvalidInputError(f"{name} in row {row + 1} is {quoted(text)}, no number") from error
+        raise InvalidInputError(f"{name} in line {line} is {quoted(text)}, no number") from error
 
 
 def _width(plan: Plan, phase: str) -> str:

@@ -122,6 +122,8 @@ def read_data(document: Mapping[str, Any], joints: tuple[str, ...]) -> Told:
         opening, width = (
             np.nan if hand[name] is None else float(hand[name]) for name in ("opening", "width")
         )
+        if min(opening, width) < 0.0 or np.inf in (opening, width):
+            raise ValueError(hand)
         close_time = float(hand["close_time"])
     with part(document, "rate") as rate:
         if not 0.0 < rate < np.inf:
@@ -149,8 +151,10 @@ def assembled(told: Told, t: Array, spans: Spans, rows: Sequence[Array]) -> Plan
     exact = np.arange(len(t)) / told.rate
     apart = ~(np.abs(exact - t) * NANO <= STAMP_TOLERANCE)
     if apart.any():
+        k = apart.argmax()
         raise InvalidInputError(
-            f"the time of point {apart.argmax()} is not that of {told.rate:g} samples a second"
+            f"point {k} is at {t[k]:.9g} s; of {told.rate:g} samples a second it is that at"
+            f" {exact[k]:.9g} s"
         )
     _require_spans(spans, len(t))
     parts = {

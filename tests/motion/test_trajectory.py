@@ -319,12 +319,19 @@ DAMAGES: list[tuple[Spoil, str]] = [
         lambda d: d["origin"]["limits"].update(torque=[1.0]),
         "the limits in 'origin' are not those of 2 joints",
     ),
-    (lambda d: points(d).reverse(), "the time of point 0 is not that of 1000 samples a second"),
+    (lambda d: d["hand"].update(opening=-0.1), "'hand' is not as it was written"),
+    (
+        lambda d: points(d).reverse(),
+        "point 0 is at 4.4 s; of 1000 samples a second it is that at 0 s",
+    ),
     (
         lambda d: points(d)[7]["time_from_start"].update(nanosec=7_000_002),
-        "the time of point 7 is not that of 1000 samples a second",
+        "point 7 is at 0.007000002 s; of 1000 samples a second it is that at 0.007 s",
     ),
-    (lambda d: d.update(rate=500), "the time of point 1 is not that of 500 samples a second"),
+    (
+        lambda d: d.update(rate=500),
+        "point 1 is at 0.001 s; of 500 samples a second it is that at 0.002 s",
+    ),
     (
         lambda d: points(d)[7].update(velocities=[0.0]),
         "velocities of point 7 are not 2 finite numbers",
@@ -374,13 +381,15 @@ def test_a_damaged_plan_is_refused(plan: Plan, tmp_path: Path, spoil: Spoil, wha
 
 CSV_DAMAGES: list[tuple[int, str, str, str]] = [
     (0, "t,phase", "phase,t", ""),
-    (7, ",transfer,", ",transfr,", "row 8 has phase 'transfr', not one of"),
-    (7, ",transfer,", ",lift,", "phase 'transfer' begins again in row 9"),
-    (7, ",transfer,", ",transfer,,", "row 8 has 10 cells, not 9"),
-    (7, ",transfer,", ",transfer,nan", "q_a in row 8 is 'nan"),
-    (7, "0.007,", "0.0071,", "the time of point 7 is not that of 1000 samples a second"),
-    (7, "0.007,", "soon,", "t in row 8 is 'soon', no number"),
+    (7, ",transfer,", ",transfr,", "line 9 has phase 'transfr', not one of"),
+    (7, ",transfer,", ",lift,", "phase 'transfer' begins again in line 10"),
+    (7, ",transfer,", ",transfer,,", "line 9 has 10 cells, not 9"),
+    (7, ",transfer,", ",transfer,nan", "q_a in line 9 is 'nan"),
+    (7, "0.007,", "0.0071,", "point 7 is at 0.0071 s; of 1000 samples a"),
+    (7, "0.007,", "soon,", "t in line 9 is 'soon', no number"),
     (7, ",transfer,", ",transfer,5", "point 7 has joint 'a' at 50."),
+    (7, ",0.08", ",0.09", "width in line 9 is '0.09'; in phase 'transfer' of this plan"),
+    (7, ",0.08", ",wide", "width in line 9 is 'wide', no number"),
 ]
 """Line, what stands there, what takes its place, and what is said."""
 
