@@ -76,7 +76,7 @@ class ArmDriver(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         last = context.get_discrete_state(self._last).value()
-        q, v = last[:-1], np.zeros(len(self._joints))
+        source, q, v = "the last command", last[:-1], np.zeros(len(self._joints))
         position, desired_state = (
             port.HasValue(context) for port in (self._position, self._desired_state)
         )
@@ -86,16 +86,20 @@ class ArmDriver(LeafSystem):
             )
         planned = self._planned(context)
         if planned is not None:
-            q, v = planned.q, planned.v
+            source, q, v = "the plan", planned.q, planned.v
         elif desired_state:
+            source = "arm.desired_state"
             q, v = np.split(self._desired_state.Eval(context), 2)
         elif position:
-            before, q = q, self._position.Eval(context)
+            source, before, q = "arm.position", q, self._position.Eval(context)
             v = (q - before) / self._period if last[-1] else v
-        command = np.concatenate([q, v])
-        if not np.isfinite(command).all():
-            raise InvalidInputError(f"the arm is commanded to {q.tolist()}, which is no posture")
-        output.SetFromVector(command)
+        if not np.isfinite([q, v]).all():
+            joint = int(np.argmin(np.isfinite(q) & np.isfinite(v)))
+            raise InvalidInputError(
+                f"{source} wants {self._joints[joint]} at {q[joint]:g} rad and {v[joint]:g} rad/s;"
+                " give finite numbers"
+            )
+        output.SetFromVector(np.concatenate([q, v]))
 
     def _planned(self, context: Context) -> PlannedCommand | None:
         """What the plan wants now; None without one, and before it starts."""

@@ -135,7 +135,7 @@ def build_station_diagram(
     engine: Engine = ENGINES["standard"],
     meshcat: Meshcat | None = None,
     drivers: bool = False,
-    cameras: bool | Sequence[str] = False,
+    cameras: bool | str | Sequence[str] = False,
     weld_objects: bool = False,
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
@@ -151,7 +151,7 @@ def build_station_diagram(
         meshcat: where to show the diagram live, if anywhere.
         drivers: let positions, widths or a plan command the robot, and measure what it feels; see
             the ports above. Needs an arm.
-        cameras: add the station's cameras, all or those named; needs the renderer's system
+        cameras: add the station's cameras, all or the named ones; needs the renderer's system
             libraries. The board's markers are drawn with cameras or `meshcat` only; it is plain
             where nobody looks.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
@@ -203,7 +203,8 @@ def build_station_diagram(
     else:
         export_ports(builder, station, models, controlled=not weld_objects)
     if cameras:
-        add_cameras(builder, station, None if cameras is True else cameras)
+        named = (cameras,) if isinstance(cameras, str) else cameras
+        add_cameras(builder, station, None if named is True else named)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder.builder(), builder.scene_graph(), meshcat)
     return StationDiagram(

@@ -173,12 +173,19 @@ class HandDriver(LeafSystem):
         if planned is not None and planned.closed:
             return _Wanted(fingers.closed, fingers.towards_closed * fastest)
         if planned is None and desired_state:
-            return _Wanted(q, self._desired_state.Eval(context)[2:])
+            speeds = self._desired_state.Eval(context)[2:]
+            if not np.isfinite(speeds).all():
+                raise InvalidInputError(
+                    f"hand.desired_state wants fingers at {speeds.tolist()} m/s; give finite"
+                    " numbers"
+                )
+            return _Wanted(q, speeds)
         goal = context.get_discrete_state(self._held).value()
         if planned is not None:
-            goal = fingers.at(planned.opening)
+            goal = fingers.at(self._distance(planned.opening, "the plan's opening"))
         elif position:
-            goal = fingers.at(self._distance(float(self._position.Eval(context)[0])))
+            wanted = float(self._position.Eval(context)[0])
+            goal = fingers.at(self._distance(wanted, "hand.position"))
         return _Wanted(goal, np.clip(FOLLOWING * (goal - q), -fastest, fastest))
 
     def _planned(self, context: Context) -> PlannedCommand | None:
@@ -188,11 +195,11 @@ class HandDriver(LeafSystem):
         start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
         return self._player.command(self._plan.Eval(context), context.get_time() - start)
 
-    def _distance(self, wanted: float) -> float:
+    def _distance(self, wanted: float, source: str) -> float:
         low, high = self._fingers.hand.opening
         if not low - SLACK <= wanted <= high + SLACK:
             raise InvalidInputError(
-                f"hand.position is {wanted:g} m; the pads of {self._fingers.hand.name!r} are"
+                f"{source} is {wanted:g} m; the pads of {self._fingers.hand.name!r} are"
                 f" {low:g} to {high:g} m apart"
             )
         return float(np.clip(wanted, low, high))

@@ -104,12 +104,15 @@ class PlanPlayer:
             it ends.
 
         Raises:
-            InvalidInputError: it is no plan, or one for another arm, scene or station.
+            InvalidInputError: it is no plan, or one for another arm, scene or station; or the time
+                is no number.
         """
         if plan is None:
             return None
         if self._course is None or plan is not self._plan:
             self._course, self._plan = self._checked(plan), plan
+        if np.isnan(time):
+            raise InvalidInputError("plan.start_time is nan s; give the time at which it begins")
         if time < 0.0:
             return None
         course = self._course

@@ -220,6 +220,10 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     assert "rad from where the arm is; bring the arm to where the plan begins" in message(
         plan, start=-1.0
     )
+    assert message(plan, start=np.nan).startswith("plan.start_time is nan s; give the time at")
+    assert "the plan's opening is 0.2 m; the pads of 'panda_hand' are 0 to 0.08 m" in message(
+        replace(plan, opening=0.2)
+    )
 
 
 def test_trials_follow_an_inverse_dynamics_controller(

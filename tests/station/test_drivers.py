@@ -242,7 +242,11 @@ def test_an_applied_force_is_felt_in_joints_and_wrist(free: StationDiagram) -> N
         ({"hand__position": [40.0]}, r"^hand.position is 40 m; the pads of 'panda_hand' are 0 to "),
         ({"hand__force_limit": [70.0]}, r"^hand.force_limit is 70 N; give more than 0 and at most"),
         ({"hand__force_limit": [0.0]}, r"^hand.force_limit is 0 N; give more than 0"),
-        ({"arm__position": np.full(7, np.nan)}, r"^the arm is commanded to \[nan, .* no posture$"),
+        (
+            {"arm__position": [0, 0, 0, -1, 0, 1, np.nan]},
+            r"^arm.position wants panda_joint7 at nan rad and .* rad/s; give finite numbers$",
+        ),
+        ({"hand__desired_state": [0, 0, np.nan, 0]}, r"^hand.desired_state wants fingers at \[nan"),
         ({"plan": [1, 2]}, r"^the port 'plan' got a list; it takes a burg_drake Plan$"),
     ],
 )
