@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.cache import Arrays, kept
+from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, inverse, rot_z, rotation_from_rpy, swap_fingers
 from burg_drake.grasping.clearance import HandClearance
@@ -145,7 +147,8 @@ class ReachabilityMap:
 def map_reachability(
     scene: Scene, station: Station, *, settings: ReachabilitySettings | None = None
 ) -> ReachabilityMap:
-    """Maps what an arm reaches over the board of a scene, in between the scene's objects.
+    """Maps what an arm reaches over the board of a scene, in between the scene's objects; what was
+    mapped before comes from the user's cache.
 
     Args:
         scene: its board, and all that stands on it as the document places it; `cleared` takes the
@@ -165,10 +168,16 @@ def map_reachability(
     heights = np.array(settings.heights)
     tilt, R_WG = settings.orientations
     X_WG = _grasps(station.document.X_WS.matrix(), x, y, heights, R_WG)
-    hand = HandClearance(build_station_diagram(scene, station, robot="hand"))
-    clear = np.flatnonzero(hand.is_clear(X_WG))
-    reached = np.zeros(len(X_WG), dtype=bool)
-    reached[clear] = _reached(scene, station, X_WG[clear], settings)
+
+    def make() -> Arrays:
+        hand = HandClearance(build_station_diagram(scene, station, robot="hand"))
+        clear = np.flatnonzero(hand.is_clear(X_WG))
+        reached = np.zeros(len(X_WG), dtype=bool)
+        reached[clear] = _reached(scene, station, X_WG[clear], settings)
+        return {"reached": reached}
+
+    asked = content_hash(scene.content, station.content, vars(settings))
+    reached = kept("reachability", asked, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)
 
