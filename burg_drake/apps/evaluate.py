@@ -43,7 +43,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
-        "burg-drake evaluate my_scene.yaml --station panda_shelf --retreat-mm 100 --lift-mm 50",
+        "burg-drake evaluate my_scene.yaml --station panda_shelf --least-lift-mm 20",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "",

@@ -31,8 +31,8 @@ def add_motion(parser: Parser) -> None:
     """Adds the options."""
     group = parser.add_argument_group(
         "motion of the hand",
-        "What is left out is as the station's document says, or else as usual: 100 mm straight in,"
-        " and 300 mm straight up.",
+        "What is left out is as the station's document says, or else as usual:\n"
+        "100 mm straight in, and 300 mm straight up.",
     )
     for name, text in (
         ("standoff", "straight way in along the approach, from the pregrasp to the grasp"),

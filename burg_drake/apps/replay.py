@@ -74,7 +74,13 @@ def add_to(verbs: Any) -> None:
 def run_replay(arguments: argparse.Namespace) -> int:
     """Executes a trial once more, recorded; 1 if it ends unlike the record."""
     from burg_drake.apps.live import open_view, present
-    from burg_drake.evaluation.rerun import arm_figures, as_result, comparison, differences
+    from burg_drake.evaluation.rerun import (
+        arm_figures,
+        as_result,
+        comparison,
+        differences,
+        motion_figures,
+    )
     from burg_drake.visualization.replay import describe
 
     if arguments.only and not arguments.best:
@@ -91,6 +97,7 @@ def run_replay(arguments: argparse.Namespace) -> int:
     meshcat = open_view(arguments)
     verdict, shown, who = _execute(source, meshcat)
     lines = [*describe(as_result(verdict)), *arm_figures(verdict)]
+    lines += motion_figures(source.trial, source.origin)
     recorded = source.trial.verdict
     found = [] if recorded is None else differences(recorded, verdict)
     lines += [] if recorded is None else comparison(found, source.origin)

@@ -15,6 +15,7 @@ from burg_drake.evaluation.judge import (
     judge_grasp,
 )
 from burg_drake.evaluation.mode import Mode, mode_for
+from burg_drake.evaluation.motion_numbers import motion_text
 from burg_drake.evaluation.origin import Origin
 from burg_drake.evaluation.run_document import software_versions
 from burg_drake.evaluation.station_judge import StationJudge
@@ -22,6 +23,7 @@ from burg_drake.evaluation.trial import Trial
 from burg_drake.motion.trajectory import Plan
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.result import Margins, TrialResult
+from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station
 
 ROUNDING = 1e-14
@@ -147,6 +149,16 @@ def arm_figures(verdict: Verdict) -> list[str]:
         if margin in verdict.margins
     ]
     return [", ".join(figures)] if figures else []
+
+
+def motion_figures(trial: Trial, origin: Origin) -> list[str]:
+    """Where the hand goes, as lines for people; none if that is the usual way."""
+    motion = origin.settings().motion
+    if motion is None or motion == GraspMotion():
+        return []
+    whole = trial.lift is None or trial.lift >= motion.lift_height
+    room = "" if whole else f"; there is room for a lift of {1e3 * (trial.lift or 0.0):g} mm"
+    return [f"motion: {motion_text(motion)}{room}"]
 
 
 def as_result(verdict: Verdict) -> TrialResult:

@@ -30,11 +30,14 @@ class ShortLifts:
     least: float
 
     def __str__(self) -> str:
-        return (
+        text = (
             f"In {self.short} of {self.grasps} grasps there is no room for the whole lift of"
-            f" {1e3 * self.whole:g} mm: the median of these is {1e3 * self.median:.0f} mm, the"
-            f" shortest {1e3 * self.least:.0f} mm."
+            f" {1e3 * self.whole:g} mm: "
         )
+        if self.short == 1:
+            return f"{text}it is {1e3 * self.least:.0f} mm."
+        least = f"the shortest {1e3 * self.least:.0f} mm"
+        return f"{text}the median of these is {1e3 * self.median:.0f} mm, {least}."
 
 
 def short_lifts(lift_height: Array, whole: float) -> ShortLifts | None:
