@@ -20,7 +20,7 @@ from pydrake.planning import RobotDiagramBuilder
 from burg_drake.core.errors import InvalidInputError, nearest
 from burg_drake.core.packages import NO_PACKAGES, Packages
 from burg_drake.station.hand import Finger, Hand
-from burg_drake.station.model_file import add_models
+from burg_drake.station.model_file import add_models, require_loose
 
 STALL = 1.25
 """Force that a finger's servo asks for when it stands still, over the force of the grip. A velocity
@@ -57,8 +57,8 @@ def add_hand(
         packages: what a station says of packages.
 
     Raises:
-        InvalidInputError: the model cannot be loaded, lacks what the document names, or is weaker
-            or slower than the document says.
+        InvalidInputError: the model cannot be loaded, is fixed in the world, lacks what the
+            document names, or is weaker or slower than the document says.
     """
     plant = builder.plant()
     constraints = plant.num_constraints()
@@ -69,6 +69,7 @@ def add_hand(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"
             f" ({' '.join(str(error).split())})"
         ) from error
+    require_loose(plant, instance, path)
     found = find_hand(plant, builder.scene_graph().model_inspector(), hand, instance)
     for finger, joint in zip(hand.fingers, found.joints, strict=True):
         _add_servo(plant, hand, finger, joint)

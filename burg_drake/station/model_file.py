@@ -14,9 +14,11 @@ from html import escape
 from pathlib import Path
 
 from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from burg_drake.core.document_text import DOCUMENT, read_bytes
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.named_files import named_packages
 from burg_drake.core.packages import DRAKE_MODELS, NO_PACKAGES, Packages
 from burg_drake.core.resources import BURG_DRAKE, data_root
@@ -65,6 +67,26 @@ def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
             known.Remove(name)
     for name, folder in {**found, BURG_DRAKE: data_root()}.items():
         known.Add(name, str(folder))
+
+
+def require_loose(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) -> None:
+    """Refuses a model that a joint of its own connects to the world, as in URDFs with a link
+    `world`.
+
+    Args:
+        plant: not finalized.
+        model: of one file.
+        path: the file.
+
+    Raises:
+        InvalidInputError: it is; the message names joint and link.
+    """
+    for joint in map(plant.get_joint, plant.GetJointIndices(model)):
+        if joint.parent_body().index() == plant.world_body().index():
+            raise InvalidInputError(
+                f"{path}: joint {joint.name()!r} connects {joint.child_body().name()!r} to the"
+                " world; remove it, as the station says where the robot stands"
+            )
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.station.hand_check import check_hand
 from burg_drake.station.hand_model import add_hand
-from burg_drake.station.model_file import add_models
+from burg_drake.station.model_file import add_models, require_loose
 from burg_drake.station.station import Station
 
 Robot = Literal["arm", "hand", "none"]
@@ -110,6 +110,7 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
             f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"
             f" ({' '.join(str(error).split())})"
         ) from error
+    require_loose(plant, model, station.arm_model)
     plant.RenameModelInstance(model, "arm")
     base = _frame(plant, model, station, "base", arm.base)
     plant.WeldFrames(plant.world_frame(), base, RigidTransform(arm.X_WA.matrix()))

@@ -68,14 +68,33 @@ def test_the_servos_hold_it_there(built: StationDiagram) -> None:
     np.testing.assert_allclose(state[:6], q, atol=1e-3)
 
 
-def test_a_urdf_without_transmissions_is_named(scene: Scene, tmp_path: Path) -> None:
+ELBOW = r"  <transmission name=\"elbow.*?</transmission>\n"
+BOLTED = (
+    '<link name="world"/><joint name="bolts" type="fixed"><parent link="world"/>'
+    '<child link="base"/></joint></robot>'
+)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "expected"),
+    [
+        (ELBOW, "", "elbow_joint cannot be driven; a URDF needs a <transmission> for each"),
+        (
+            "</robot>",
+            BOLTED,
+            "joint 'bolts' connects 'base' to the world; remove it, as the station says where",
+        ),
+    ],
+)
+def test_a_urdf_that_is_no_arm_for_a_station(
+    scene: Scene, tmp_path: Path, pattern: str, replacement: str, expected: str
+) -> None:
     urdf = resolve("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
-    bare = re.sub(r"  <transmission name=\"elbow.*?</transmission>\n", "", urdf, flags=re.DOTALL)
-    assert bare != urdf
-    (tmp_path / "arm.urdf").write_text(bare, encoding="utf-8")
+    other = re.sub(pattern, replacement, urdf, flags=re.DOTALL)
+    assert other != urdf
+    (tmp_path / "arm.urdf").write_text(other, encoding="utf-8")
     station = load_station("ur5e_tabletop").path.read_text("utf-8")
     station = station.replace("package://burg_drake/models/ur5e/ur5e.urdf", "arm.urdf")
     (tmp_path / "mine.yaml").write_text(station, encoding="utf-8")
-    expected = r"arm\.urdf: elbow_joint cannot be driven; a URDF needs a <transmission> for each"
-    with pytest.raises(InvalidInputError, match=expected):
+    with pytest.raises(InvalidInputError, match=rf"arm\.urdf: {expected}"):
         build_station_diagram(scene, load_station(tmp_path / "mine.yaml"))
