@@ -84,6 +84,11 @@ def make_inverse_dynamics(
             f"{where}.kd of {max(kd):g} 1/s is too stiff for steps of {1e3 * step:g} ms; stay below"
             f" {1.0 / step:g}, which is twice the root of kp if it is not given"
         )
+    if max(kp) * step**2 >= 1.0:
+        raise InvalidInputError(
+            f"{where}.kp of {max(kp):g} 1/s^2 is too stiff for steps of {1e3 * step:g} ms; stay"
+            f" below {1.0 / step**2:g}"
+        )
     limits = np.array([actuator.effort_limit() for actuator in actuators])
     return InverseDynamicsControl(controller_plant(plant, station, models), kp, kd, limits)
 

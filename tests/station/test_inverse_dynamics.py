@@ -192,6 +192,10 @@ def test_documents(tmp_path: Path) -> None:
             ArmControl(kind="inverse_dynamics", kd=(600.0,)),
             r"arm.control.kd of 600 1/s is too stiff for steps of 2 ms; stay below 500",
         ),
+        (
+            ArmControl(kind="inverse_dynamics", kp=(9e5,), kd=(10.0,)),
+            r"arm.control.kp of 900000 1/s\^2 is too stiff for steps of 2 ms; stay below 250000",
+        ),
     ],
 )
 def test_gains_that_do_not_fit(empty: Scene, control: ArmControl, message: str) -> None:
