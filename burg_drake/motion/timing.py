@@ -112,6 +112,7 @@ def time_motion(
             _retreating(settings),
             lines,
             is_free=checks.retreat,
+            limit_margin=limit_margin,
         )
         retreat = _sampled(back, witness.retreat, limits, settings)
     return Plan(

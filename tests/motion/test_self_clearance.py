@@ -126,6 +126,7 @@ def test_tables_bound_distances(station: str, first: str, second: str, tmp_path:
     drake = oracle(built, a.body, b.body, q[:300])
     assert np.all(lower[:300] <= np.maximum(drake, 0.0) + 1e-7)
     assert np.all(drake[upper[:300] < 0.0] < 0.0)
+    assert distance.at(np.empty((0, len(grid.joints))), 1.0).shape == (0,)
     exact = distance.at(q[:, list(grid.joints)], 1.0)
     near = (exact > 0.0) & (exact < 0.02)
     assert near.sum() > 15
@@ -163,6 +164,7 @@ def test_a_table_holds_beyond_the_limits() -> None:
     _a, _b, grid, distance = pair(built, shape, "panda_link5", "panda_hand")
     q = np.random.default_rng(2).uniform(*(1.3 * shape.limits.T), (1000, 7))
     lower, _ = PairTable.of(grid, distance).bounds(q)
+    assert distance.at(np.empty((0, len(grid.joints))), 1.0).shape == (0,)
     exact = distance.at(q[:, list(grid.joints)], 1.0)
     apart = exact > 0.0
     assert apart.sum() > 300

@@ -264,6 +264,7 @@ def test_the_margin_to_joint_limits_is_kept_between_waypoints(
     at every 0.1 ms."""
     arm, limits = panda
     given, margin = witness(arm, stepped=0.4), 0.01
+    given = replace(given, retreat=given.approach[::-1], lift=given.lift)
     waypoints = np.concatenate([given.transfer, given.approach, given.lift])
     low, high = waypoints.min(axis=0), waypoints.max(axis=0)
     tight = {"lower": low - margin, "upper": high + margin}
