@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, State
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
@@ -122,7 +122,9 @@ class HandDriver(LeafSystem):
         self._held = self.DeclareDiscreteState(fingers.open)
         self._braked = self.DeclareDiscreteState(np.zeros(2))
         self.DeclareInitializationDiscreteUpdateEvent(self._begin)
-        self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step(), 0.0, self._remember)
+        # A discrete update would come after the plant's step, which is an unrestricted one, and
+        # would remember the brake of the step to come.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._remember)
         self.DeclareVectorOutputPort("command", 4, self._calc_command)
         self._brake = self.DeclareVectorOutputPort("brake", self._size, self._calc_brake)
         self.DeclareStateOutputPort("braked", self._braked)
@@ -131,7 +133,8 @@ class HandDriver(LeafSystem):
         values.set_value(self._held, self._state.Eval(context)[self._fingers.q])
         values.set_value(self._braked, np.zeros(2))
 
-    def _remember(self, context: Context, values: DiscreteValues) -> None:
+    def _remember(self, context: Context, state: State) -> None:
+        values = state.get_mutable_discrete_state()
         wanted = self._wanted(context)
         values.set_value(self._held, wanted.q)
         values.set_value(self._braked, self._brake.Eval(context)[self._fingers.dofs])

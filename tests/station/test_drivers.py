@@ -149,8 +149,15 @@ def test_the_hand_goes_to_a_distance(empty: Scene, reference: str) -> None:
     assert run.read("hand.state_measured") == pytest.approx([0.03, 0.0], abs=1e-5)
     closer = before - between_fingers(free, run)
     assert closer == pytest.approx(hand.opening[1] - 0.03, abs=1e-5)
+    # At rest it presses nothing, whatever the limit is, in every step.
+    run.give(hand__position=[0.0301], hand__force_limit=[1.0])
+    run.to(1.5)
+    for k in range(100):
+        run.to(1.5 + k * free.engine.time_step)
+        assert run.read("hand.force_measured") == pytest.approx(0.0, abs=0.01)
+        assert run.read("hand.actuation") == pytest.approx([0.0, 0.0], abs=0.01)
     run.give(hand__position=[0.08])
-    assert run.to(2.0).read("hand.state_measured") == pytest.approx([0.08, 0.0], abs=1e-5)
+    assert run.to(3.0).read("hand.state_measured") == pytest.approx([0.08, 0.0], abs=1e-5)
 
 
 def between_fingers(built: StationDiagram, run: Run) -> float:
