@@ -31,10 +31,11 @@ def shortcut(edges: Edges, path: Array, scale: Array) -> Array:
     Returns:
         (L, n) corners of a free way with the same ends, at most as long as `path`.
     """
-    if len(path) > 2 and edges.is_free(path[0], path[-1]):
+    known: dict[bytes, bool] = {}
+    if len(path) > 2 and _is_free(edges, path[[0, -1]], known):
         return np.asarray(path[[0, -1]])
     for _ in range(ROUNDS if len(path) > 2 and _length(path, scale) > 0.0 else 0):
-        other = _through_points(edges, _points(path, scale), scale)
+        other = _through_points(edges, _points(path, scale), scale, known)
         gain = _length(path, scale) - _length(other, scale)
         if gain >= 0.0:
             path = other
@@ -55,16 +56,36 @@ def _points(path: Array, scale: Array) -> Array:
     return np.column_stack([np.interp(wanted, at, joint) for joint in path.T])
 
 
-def _through_points(edges: Edges, q: Array, scale: Array) -> Array:
+def _is_free(edges: Edges, ends: Array, known: dict[bytes, bool]) -> bool:
+    """Whether a segment (2, n) is free; one that is not so by the best guess is not looked at."""
+    screened = edges.screen(ends[:1], ends[1:], fine=np.inf)
+    free = bool(edges.seem_free(screened, guess=True)[0]) and edges.is_free(*ends)
+    known[ends.tobytes()] = free
+    return free
+
+
+def _through_points(edges: Edges, q: Array, scale: Array, known: dict[bytes, bool]) -> Array:
     """The shortest way from the first to the last of points that follow one another on a free way.
 
-    A few bounds say which segments are worth considering; those that a way takes are judged.
+    A few bounds say which segments are worth considering: those that are free by the best guess, as
+    it takes hundreds of checks to be sure of others. Those that a way takes are judged.
+
+    Args:
+        edges: judges segments.
+        q: (N, n) points.
+        scale: see `shortcut`.
+        known: verdicts on segments by the bytes of their ends; what is found is added.
     """
     first, second = np.triu_indices(len(q), 2)
     length = np.sqrt((((q[:, None] - q) * scale) ** 2).sum(axis=-1)) + CORNER
     allowed = np.eye(len(q), k=1, dtype=bool)
-    allowed[first, second] = edges.seem_free(edges.screen(q[first], q[second], fine=np.inf))
+    screened = edges.screen(q[first], q[second], fine=np.inf)
+    allowed[first, second] = edges.seem_free(screened, guess=True)
     free = np.eye(len(q), k=1, dtype=bool)
+    for pair in zip(first.tolist(), second.tolist(), strict=True):
+        verdict = known.get(q[list(pair)].tobytes())
+        if verdict is not None:
+            free[pair] = allowed[pair] = verdict
     while True:
         _, before = dijkstra(np.where(allowed, length, 0.0), indices=0, return_predecessors=True)
         chain = [len(q) - 1]
@@ -74,6 +95,6 @@ def _through_points(edges: Edges, q: Array, scale: Array) -> Array:
         asked = [pair for pair in pairwise(chain) if not free[pair]]
         blocked = edges.first_blocked_each([q[list(pair)] for pair in asked])
         for pair, at in zip(asked, blocked, strict=True):
-            free[pair] = allowed[pair] = at is None
+            free[pair] = allowed[pair] = known[q[list(pair)].tobytes()] = at is None
         if all(at is None for at in blocked):
             return np.asarray(q[chain])
