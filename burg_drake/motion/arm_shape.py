@@ -108,7 +108,7 @@ def _shape_content(inspector: SceneGraphInspector, geometry: GeometryId) -> list
     shape = inspector.GetShape(geometry)
     match shape:
         case Sphere():
-            sizes = [shape.radius()]
+            sizes: Any = [shape.radius()]
         case Capsule() | Cylinder():
             sizes = [shape.radius(), shape.length()]
         case Box():
