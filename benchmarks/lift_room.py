@@ -26,6 +26,7 @@ from burg_drake.station.station import Station, load_station
 
 STATIONS = Path(__file__).parent / "confined"
 MOTIONS = {
+    "up by 1 mm": GraspMotion(lift_height=0.001),
     "up by 30 cm": GraspMotion(),
     "up by 30 cm, or as far as there is room, at least 2 cm": GraspMotion(least_lift=0.02),
     "back by 10 cm, then up by 30 cm": GraspMotion(retreat=0.10),
