@@ -21,6 +21,8 @@ Indices = NDArray[np.intp]
 
 STEP = 0.01
 """Distance of the heights that are tried [m]."""
+DECIMALS = 9
+"""Of heights in metres: adding steps up leaves roundings behind."""
 WHATEVER_HEIGHT = (
     Outcome.HAND_COLLISION_APPROACH,
     Outcome.HAND_COLLISION_RETREAT,
@@ -39,7 +41,9 @@ IsFree = Callable[[int, Indices], Booleans]
 
 def heights(least: float, most: float) -> Array:
     """What is tried, rising from `least` by `STEP` to `most` [m]."""
-    return np.append(np.arange(least, most - 1e-9, STEP), most)
+    rising = np.arange(least, most - 1e-9, STEP)
+    rising[1:] = np.round(rising[1:], DECIMALS)
+    return np.append(rising, most)
 
 
 def as_high_as_there_is_room(
