@@ -153,4 +153,11 @@ def _makers() -> tuple[str, ...]:
     package = Path(__file__).parents[1]
     files = [file for room in ROOMS for file in sorted((package / room).glob("*.py"))]
     code = content_hash([file.name for file in files], files)
-    return code, *(metadata.version(name) for name in MAKERS)
+    return code, *(_version(name) for name in MAKERS)
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:  # a Drake that was built from source has no metadata
+        return "unknown"

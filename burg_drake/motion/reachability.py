@@ -25,6 +25,7 @@ from burg_drake.motion.proximity import ArmProximity
 from burg_drake.scene.scene import Scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station
+from burg_drake.station.world_content import world_content
 
 Indices = NDArray[np.intp]
 
@@ -176,7 +177,7 @@ def map_reachability(
         reached[clear] = _reached(scene, station, X_WG[clear], settings)
         return {"reached": reached}
 
-    asked = content_hash(scene.content, station.content, vars(settings))
+    asked = content_hash(world_content(scene, station), vars(settings))
     reached = kept("reachability", asked, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)

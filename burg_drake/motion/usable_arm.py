@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.core.cache import Arrays, kept
-from burg_drake.core.content import content_hash
 from burg_drake.motion.arm_span import ArmSpan, unreachable_objects
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
+from burg_drake.station.world_content import world_content
 
 
 def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
@@ -35,6 +35,6 @@ def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
         span = usable_span(scene, station)
         return {"p_WJ": span.p_WJ, "radius": np.array(span.radius)}
 
-    found = kept("usable-arm", content_hash(scene.content, station.content), check)
+    found = kept("usable-arm", world_content(scene, station), check)
     span = ArmSpan(found["p_WJ"], float(found["radius"]))
     return tuple(unreachable_objects(span, scene, station).values())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from burg_drake.core.cache import Arrays, kept
-from burg_drake.core.content import content_hash
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import require_sound
 from burg_drake.station.station import Station
+from burg_drake.station.world_content import world_content
 
 
 def require_sound_scene(scene: Scene, station: Station) -> None:
@@ -22,4 +22,4 @@ def require_sound_scene(scene: Scene, station: Station) -> None:
         require_sound(scene, check_scene(scene, station))
         return {}
 
-    kept("sound-scene", content_hash(scene.content, station.content), check)
+    kept("sound-scene", world_content(scene, station), check)

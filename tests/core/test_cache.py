@@ -94,6 +94,15 @@ def test_an_entry_of_another_version_is_told_and_replaced(
     assert_same(kept("thing", KEY, never))
 
 
+def test_a_package_without_metadata_is_no_obstacle(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "MAKERS", ("numpy", "built-from-source"))
+    monkeypatch.setattr(cache, "_makers", cache._makers.__wrapped__)
+    assert_same(kept("thing", KEY, compute))
+    assert_same(kept("thing", KEY, never))
+
+
 def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -132,3 +133,22 @@ def test_require_sound_scene(library: Path, panda: Station, tmp_path: Path) -> N
         InvalidInputError, match=r"scene\.yaml: 'cube_0' and 'cube_1' overlap by 50"
     ):
         require_sound_scene(overlapping, panda)
+
+
+def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
+    library: Path, panda: Station, tmp_path: Path
+) -> None:
+    edited = tmp_path / "library"
+    shutil.copytree(library, edited)
+    places = (0.2, 0.2, HEIGHT), (0.2 + EDGE + 1e-4, 0.2, HEIGHT)
+    require_sound_scene(scene_of(edited, tmp_path, *places), panda)
+    (model,) = edited.rglob("*.sdf")
+    text = model.read_text()
+    before, wider = (
+        f"<size>{EDGE} {EDGE} {EDGE}</size>",
+        f"<size>{EDGE + 0.01} {EDGE} {EDGE}</size>",
+    )
+    assert before in text
+    model.write_text(text.replace(before, wider))
+    with pytest.raises(InvalidInputError, match="'cube_0' and 'cube_1' overlap by 9"):
+        require_sound_scene(scene_of(edited, tmp_path, *places), panda)
