@@ -148,7 +148,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     )
     answered = judged.column("outcome") != ""
     names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
-    print_tables(judged.select(answered), names)
+    print_tables(judged.select(answered), names, motion)
     if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
         print(f"note: {note}")
     lifts = short_lifts(judged.column("lift_height"), motion.lift_height)

@@ -11,22 +11,24 @@ from burg_drake.core.text_table import TextTable
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.core.outcome import Outcome
+    from burg_drake.station.grasp_motion import GraspMotion
 
 BLOCKERS = 3
 """Most frequent bodies that are listed for each outcome."""
 
 
-def print_tables(grasps: GraspSet, asked: Iterable[str]) -> None:
-    """Counts by object and by outcome, what was in the way, objects without a clear grasp, and how
-    fast that was found out.
+def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) -> None:
+    """Counts by object and by outcome, what was in the way, objects without a clear or reachable
+    grasp, and how fast that was found out.
 
     Args:
         grasps: as `reach` has judged them.
         asked: objects that it was asked about, of which some may have no grasp.
+        motion: of the hand.
     """
     from burg_drake.core.figures import figure
     from burg_drake.core.outcome import Outcome, Stage
-    from burg_drake.evaluation.run_notes import unclear_notes
+    from burg_drake.evaluation.run_notes import unclear_notes, unmoved_notes
 
     outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
     by_object: dict[str, Counter[Outcome]] = {name: Counter() for name in asked}
@@ -35,8 +37,9 @@ def print_tables(grasps: GraspSet, asked: Iterable[str]) -> None:
     total = Counter(outcomes)
     reach_table(by_object, total).show()
     outcome_table(grasps, by_object, total).show()
-    columns = (grasps.column(name) for name in ("outcome", "blocker"))
-    for note in unclear_notes(grasps.object, *columns):
+    outcome, blocker = (grasps.column(name) for name in ("outcome", "blocker"))
+    notes = unclear_notes(grasps.object, outcome, blocker)
+    for note in (*notes, *unmoved_notes(grasps.object, outcome, blocker, motion)):
         print(f"note: {note}")
     clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())

@@ -84,6 +84,8 @@ def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
     ways = []
     if outcome in NO_LIFT and motion.least >= motion.lift_height:
         ways.append("a shorter lift (--least-lift-mm)")
+    elif outcome in NO_LIFT and motion.least > 0.0:
+        ways.append("a smaller --least-lift-mm")
     if outcome in NO_LIFT and not motion.retreat:
         ways.append("a retreat first (--retreat-mm)")
     if outcome in NO_RETREAT:
@@ -107,6 +109,33 @@ def unclear_notes(
             causes = _causes(outcomes[mine], blockers[mine])
             remedy = REMEDIES[Stage.CLEAR]
             notes.append(f"{name}: none of {_grasps(mine)} is clear: {causes}; {remedy}")
+    return tuple(notes)
+
+
+def unmoved_notes(
+    objects: NDArray[np.str_],
+    outcomes: NDArray[np.str_],
+    blockers: NDArray[np.str_],
+    motion: GraspMotion,
+) -> tuple[str, ...]:
+    """A sentence for each object of which the arm can execute no grasp, where that is most often
+    because of the lift or the retreat, and another motion of the hand may help.
+
+    Args:
+        objects, outcomes, blockers: (N,) of each grasp.
+        motion: that was asked for.
+    """
+    notes = []
+    for name in dict.fromkeys(objects.tolist()):
+        mine = objects == name
+        if (outcomes[mine] == Outcome.REACHABLE).any():
+            continue
+        first = Outcome(_counted(outcomes[mine], blockers[mine])[0][0][0])
+        if other := _other_motion(first, motion):
+            causes = _causes(outcomes[mine], blockers[mine])
+            notes.append(
+                f"{name}: none of {_grasps(mine)} is reachable: {causes}; {other} may help"
+            )
     return tuple(notes)
 
 

@@ -36,6 +36,7 @@ from burg_drake.objects.library import load_library
 from burg_drake.simulation.hold_force import AXES, DIRECTIONS, HoldForces
 from burg_drake.simulation.perturbation import SuccessRate
 from burg_drake.simulation.settle_scene import Displacement
+from burg_drake.station.grasp_motion import GraspMotion
 
 NAME = "a_scanned_thing_with_a_name_of_sixty_characters_from_a_robot"
 VALUES = (1e-9, 1e9, math.nan, math.inf, -123456.789, 0.0)
@@ -191,23 +192,30 @@ def test_what_does_not_fit_side_by_side_goes_on_below() -> None:
 
 
 def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture[str]) -> None:
-    """One without any grasp counts 0; one whose grasps all collide is told with what they hit."""
+    """One without any grasp counts 0; one whose grasps all collide is told with what they hit, one
+    that cannot be lifted with what may help."""
     judged = GraspSet.create(
-        np.tile(np.eye(4), (4, 1, 1)),
-        object=["box", "mug", "mug", "mug"],
+        np.tile(np.eye(4), (5, 1, 1)),
+        object=["box", "mug", "mug", "mug", "can"],
         columns={
-            "outcome": ["reachable", "collision_table", "collision_target", "collision_table"],
-            "blocker": ["", "table", "mug", "table"],
-            "cpu": [0.0] * 4,
+            "outcome": [
+                "reachable",
+                *("collision_table", "collision_target", "collision_table"),
+                "lift_line",
+            ],
+            "blocker": ["", "table", "mug", "table", ""],
+            "cpu": [0.0] * 5,
         },
     )
-    print_tables(judged, ["box", "marble", "mug"])
+    print_tables(judged, ["box", "marble", "mug", "can"], GraspMotion(retreat=0.1))
     out = capsys.readouterr().out
     rows = [line.split() for line in out.splitlines()]
-    for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 4 1 1 100 %"):
+    for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 5 2 1 50 %"):
         assert row.split() in rows
     assert [line for line in out.splitlines() if line.startswith("note: ")] == [
         "note: mug: none of 3 grasps is clear: the open hand hits the table in 2, the open hand"
         " hits the object itself in 1; sample grasps at which the hand is clear, which is the"
-        " default"
+        " default",
+        "note: can: none of 1 grasp is reachable: lift line in 1; a shorter lift (--least-lift-mm)"
+        " may help",
     ]
