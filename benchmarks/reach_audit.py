@@ -24,6 +24,8 @@ from burg_drake.station.station import Station
 
 DEEPER = 1e-3
 """What the target touches at rest counts where it gets deeper by more than that [m]."""
+ROUNDED = 1e-9
+"""What rests on something exactly may be so deep in it once its pose has been computed [m]."""
 
 Pair = frozenset[BodyIndex]
 
@@ -111,7 +113,9 @@ class Audit:
 
     def _allowed(self, pair: Pair, held: BodyIndex | None) -> float:
         """Depth up to which an overlap is none [m]."""
-        return self._at_rest[pair] + DEEPER if held in pair and pair in self._at_rest else 0.0
+        if held in pair and pair in self._at_rest:
+            return self._at_rest[pair] + DEEPER
+        return ROUNDED
 
     def _X_WH(self, q: Array) -> RigidTransform:
         """The hand's pose at arm positions, which are set."""

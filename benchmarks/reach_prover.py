@@ -62,6 +62,8 @@ NEWTON = 25
 """Most of Newton's steps from a random start; from a near one a third of it."""
 DEEPER = 1e-3
 """What the target touches at rest counts where it gets deeper by more than that [m]."""
+ROUNDED = 1e-9
+"""What rests on something exactly may be so deep in it once its pose has been computed [m]."""
 STRIDE, FINE = 0.5, 0.02
 """Longest edge of a random tree, and between two looks along it: of the joint that moves most
 [rad]."""
@@ -488,7 +490,9 @@ class _World:
 
     def _counts(self, pair: frozenset[BodyIndex], depth: float, held: BodyIndex | None) -> bool:
         if held in pair:
-            return not pair & self._in_hand and depth > self._at_rest.get(pair, -DEEPER) + DEEPER
+            touching = self._at_rest.get(pair)
+            allowed = ROUNDED if touching is None else touching + DEEPER
+            return not pair & self._in_hand and depth > allowed
         return bool(pair & self._movers)
 
     def _set_fingers(self, width: float) -> None:
