@@ -42,7 +42,11 @@ from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import Station, load_station
 
 BATCH = 128
-"""Grasps whose motions are looked for together: enough that more would hardly be cheaper each."""
+"""Grasps whose motions are looked for together: enough that more would hardly be cheaper each ...
+"""
+POSES = 12 * BATCH
+"""... and poses of their ways at which postures are looked for: bounds the memory of long ways to
+some 130 MB."""
 
 Indices = NDArray[np.intp]
 
@@ -100,8 +104,8 @@ class ArmReach:
         self._sweep = HandSweep(scene, station, self.motion)
         X_WA = arm.X_WA.matrix()
         self._X_AW = inverse(X_WA)
-        lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
-        self._search = _line_search(self, lines, home, ik)
+        self._lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
+        self._search = _line_search(self, self._lines, home, ik)
         self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
@@ -175,8 +179,9 @@ class ArmReach:
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
             self._searches[height] = self._search.lifted(height)
-        for k in range(0, len(left), BATCH):
-            part = left[k : k + BATCH]
+        size = min(BATCH, POSES // len(replace(self._lines, lift=height).layers))
+        for k in range(0, len(left), size):
+            part = left[k : k + size]
             X_WG, clearance = ways.X_both[part], hand.clearance[part]
             lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
             task = Task(ways.instance[part].tolist(), X_WG, ways.width[part], clearance)

@@ -25,6 +25,9 @@ AT_REST = 1e-3
 STEP = 1e-3
 """Step at which its way past what it touches, or may meet, is looked at [m]."""
 
+POSES = 2**17
+"""Of the object that are looked at together; bounds the memory to some 20 MB."""
+
 Indices = NDArray[np.intp]
 
 
@@ -112,17 +115,18 @@ class TargetWay:
         self, name: str, found: Blocked, rows: Indices, start_W: Array, u_W: Array, length: float
     ) -> None:
         """Notes for some ways (S,) whether the object gets too deep into one body on them."""
-        if not len(rows):
-            return
         places = np.linspace(0.0, length, int(np.ceil(length / STEP)) + 1)
-        p_W = start_W[:, None] + places[:, None] * u_W[:, None]
-        depths = self._still.deepest(self._poses(p_W.reshape(-1, 3)), [name])[1]
-        depths = depths.reshape(len(rows), len(places))
-        deepest = depths.argmax(axis=1)
-        depth = depths[np.arange(len(rows)), deepest]
-        hit = depth > self._allowed(name)
-        found.by[rows[hit]], found.depth[rows[hit]] = name, depth[hit]
-        found.at[rows[hit]] = places[deepest[hit]]
+        size = max(1, POSES // len(places))
+        for k in range(0, len(rows), size):
+            some = slice(k, k + size)
+            p_W = start_W[some, None] + places[:, None] * u_W[some, None]
+            depths = self._still.deepest(self._poses(p_W.reshape(-1, 3)), [name])[1]
+            depths = depths.reshape(-1, len(places))
+            deepest = depths.argmax(axis=1)
+            depth = depths[np.arange(len(depths)), deepest]
+            hit = depth > self._allowed(name)
+            at = rows[some][hit]
+            found.by[at], found.depth[at], found.at[at] = name, depth[hit], places[deepest[hit]]
 
     def _allowed(self, name: str) -> float:
         """Depth in a body up to which nothing is in the way [m]."""
