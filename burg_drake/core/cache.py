@@ -104,11 +104,19 @@ def _read(path: Path, made_by: str) -> Arrays | None:
         _log.warning("cache: %s; it is computed anew", error)
         return None
     if found is None:
-        _log.warning("cache: %s was made by another version; it is computed anew", path)
+        _tell_of_versions(path.parent)
     elif time.time() - mark > TOUCHED:
         with contextlib.suppress(OSError):
             os.utime(path)
     return found
+
+
+@functools.cache
+def _tell_of_versions(folder: Path) -> None:
+    """One line a process, as after an update that is so of all entries."""
+    _log.warning(
+        "cache: what %s has was made by another version; what is needed is computed anew", folder
+    )
 
 
 def _arrays(archive: NpzFile) -> Arrays:

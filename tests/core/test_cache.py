@@ -85,13 +85,17 @@ def test_a_damaged_entry_is_told_and_replaced(
 def test_an_entry_of_another_version_is_told_and_replaced(
     folder: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept("thing", KEY, compute)
+    kinds = ("thing", "another")
+    for kind in kinds:
+        kept(kind, KEY, compute)
     monkeypatch.setattr(cache, "_makers", lambda: ("another",))
-    assert_same(kept("thing", KEY, compute))
+    for kind in kinds:
+        assert_same(kept(kind, KEY, compute))
     assert caplog.messages == [
-        f"cache: {entry(folder)} was made by another version; it is computed anew"
+        f"cache: what {folder} has was made by another version; what is needed is computed anew"
     ]
-    assert_same(kept("thing", KEY, never))
+    for kind in kinds:
+        assert_same(kept(kind, KEY, never))
 
 
 def test_a_package_without_metadata_is_no_obstacle(
