@@ -170,6 +170,19 @@ def test_the_lift_is_as_gentle_as_that_of_the_hand_alone(
     assert TimingSettings().lift_time == DEFAULT_TRIAL.lift_time
 
 
+def test_a_shorter_lift_has_the_same_acceleration_and_a_retreat_no_more(
+    panda: tuple[ArmKinematics, ArmLimits],
+) -> None:
+    """0.07 m with 4 * 0.30 / 1.25^2 up and down, ramps of 30 ms on top; likewise backwards."""
+    arm, limits = panda
+    given = witness(arm)
+    plan = time_motion(replace(given, lift=given.lift[:8]), limits, arm)
+    assert plan.lift.duration == pytest.approx(1.25 * np.sqrt(0.07 / 0.30) + 0.03, abs=0.002)
+    back = time_motion(replace(given, retreat=given.approach[::-1]), limits, arm).retreat
+    assert back is not None
+    assert back.duration == pytest.approx(0.4 + 0.25 / 0.75 + 0.03, abs=0.002)
+
+
 def test_the_approach_has_its_speed(panda: tuple[ArmKinematics, ArmLimits]) -> None:
     # 0.1 m at 0.25 m/s takes 0.4 s, and 0.25 / 0.75 s to get there, and 30 ms more.
     arm, limits = panda
