@@ -210,7 +210,7 @@ def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture
     print_tables(judged, ["box", "marble", "mug", "can"], GraspMotion(retreat=0.1))
     out = capsys.readouterr().out
     rows = [line.split() for line in out.splitlines()]
-    for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 5 2 1 50 %"):
+    for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 5 2 1 50.0 %"):
         assert row.split() in rows
     assert [line for line in out.splitlines() if line.startswith("note: ")] == [
         "note: mug: none of 3 grasps is clear: the open hand hits the table in 2, the open hand"
