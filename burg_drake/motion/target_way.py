@@ -1,7 +1,7 @@
 """The way of a grasped object past all others: back along the approach, and along the lift.
 
 At rest it lies on the table or leans on others, and shapes overlap a little where they touch: what
-it touches counts where it gets deeper than that.
+it touches counts where it gets deeper than that. All else may not be overlapped at all.
 
 Nothing here depends on what else is in a batch, not in its last bit: see `grasping.convex`.
 """
@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.grasping.body import Body
+from burg_drake.grasping.body import TOUCHING, Body
 from burg_drake.grasping.screen import HandScreen
 from burg_drake.motion.swept_shapes import swept_body
 
 AT_REST = 1e-3
-"""How much deeper than at rest an object may get into what it touches, when it is moved [m]."""
+"""How much deeper than at rest an object may get into what it touches, when it is moved; and the
+distance at rest up to which it counts as touching [m]."""
 
 STEP = 1e-3
 """Step at which its way past what it touches, or may meet, is looked at [m]."""
@@ -70,7 +71,8 @@ class TargetWay:
         self._still = HandScreen(target.pieces, others)
         self._boxes = {name: swept_body(body, np.zeros(3)) for name, body in others.items()}
         self._box = swept_body(target, np.zeros(3))
-        self._depth_at_rest: dict[str, float] = {}
+        self._others = dict(others)
+        self._depths_allowed: dict[str, float] = {}
         self._lifts: dict[float, HandScreen] = {}
 
     def retreat(self, u_W: Array, length: float) -> Blocked:
@@ -104,7 +106,8 @@ class TargetWay:
         for name in self._boxes:
             rows = np.flatnonzero(found.by == "")
             # An upper bound, which is quick and settles most.
-            rows = rows[screen.deepest(path[rows], [name], faces_only=True)[1] > AT_REST]
+            bound = screen.deepest(path[rows], [name], faces_only=True)[1]
+            rows = rows[bound > TOUCHING]
             if len(rows):
                 rows = rows[screen.deepest(path[rows], [name])[1] > self._allowed(name)]
             u = np.broadcast_to(u_W, (len(rows), 3))
@@ -130,10 +133,13 @@ class TargetWay:
 
     def _allowed(self, name: str) -> float:
         """Depth in a body up to which nothing is in the way [m]."""
-        if name not in self._depth_at_rest:
-            at_rest = self._still.deepest(self._X_WO[None], [name])[1]
-            self._depth_at_rest[name] = float(at_rest[0])
-        return self._depth_at_rest[name] + AT_REST
+        if name not in self._depths_allowed:
+            at_rest = self._X_WO[None]
+            depth = float(self._still.deepest(at_rest, [name])[1][0])
+            alone = HandScreen(self._target.pieces, {name: self._others[name]})
+            touches = depth > 0.0 or alone.nearest(at_rest)[1][0] <= AT_REST
+            self._depths_allowed[name] = depth + AT_REST if touches else TOUCHING
+        return self._depths_allowed[name]
 
     def _poses(self, moved_W: Array) -> Array:
         """(N, 4, 4) poses of the object once it has been moved by (N, 3) [m]."""

@@ -130,6 +130,21 @@ def test_the_target_meets_what_the_hand_does_not(beside: float, hit: bool) -> No
         assert lift.clearance[0] == pytest.approx(-0.039, abs=1e-6)  # out to the near end
 
 
+@pytest.mark.parametrize(("depth", "hit"), [(5e-4, True), (-5e-4, False)])
+def test_the_target_gets_no_half_millimetre_into_what_it_does_not_touch(
+    depth: float, hit: bool
+) -> None:
+    """The same box, 210 mm high, lifted to a bar at the other end."""
+    box = Instance(name="box", object="box", X_SO=Pose((0.4, 0.0, 0.0)))
+    bar = block((0.4, 0.05, 0.21 + LIFT - depth + 0.01), (0.02, 0.02, 0.02))
+    X = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.4, -0.05, 0.20))
+    lift = both(sweep(box, bar=bar), X, 0.06, "box")[1]
+    assert lift.free[0] is np.bool_(not hit)
+    if hit:
+        assert lift.blocker[0] == "bar"
+        assert lift.clearance[0] == pytest.approx(-depth, abs=1e-6)
+
+
 def test_what_lies_on_the_target_is_in_its_way_and_not_what_it_lies_on() -> None:
     box = Instance(name="box", object="box", X_SO=Pose((0.4, 0.0, -0.0005)))
     on_it = Instance(name="can", object="can", X_SO=Pose((0.4, 0.03, 0.209)))
