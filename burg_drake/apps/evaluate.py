@@ -92,8 +92,10 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.evaluation.mode import mode_for
+    from burg_drake.evaluation.motion_numbers import motion_text
     from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
+    from burg_drake.station.grasp_motion import GraspMotion
     from burg_drake.station.sound_scene import require_sound_scene
     from burg_drake.station.station import load_station
 
@@ -130,6 +132,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         progress=not arguments.quiet,
     )
     print_summary(run)
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
     if run.failures:

@@ -107,10 +107,12 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.core.outcome import Outcome
     from burg_drake.evaluation.feasibility import reach
     from burg_drake.evaluation.instance_names import chosen_instances
+    from burg_drake.evaluation.motion_numbers import motion_text
     from burg_drake.evaluation.run_notes import ungiven_note
     from burg_drake.evaluation.short_lifts import short_lifts
     from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
+    from burg_drake.station.grasp_motion import GraspMotion
     from burg_drake.station.sound_scene import require_sound_scene
     from burg_drake.station.station import load_station
 
@@ -151,6 +153,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
     print_tables(judged.select(answered), names, motion)
     if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
         print(f"note: {note}")
+    if motion != GraspMotion():
+        print(f"motion: {motion_text(motion)}")
     lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
     if lifts is not None:
         print(lifts)

@@ -37,9 +37,9 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
     total = Counter(outcomes)
     reach_table(by_object, total).show()
     outcome_table(grasps, by_object, total).show()
-    outcome, blocker = (grasps.column(name) for name in ("outcome", "blocker"))
-    notes = unclear_notes(grasps.object, outcome, blocker)
-    for note in (*notes, *unmoved_notes(grasps.object, outcome, blocker, motion)):
+    ended, blocker = grasps.column("outcome"), grasps.column("blocker")
+    notes = unclear_notes(grasps.object, ended, blocker)
+    for note in (*notes, *unmoved_notes(grasps.object, ended, blocker, motion)):
         print(f"note: {note}")
     clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())

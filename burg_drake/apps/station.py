@@ -124,6 +124,8 @@ def _inspect(arguments: argparse.Namespace) -> tuple[Station, Scene | None, Stat
 
 def _lines(station: Station, scene: Scene | None, report: StationReport) -> list[tuple[str, str]]:
     """What is printed about a station, by name."""
+    from burg_drake.evaluation.motion_numbers import motion_text
+
     low, high = (round(1e3 * width) + 0 for width in report.hand.opening)
     hand = station.hand
     lines = [("hand", f"{hand.name}, opening {low} to {high} mm, {hand.force:g} N a finger")]
@@ -131,6 +133,7 @@ def _lines(station: Station, scene: Scene | None, report: StationReport) -> list
         lines.append(("arm", "none: the hand alone"))
     else:
         lines += _arm_lines(station, report.arm)
+    lines.append(("motion", motion_text(station.document.motion)))
     lines += _board_lines(scene, report.arm.reachability if report.arm else None)
     for name, share in report.seen.items():
         camera = station.document.cameras[name]

@@ -92,6 +92,10 @@ class Trajectory:
         )
         return cls(np.concatenate(t), q, v, a)
 
+    def __repr__(self) -> str:
+        samples, joints = self.q.shape
+        return f"Trajectory({samples} samples of {joints} joints, {self.duration:.2f} s)"
+
     @property
     def duration(self) -> float:
         """Time from start to end [s]."""
@@ -190,6 +194,11 @@ class Plan:
         close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
         parts = (self.transfer, self.approach, close, self.retreat, self.lift)
         return {name: part for name, part in zip(PHASES, parts, strict=True) if part is not None}
+
+    def __repr__(self) -> str:
+        phases = ", ".join(f"{name} {part.duration:.2f} s" for name, part in self.phases.items())
+        of = f"{self.origin.instance!r} of {self.origin.scene!r}: " if self.origin else ""
+        return f"Plan({of}{phases}; {self.approach.q.shape[1]} joints)"
 
     @property
     def whole(self) -> Trajectory:

@@ -47,6 +47,8 @@ class GraspMotion:
     lift_direction: Vector3 = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
+        x, y, z = (float(part) for part in self.lift_direction)  # arrays are no part of documents
+        object.__setattr__(self, "lift_direction", (x, y, z))
         ranges = {k: v for k, v in RANGES.items() if getattr(self, k) is not None}
         require_ranges(self, ranges)
         if self.least_lift is not None and self.least_lift > self.lift_height:

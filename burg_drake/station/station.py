@@ -194,8 +194,9 @@ class StationDocument:
         over_table = abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2
         if z < 0.0 and over_table and "table" not in self.arm.stands_in:
             raise FieldError(
-                f"arm.X_WA puts the arm's base {-1e3 * z:.0f} mm deep into 'table'; move the base"
-                " or what is in its place, or write arm.stands_in: [table] if it is let in",
+                f"arm.X_WA puts the arm's base {-1e3 * z:.0f} mm deep into 'table'; raise it"
+                f" (translation: [{x:g}, {y:g}, 0]) or move it off the table, or write"
+                " arm.stands_in: [table] if it is let in",
                 *("arm", "X_WA"),
             )
 

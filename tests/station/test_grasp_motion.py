@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from burg_drake.core.errors import DocumentError
@@ -46,3 +47,8 @@ def test_a_station_states_its_usual_motion(tmp_path: Path) -> None:
 def test_motions_that_cannot_be_are_refused(tmp_path: Path, text: str, told: str) -> None:
     with pytest.raises(DocumentError, match=told):
         load_station(with_motion(tmp_path, text))
+
+
+def test_a_direction_may_be_an_array() -> None:
+    motion = GraspMotion(lift_direction=np.array([0, 1, 1]))  # type: ignore[arg-type]
+    assert motion == GraspMotion(lift_direction=(0.0, 1.0, 1.0)) and len({motion}) == 1
