@@ -218,7 +218,9 @@ def _line_search(
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:
         return NumericLines(arm, lines, reach.proximity, home, settings)
-    rest = lines, reach.proximity, home, settings
+    rest = lines, reach.proximity, home
+    few = replace(settings, starts=settings.starts[:1])  # more found nothing more in 3,000 grasps
     return SuccessiveLines(
-        ClosedFormLines(arm, ik.within(margin), *rest), lambda: NumericLines(arm, *rest)
+        ClosedFormLines(arm, ik.within(margin), *rest, settings),
+        lambda: NumericLines(arm, *rest, few),
     )
