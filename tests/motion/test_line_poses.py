@@ -4,15 +4,17 @@ import numpy as np
 
 from burg_drake.core.frames import inverse, make_pose, pregrasp, rotation_from_rpy
 from burg_drake.motion.line_poses import LinePoses
+from burg_drake.station.grasp_motion import GraspMotion
 
 X_HG = make_pose(rotation_from_rpy((0.0, 0.0, np.pi / 2)), (0.0, 0.0, 0.1034))
 X_WA = make_pose(rotation_from_rpy((0.4, -0.2, 1.1)), (0.3, -0.1, 0.05))
 X_WG = make_pose(rotation_from_rpy((2.8, 0.3, -0.5)), (0.5, 0.1, 0.12))
-LINES = LinePoses.of(X_HG, X_WA[:3, :3])
+LINES = LinePoses.of(X_HG, X_WA[:3, :3], GraspMotion())
+BACK_AND_ASIDE = GraspMotion(retreat=0.08, lift_height=0.2, lift_direction=(0.0, 3.0, 4.0))
 
 
-def grasp_in_world(way: float) -> np.ndarray:
-    X_AH = LINES.X_AH(inverse(X_WA) @ X_WG, np.array(way))
+def grasp_in_world(way: float, lines: LinePoses = LINES) -> np.ndarray:
+    X_AH = lines.X_AH(inverse(X_WA) @ X_WG, np.array(way))
     return X_WA @ X_AH @ X_HG
 
 
@@ -28,6 +30,19 @@ def test_after_it_the_hand_is_straight_above_whatever_the_base() -> None:
     risen = X_WG.copy()
     risen[2, 3] += 0.3
     np.testing.assert_allclose(grasp_in_world(0.3), risen, atol=1e-12)
+
+
+def test_after_a_retreat_the_lift_begins_back_on_the_approach() -> None:
+    lines = LinePoses.of(X_HG, X_WA[:3, :3], BACK_AND_ASIDE)
+    back, aside = pregrasp(X_WG, 0.08), pregrasp(X_WG, 0.08)
+    aside[:3, 3] += 0.2 * np.array((0.0, 0.6, 0.8))
+    np.testing.assert_allclose(grasp_in_world(0.08, lines), back, atol=1e-12)
+    np.testing.assert_allclose(grasp_in_world(0.28, lines), aside, atol=1e-12)
+    np.testing.assert_allclose(lines.layers[[0, lines.at_retreated, -1]], [-0.1, 0.08, 0.28])
+    carried = lines.carried(inverse(X_WA) @ X_WG, np.array((-0.1, 0.0, 0.28))[:, None])
+    np.testing.assert_allclose(
+        carried[:, 0], [np.zeros(3), np.zeros(3), aside[:3, 3] - X_WG[:3, 3]], atol=1e-12
+    )
 
 
 def test_shapes_broadcast() -> None:
