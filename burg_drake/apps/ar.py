@@ -161,8 +161,8 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
             _serve(arguments, live, actions, closing)
         if arguments.record is not None:
             actions.start_recording(arguments.record)
-        live.start(arguments.frames)
         try:
+            live.start(arguments.frames)
             live.wait(seconds=arguments.seconds, to_end=arguments.no_browser)
         except KeyboardInterrupt:
             interrupted = True
