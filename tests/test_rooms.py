@@ -26,6 +26,9 @@ ROOMS = [
     "pipeline",
     "visualization",
     "evaluation",
+    "generation",
+    "compose",
+    "ui",
     "apps",
 ]
 

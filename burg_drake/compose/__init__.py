@@ -1,0 +1,1 @@
+"""Composing a scene by hand: document, selection, commands and history, without any page."""
