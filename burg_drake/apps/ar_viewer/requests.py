@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
-import socket
 from email.message import Message
 from http import HTTPStatus
 from io import BufferedIOBase
@@ -11,66 +9,11 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from burg_drake.core.json_text import parse_json
+from burg_drake.core.web_access import RequestError
 
 LONGEST_BODY = 10_000
 LONGEST_NUMBER = 12
 """Digits; far more than pictures are counted, far fewer than Python refuses to convert."""
-
-
-class RequestError(Exception):
-    """A request that is refused.
-
-    Attributes:
-        code: HTTP status.
-    """
-
-    def __init__(self, code: HTTPStatus, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-def names_this_machine(name: str, served: str) -> bool:
-    """Whether a `Host` header names this machine.
-
-    A rebound DNS name is a name, so that any plain address will do.
-
-    Args:
-        name: the header.
-        served: the address that is listened on.
-    """
-    try:
-        host = urlsplit(f"//{name}").hostname or ""
-    except ValueError:
-        return False
-    mine = socket.gethostname().lower()
-    if host in ("localhost", served.lower(), mine, f"{mine}.local"):
-        return True
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True
-
-
-def require_own_host(headers: Message, target: str, served: str) -> None:
-    """Refuses what another site may have sent.
-
-    Args:
-        headers: of the request.
-        target: what it asks for.
-        served: the address that is listened on.
-
-    Raises:
-        RequestError: another host is meant, or another site asks.
-    """
-    host = headers.get("Host", "")
-    if not names_this_machine(host, served):
-        raise RequestError(HTTPStatus.FORBIDDEN, f"this is not {host or 'a nameless host'}")
-    origin = headers.get("Origin")
-    if origin is not None and origin != f"http://{host}":
-        raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {origin} are refused")
-    if headers.get("Sec-Fetch-Site") == "cross-site" and target != "/":
-        raise RequestError(HTTPStatus.FORBIDDEN, "requests from other sites are refused")
 
 
 def address(target: str) -> tuple[str, dict[str, str]]:

@@ -28,20 +28,14 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from typing import Any
 
-from burg_drake.apps.ar_viewer.requests import (
-    RequestError,
-    address,
-    json_body,
-    picture_number,
-    require_own_host,
-)
+from burg_drake.apps.ar_viewer.requests import address, json_body, picture_number
 from burg_drake.apps.ar_viewer.status import status
 from burg_drake.cameras.live_session import LiveSession
 from burg_drake.cameras.view_actions import ViewActions
 from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.web_access import HEADERS as ACCESS_HEADERS
+from burg_drake.core.web_access import LOCALHOST, RequestError, page_url, require_own_host, taken
 
-LOCALHOST = "127.0.0.1"
-EVERYWHERE = ("0.0.0.0", "::", "")
 FIRST_PORT, PORTS = 7100, 50
 """Without a port the first free one of these; Meshcat's begin at 7000."""
 PATIENCE = 1.0
@@ -55,12 +49,9 @@ PAGES = {
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
 }
 HEADERS = {
-    "Cache-Control": "no-store",
+    **ACCESS_HEADERS,
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:;"
     " frame-ancestors 'none'",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
 }
 
 
@@ -92,7 +83,7 @@ class ViewServer(ThreadingHTTPServer):
         if ":" in host:
             self.address_family = socket.AF_INET6
         self.closing = threading.Event()
-        ports = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else (port,)
+        ports = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else range(port, port + 1)
         for candidate in ports:
             try:
                 super().__init__((host, candidate), Handler)
@@ -104,14 +95,12 @@ class ViewServer(ThreadingHTTPServer):
                         f"the view cannot be served on {host}: {error.strerror or error}"
                     ) from error
         else:
-            raise InvalidInputError(_taken(host, port)) from failure
+            raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
 
     @property
     def url(self) -> str:
         """Address of the page."""
-        host = socket.gethostname() if self.host in EVERYWHERE else self.host
-        host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{self.server_address[1]}/"
+        return page_url(self.host, self.server_address[1])
 
     def start(self) -> None:
         """Serves in a thread of its own."""
@@ -159,7 +148,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
         try:
-            require_own_host(self.headers, self.path, self.server.host)
+            require_own_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
             path, query = address(self.path)
             if path not in routes:
                 raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path}")
@@ -245,10 +234,3 @@ class Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Requests are not worth a line."""
-
-
-def _taken(host: str, port: int | None) -> str:
-    if port is None:
-        last = FIRST_PORT + PORTS - 1
-        return f"all ports from {FIRST_PORT} to {last} of {host} are taken; give another, --port N"
-    return f"port {port} of {host} is taken; give another, or none for the first that is free"

@@ -1,0 +1,66 @@
+"""A real Chromium without a window, for pages.
+
+It renders WebGL in software at a few frames a second: tests wait for what a page says, never for
+frames or for time.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
+sync_api = pytest.importorskip("playwright.sync_api", reason="driven by playwright")
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+PATIENCE_MS = 60_000
+"""For what a page has to say, on a busy machine."""
+SIZE = {"width": 1280, "height": 800}
+
+
+def chromium_path() -> str:
+    """The system's Chromium; skips without one."""
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        pytest.skip(f"no browser: none of {', '.join(NAMES)} is on the PATH")
+    return found
+
+
+@pytest.fixture(scope="session")
+def playwright() -> Iterator[sync_api.Playwright]:
+    """Drives browsers, from this thread."""
+    chromium_path()
+    with sync_api.sync_playwright() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="session")
+def browser(playwright: sync_api.Playwright) -> Iterator[sync_api.Browser]:
+    """One a process, which all tests share; each has cookies of its own by `page`."""
+    browser = playwright.chromium.launch(
+        executable_path=chromium_path(), args=list(ARGUMENTS), timeout=PATIENCE_MS
+    )
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(browser: sync_api.Browser) -> Iterator[sync_api.Page]:
+    """A fresh tab of a fresh profile; the test fails if a script of the page does."""
+    with browser.new_context(viewport=SIZE) as context:
+        context.set_default_timeout(PATIENCE_MS)
+        context.set_default_navigation_timeout(PATIENCE_MS)
+        page = context.new_page()
+        errors: list[str] = []
+        page.on("pageerror", lambda error: errors.append(f"{error} {error.stack}"))
+        yield page
+        assert errors == []
