@@ -42,12 +42,14 @@ class SceneIssue:
         kind: what is wrong. `hovering` is a warning, all else are errors.
         amount: how far beyond, below, above or into something [m].
         message: one clear line.
+        other: what it overlaps: another instance, the table, or a body of the station.
     """
 
     instance: str
     kind: IssueKind
     amount: float
     message: str
+    other: str = ""
 
     @property
     def is_error(self) -> bool:

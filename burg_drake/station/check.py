@@ -38,7 +38,9 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
         if depth <= TOUCH_TOLERANCE or (b == "table" and a in buried):
             continue
         message = _overlap(a, b, depth, parts, station.path)
-        issues.append(SceneIssue(instance=a, kind="overlap", amount=depth, message=message))
+        issues.append(
+            SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
+        )
     return tuple(issues)
 
 
