@@ -1,0 +1,211 @@
+"""Commands that change what is in a scene: add, delete, duplicate, rename, fix, clear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.compose.command import FARTHEST, label_of, require_number
+from burg_drake.compose.footprint import bounds, object_bounds
+from burg_drake.compose.free_spot import free_spot
+from burg_drake.compose.moving import stable_pose_matrix, standing
+from burg_drake.compose.state import (
+    State,
+    name_of,
+    named,
+    readable_pose,
+    require_some,
+    unused_name,
+)
+from burg_drake.compose.surroundings import Surroundings
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, make_pose
+from burg_drake.scene.scene import Instance
+
+GAP = 0.01
+"""Between a duplicate and what it was made of [m]."""
+
+
+@dataclass(frozen=True)
+class AddObject:
+    """Puts an object of the library on the board.
+
+    Attributes:
+        object: its name in the library.
+        stable_pose: that it stands in.
+        position: x and y of its centre of mass [m]; a free spot near the middle if None.
+        yaw_deg: by which it is turned.
+    """
+
+    object: str
+    stable_pose: int = 0
+    position: tuple[float, float] | None = None
+    yaw_deg: float = 0.0
+
+    @property
+    def label(self) -> str:
+        return f"add {self.object}"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        X_SO = stable_pose_matrix(state, self.object, self.stable_pose)
+        yaw = np.deg2rad(require_number(self.yaw_deg, "yaw", -360.0, 360.0, "degrees"))
+        position = self.position
+        if position is None:
+            standing_there = object_bounds(state.library, self.object, standing(X_SO, (0, 0), yaw))
+            position = free_spot(standing_there, state)
+        x, y = (
+            require_number(value, f"{axis} of the new {self.object!r}", -FARTHEST, FARTHEST, "m")
+            for axis, value in zip("xy", position, strict=True)
+        )
+        name = unused_name(self.object, surroundings.taken_names(state))
+        instance = Instance(
+            name="" if name == self.object else name,
+            object=self.object,
+            X_SO=readable_pose(standing(X_SO, (x, y), yaw)),
+        )
+        return state.added([instance], fixed=_without_mass(state, [instance]))
+
+
+@dataclass(frozen=True)
+class Delete:
+    """Takes instances out of the scene."""
+
+    names: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        return label_of("delete", tuple(self.names))
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        names = require_some(self.names, state)
+        return state.changed(lambda i: None if name_of(i) in names else i)
+
+
+@dataclass(frozen=True)
+class Duplicate:
+    """Puts copies beside instances.
+
+    Attributes:
+        names: of what is copied; several keep their places to one another.
+        offset: from each to its copy along x and y [m]; to the nearest side where the copies are on
+            the board and free if None.
+    """
+
+    names: tuple[str, ...]
+    offset: tuple[float, float] | None = None
+
+    @property
+    def label(self) -> str:
+        return label_of("duplicate", tuple(self.names))
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        names = require_some(self.names, state)
+        offset = _beside(state, names) if self.offset is None else self.offset
+        x, y = (
+            require_number(value, f"offset along {axis}", -FARTHEST, FARTHEST, "m")
+            for axis, value in zip("xy", offset, strict=True)
+        )
+        X = make_pose(p_AB=(x, y, 0.0))
+        taken, copies = set(surroundings.taken_names(state)), []
+        fixed = set()
+        for name in names:
+            copy_name = unused_name(name, taken)
+            taken.add(copy_name)
+            copy = replace(state.instance(name), X_SO=readable_pose(X @ state.X_SO(name)))
+            copies.append(named(copy, copy_name))
+            if state.instance(name) in state.document.background:
+                fixed.add(copy_name)
+        return state.added(copies, fixed=fixed)
+
+
+@dataclass(frozen=True)
+class Rename:
+    """Gives an instance another name."""
+
+    name: str
+    new: str
+
+    @property
+    def label(self) -> str:
+        return f"rename {self.name}"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        state.instance(self.name)
+        if self.new == self.name:
+            return state.select([self.name])
+        surroundings.require_unused(self.new, state)
+        renamed = state.changed(lambda i: named(i, self.new) if name_of(i) == self.name else i)
+        return renamed.select([self.new])
+
+
+@dataclass(frozen=True)
+class SetFixed:
+    """Makes free instances part of the background, or the other way round.
+
+    Attributes:
+        names: instances.
+        fixed: whether they shall stay where they are when the scene is simulated.
+    """
+
+    names: tuple[str, ...]
+    fixed: bool = True
+
+    @property
+    def label(self) -> str:
+        return label_of("fix" if self.fixed else "free", tuple(self.names))
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        names = require_some(self.names, state)
+        if not self.fixed:
+            heavy = _without_mass(state, [state.instance(name) for name in names])
+            if heavy:
+                raise InvalidInputError(
+                    f"{sorted(heavy)[0]!r} has no mass, so it can only be background; build its"
+                    " object with a mass"
+                )
+        document = state.document
+        others = document.instances if self.fixed else document.background
+        moving = [i for i in others if name_of(i) in names]
+        rest = state.changed(lambda i: None if i in moving else i)
+        fixed = map(name_of, moving) if self.fixed else ()
+        return rest.added(moving, fixed=tuple(fixed)).select(names)
+
+
+@dataclass(frozen=True)
+class Clear:
+    """Takes everything off the board."""
+
+    label = "clear scene"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        document = replace(state.document, instances=(), background=())
+        return replace(state, document=document, selection=())
+
+
+def _without_mass(state: State, instances: list[Instance]) -> set[str]:
+    return {name_of(i) for i in instances if state.library.entry(i.object).is_fixed}
+
+
+def _beside(state: State, names: tuple[str, ...]) -> tuple[float, float]:
+    """Offset of copies: to the first side of right, up, left, down where they fit."""
+    corners = np.array([bounds(state, name) for name in names])
+    lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    others = [bounds(state, name) for name in state.instances]
+    width, depth = (float(v) for v in (upper - lower)[:2] + GAP)
+    sides = [(width, 0.0), (0.0, depth), (-width, 0.0), (0.0, -depth)]
+    for side in sides:
+        moved = corners[:, :, :2] + side
+        if _on_board(moved, state) and not any(_meet(m, o[:, :2]) for m in moved for o in others):
+            return side
+    return sides[0]
+
+
+def _on_board(corners: Array, state: State) -> bool:
+    """Whether boxes (N, 2, 2) in the plane of the board are on it."""
+    return bool((corners >= 0.0).all() and (corners <= np.array(state.document.board.size)).all())
+
+
+def _meet(a: Array, b: Array) -> bool:
+    """Whether two boxes (2, 2) overlap."""
+    return bool((a[0] < b[1]).all() and (b[0] < a[1]).all())

@@ -1,0 +1,78 @@
+"""A session: commands, history, selection, and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake import load_scene, load_station
+from burg_drake.compose import AddObject, ComposeSession, Delete, Move
+from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import make_pose
+from burg_drake.station.station import Station
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return load_station("panda_tabletop")
+
+
+@pytest.fixture
+def session(station: Station, tmp_path: Path) -> ComposeSession:
+    return ComposeSession.open("household", station, folder=tmp_path)
+
+
+def test_steps_are_undone_and_redone(session: ComposeSession) -> None:
+    empty = session.view.document
+    session.do(AddObject("bowl", position=(0.1, 0.15)))
+    placed = session.do(AddObject("bowl", position=(0.3, 0.15)))
+    assert placed.selection == ("bowl_2",)
+    assert placed.status == {"bowl": "ok", "bowl_2": "ok"}
+    session.do(Delete(("bowl",)))
+    assert session.undo().selection == ("bowl",)
+    session.undo()
+    assert session.undo().document == empty
+    session.redo()
+    assert session.redo().document == placed.document
+    assert session.view.redo_label == "delete bowl"
+
+
+def test_a_drag_is_one_step_and_tells_of_collisions_on_its_way(session: ComposeSession) -> None:
+    session.do(AddObject("bowl", position=(0.1, 0.15)))
+    start = session.do(AddObject("box", position=(0.3, 0.15)))
+    drag = session.drag(["box"])
+    held = drag.move_by((-0.2, 0.0, 0.3))
+    assert held.status == {"bowl": "collision", "box": "collision"}
+    assert held.revision == start.revision
+    assert held.X_SO("box")[2, 3] == start.X_SO("box")[2, 3]  # movement is planar
+    assert drag.cancel().document == start.document
+    drag = session.drag(["box"])
+    drag.move_by((0.01, 0.0, 0.0))
+    assert drag.end().undo_label == "move box"
+    assert session.undo().document == start.document
+
+
+def test_what_is_refused_changes_nothing(session: ComposeSession) -> None:
+    before = session.do(AddObject("mug"))
+    with pytest.raises(InvalidInputError, match=r"the pose of 'mug' has NaN or infinite numbers"):
+        session.do(Move({"mug": make_pose(p_AB=(np.nan, 0.0, 0.0))}))
+    assert session.view is before
+
+
+def test_a_file_that_was_changed_is_not_overwritten(session: ComposeSession) -> None:
+    session.do(AddObject("mug"))
+    path = session.save("breakfast").path
+    assert path is not None
+    assert load_scene(path).document == session.view.document
+    theirs = path.read_text() + "# theirs\n"
+    path.write_text(theirs)
+    session.do(Delete(("mug",)))
+    with pytest.raises(FileChanged, match=r"was changed by something else meanwhile"):
+        session.save()
+    assert path.read_text() == theirs
+    with pytest.raises(UnsavedChanges):
+        session.load()
+    assert session.load(discard=True).status == {"mug": "ok"}
