@@ -165,10 +165,10 @@ def map_reachability(
         raise InvalidInputError(
             f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
         )
-    (x, y), cell = _cells(scene.board.size, settings.spacing)
+    (x, y), cell = board_cells(scene.board.size, settings.spacing)
     heights = np.array(settings.heights)
     tilt, R_WG = settings.orientations
-    X_WG = _grasps(station.document.X_WS.matrix(), x, y, heights, R_WG)
+    X_WG = grasps_over_board(station.document.X_WS.matrix(), x, y, heights, R_WG)
 
     def make() -> Arrays:
         hand = HandClearance(build_station_diagram(scene, station, robot="hand"))
@@ -188,7 +188,7 @@ def cleared(scene: Scene) -> Scene:
     return replace(scene, document=replace(scene.document, instances=()))
 
 
-def _cells(
+def board_cells(
     size: tuple[float, float], spacing: float
 ) -> tuple[tuple[Array, Array], tuple[float, float]]:
     """Middles of equal cells along x and y of a board, and the cells' extents [m]."""
@@ -200,7 +200,7 @@ def _cells(
     return (x, y), (size[0] / counts[0], size[1] / counts[1])
 
 
-def _grasps(X_WS: Array, x: Array, y: Array, heights: Array, R_WG: Array) -> Array:
+def grasps_over_board(X_WS: Array, x: Array, y: Array, heights: Array, R_WG: Array) -> Array:
     """(Z Y X K, 4, 4) grasps in the world, orientations last."""
     z_S, y_S, x_S = np.meshgrid(heights, y, x, indexing="ij")
     p_SG = np.stack([x_S, y_S, z_S], axis=-1).reshape(-1, 3)
