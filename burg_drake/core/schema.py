@@ -82,6 +82,14 @@ class Pose:
         rpy = np.rad2deg(rpy_from_rotation(X[:3, :3])) + 0.0
         return cls(translation, rpy_deg=typing.cast(Vector3, tuple(rpy.tolist())))
 
+    @classmethod
+    def readable(cls, X_AB: ArrayLike) -> Pose:
+        """From a (4, 4) matrix, rounded to a micrometre and a ten thousandth of a degree."""
+        exact = cls.from_matrix(X_AB)
+        x, y, z = (round(value, 6) + 0.0 for value in exact.translation)
+        roll, pitch, yaw = (round(value, 4) + 0.0 for value in exact.rpy_deg or (0.0, 0.0, 0.0))
+        return cls((x, y, z), rpy_deg=(roll, pitch, yaw))
+
 
 def load_document(path: str | Path, schema: type[T]) -> T:
     """Reads a YAML file into a document dataclass.

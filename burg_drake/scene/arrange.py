@@ -1,0 +1,229 @@
+"""Lays out objects on a board: at random, apart or together, packed, or hanging above a heap.
+
+Only geometry, without physics. But for what touches, objects are held apart by the convex polygons
+that their hulls cover of the board, which is quick, and on the safe side: nothing overlaps, and
+nothing stands under another one's overhang. What touches is pushed together until convex pieces of
+both are in contact (see `scene.convex_travel`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.frames import Array
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.arrange_close import place_beside
+from burg_drake.scene.arrange_heap import Heap
+from burg_drake.scene.arrange_packed import density, pack
+from burg_drake.scene.arrangement import (
+    LAYOUTS,
+    TRIES,
+    Arrangement,
+    Layout,
+    Occupied,
+    PoseChoice,
+    Standing,
+    Wanted,
+    draw_pose,
+    instance,
+    random_place,
+    standing,
+)
+from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes
+from burg_drake.scene.scene import Board
+
+GAPS = {"random": 0.001, "wide": 0.040}
+"""Least distance of shadows [m]; a finger of the Panda's hand is 22 mm wide."""
+ORDERS = 4
+"""Orders in which objects are packed."""
+
+
+def choose(
+    library: ObjectLibrary,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    only: Sequence[str] = (),
+    repeat: bool = False,
+    taken: Sequence[str] = (),
+) -> tuple[Wanted, ...]:
+    """Draws objects of a library.
+
+    Args:
+        library: the library; what has no mass or no stable pose is left out.
+        count: how many.
+        rng: draws.
+        only: names of the objects to draw from; all if empty.
+        repeat: an object may come several times.
+        taken: names that instances must not get.
+
+    Raises:
+        UnknownNameError: `only` names an object that is not there.
+        InvalidInputError: there are not enough objects.
+    """
+    usable = [n for n, e in library.objects.items() if not e.is_fixed and e.stable_poses]
+    for name in only:
+        if name not in usable:
+            raise UnknownNameError(
+                f"object {name!r} is not in library {library.root}, or has no mass or no stable"
+                f" pose; {nearest(name, usable)}"
+            )
+    names = sorted(set(only) or usable)
+    if not names or (not repeat and count > len(names)):
+        raise InvalidInputError(
+            f"{count} different objects are asked for, and there are {len(names)}"
+            f" {'in ' + str(library.root) if not only else 'to choose from'};"
+            " ask for fewer, or let objects repeat"
+        )
+    drawn = [names[i] for i in rng.choice(len(names), count, replace=repeat)]
+    wanted: list[Wanted] = []
+    used = set(taken)
+    for name in drawn:
+        unique, k = name, 2
+        while unique in used:
+            unique, k = f"{name}_{k}", k + 1
+        used.add(unique)
+        wanted.append(Wanted(name=unique, object=name))
+    return tuple(wanted)
+
+
+def arrange(
+    wanted: Sequence[Wanted],
+    shapes: ObjectShapes,
+    board: Board,
+    rng: np.random.Generator,
+    *,
+    layout: Layout = "random",
+    poses: PoseChoice = "probability",
+    obstacles: Sequence[Array] = (),
+    tries: int = TRIES,
+) -> Arrangement:
+    """Looks for a place for each object.
+
+    Each gets its stable pose first, then up to `tries` random places and yaws; large ones begin.
+    What finds no place is missing in the result.
+
+    Args:
+        wanted: the objects.
+        shapes: of the library's objects; to be kept for the next time.
+        board: objects stay within its edges.
+        rng: draws; the same one gives the same result.
+        layout: how they stand to one another.
+        poses: how stable poses are drawn.
+        obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as those of
+            `scene.arrangement.corners` and boxes of a station.
+        tries: places to look at for each object.
+
+    Raises:
+        UnknownNameError: an object is not in the library.
+        InvalidInputError: an object cannot be placed, as it has no mass, for example; or there is
+            no such layout.
+    """
+    if layout not in LAYOUTS:
+        raise InvalidInputError(f"layout {layout!r} does not exist; {nearest(layout, LAYOUTS)}")
+    occupied = Occupied(board, obstacles)
+    for one in wanted:
+        _ = shapes[one.object]
+    if layout == "heap":
+        return _heap(wanted, shapes, occupied, rng, tries)
+    chosen = [(shapes[one.object], draw_pose(one, shapes, rng, poses)) for one in wanted]
+    if layout == "packed":
+        places, used = _packed(chosen, board, obstacles, rng)
+    else:
+        places, used = _scattered(chosen, occupied, rng, layout, tries)
+    X_SO = [None if place is None else place.X_SO for place in places]
+    return _result(wanted, X_SO, used)
+
+
+def _scattered(
+    chosen: Sequence[tuple[ObjectShape, int]],
+    occupied: Occupied,
+    rng: np.random.Generator,
+    layout: Layout,
+    tries: int,
+) -> tuple[list[Standing | None], int]:
+    """Places by trial and error, large objects first; and the number of trials."""
+    places: list[Standing | None] = [None] * len(chosen)
+    used = 0
+    for i in _large_first(chosen):
+        shape, pose = chosen[i]
+        for _ in range(tries):
+            used += 1
+            if layout in GAPS:
+                place = _anywhere(occupied, shape, pose, rng, GAPS[layout])
+            else:
+                place = place_beside(occupied, shape, pose, rng, touching=layout == "touching")
+            if place is not None:
+                occupied.add(place)
+                places[i] = place
+                break
+    return places, used
+
+
+def _anywhere(
+    occupied: Occupied, shape: ObjectShape, pose: int, rng: np.random.Generator, least: float
+) -> Standing | None:
+    """One random place on the board; None if it is not free."""
+    turned = standing(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
+    place = random_place(turned, occupied.size, rng)
+    return place if place is not None and occupied.is_free(place, least) else None
+
+
+def _packed(
+    chosen: Sequence[tuple[ObjectShape, int]],
+    board: Board,
+    obstacles: Sequence[Array],
+    rng: np.random.Generator,
+) -> tuple[list[Standing | None], int]:
+    """The densest of several orders; the first is by size, the others are random."""
+    best: list[Standing | None] = [None] * len(chosen)
+    value = (-1, 0.0)
+    for k in range(ORDERS):
+        order = _large_first(chosen) if k == 0 else rng.permutation(len(chosen)).tolist()
+        found = pack(Occupied(board, obstacles), [chosen[i] for i in order])
+        placed = [place for place in found if place is not None]
+        if (len(placed), density(placed)) > value:
+            value = (len(placed), density(placed))
+            for i, place in zip(order, found, strict=True):
+                best[i] = place
+    return best, ORDERS * len(chosen)
+
+
+def _heap(
+    wanted: Sequence[Wanted],
+    shapes: ObjectShapes,
+    occupied: Occupied,
+    rng: np.random.Generator,
+    tries: int,
+) -> Arrangement:
+    """Start poses above the middle of the board."""
+    heap = Heap(occupied, [shapes[one.object] for one in wanted])
+    X_SO: list[Array | None] = []
+    used = 0
+    for one in wanted:
+        found = None
+        for _ in range(tries):
+            used += 1
+            found = heap.hang(shapes[one.object], rng)
+            if found is not None:
+                break
+        X_SO.append(found)
+    return _result(wanted, X_SO, used)
+
+
+def _large_first(chosen: Sequence[tuple[ObjectShape, int]]) -> list[int]:
+    """Numbers of objects, those that cover most of the board first."""
+    size = [np.prod(np.ptp(shape.shadows[pose], axis=0)) for shape, pose in chosen]
+    return [int(i) for i in np.argsort(-np.array(size), kind="stable")]
+
+
+def _result(wanted: Sequence[Wanted], X_SO: Sequence[Array | None], tries: int) -> Arrangement:
+    placed = zip(wanted, X_SO, strict=True)
+    return Arrangement(
+        tuple(instance(one, X) for one, X in placed if X is not None),
+        tuple(one.name for one, X in zip(wanted, X_SO, strict=True) if X is None),
+        tries,
+    )

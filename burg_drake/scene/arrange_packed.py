@@ -1,0 +1,140 @@
+"""Objects packed side by side, as densely as it gets.
+
+They are set down one after the other, in several orders, of which the densest result is kept. Each
+has some yaws to choose from: those that lay the longest side of its shadow along a side of the
+board, or along the longest sides of what stands there. For each yaw the places are looked at where
+it touches two others, or one and the board's edge: there edges of the forbidden polygons cross, or
+have their ends. Of all places the one wins that leaves the convex hull of all shadows smallest; the
+first object stands in the middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core.frames import Array
+from burg_drake.scene.arrangement import Occupied, Standing, standing
+from burg_drake.scene.object_shapes import ObjectShape
+from burg_drake.scene.polygons import (
+    DIRECTIONS,
+    area,
+    convex_polygon,
+    forbidden,
+    reach,
+    support_area,
+)
+
+APART = 3e-4
+"""Between shadows [m], so that rounding of poses lets nothing overlap."""
+SIDES = 3
+"""Longest sides of a shadow that another one is laid along."""
+
+
+def pack(
+    occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]], most_yaws: int = 16
+) -> list[Standing | None]:
+    """Finds places, one object after the other, and adds them to what stands there.
+
+    Args:
+        occupied: the board and what stands there.
+        objects: with the numbers of their stable poses.
+        most_yaws: of each object.
+
+    Returns:
+        None for those for which there is no room.
+    """
+    found: list[Standing | None] = []
+    for shape, pose in objects:
+        best, best_area = None, np.inf
+        for yaw in _yaws(shape.shadows[pose], occupied.standing)[:most_yaws]:
+            turned = standing(shape, pose, yaw)
+            place, place_area = _best_place(occupied, turned)
+            if place is not None and place_area < best_area - 1e-12:
+                best, best_area = place, place_area
+        if best is not None:
+            occupied.add(best)
+        found.append(best)
+    return found
+
+
+def density(placed: Sequence[Standing]) -> float:
+    """Share of the convex hull of all shadows that they cover."""
+    if not placed:
+        return 0.0
+    hull = convex_polygon(np.concatenate([one.shadow for one in placed]))
+    return sum(area(one.shadow) for one in placed) / area(hull)
+
+
+def _yaws(shadow: Array, others: Sequence[Standing]) -> list[float]:
+    """Yaws that lay the longest side of a shadow along a side of something [rad]."""
+    own = _headings(shadow)[0]
+    towards = [k * np.pi / 2.0 for k in range(4)]
+    for one in others[::-1]:
+        towards += [heading + np.pi for heading in _headings(one.shadow)]
+    found: list[float] = []
+    for heading in towards:
+        yaw = float((heading - own) % (2.0 * np.pi))
+        if all(abs((yaw - other + np.pi) % (2.0 * np.pi) - np.pi) > 0.02 for other in found):
+            found.append(yaw)
+    return found
+
+
+def _headings(polygon: Array) -> Array:
+    """Headings of the longest sides of a polygon [rad]."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    longest = np.argsort(-np.hypot(along[:, 0], along[:, 1]), kind="stable")[:SIDES]
+    return np.asarray(np.arctan2(along[longest, 1], along[longest, 0]))
+
+
+def _best_place(occupied: Occupied, turned: Standing) -> tuple[Standing | None, float]:
+    """The place where the hull of all shadows is smallest, and its area [m^2]."""
+    low, high = -turned.shadow.min(axis=0), occupied.size - turned.shadow.max(axis=0)
+    if (low > high).any():
+        return None, np.inf
+    there = [one.shadow for one in occupied.standing]
+    if not there:
+        middle = turned.shifted((low + high) / 2.0)
+        whole = float(support_area(reach(middle.shadow)))
+        return (middle, whole) if occupied.is_free(middle, APART) else (None, np.inf)
+    points = _touching(turned.shadow, there, low, high)
+    points = points[((points >= low) & (points <= high)).all(axis=1)]
+    there_reach = np.max([reach(shadow) for shadow in there], axis=0)
+    areas = support_area(np.maximum(there_reach, reach(turned.shadow) + points @ DIRECTIONS.T))
+    for i in np.argsort(areas, kind="stable"):
+        place = turned.shifted(points[i])
+        if occupied.is_free(place, APART):
+            return place, float(areas[i])
+    return None, np.inf
+
+
+def _touching(shadow: Array, there: Sequence[Array], low: Array, high: Array) -> Array:
+    """Places (N, 2) of a shadow's origin at which it touches what is there, once or twice."""
+    around = [_grown(forbidden(other, shadow)) for other in there]
+    starts = np.concatenate(around)
+    ends = np.concatenate([np.roll(polygon, -1, axis=0) for polygon in around])
+    frame = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    starts = np.concatenate([starts, frame])
+    ends = np.concatenate([ends, np.roll(frame, -1, axis=0)])
+    along = ends - starts
+    between = starts[None] - starts[:, None]
+    turn = along[:, None, 0] * along[None, :, 1] - along[:, None, 1] * along[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (between[..., 0] * along[None, :, 1] - between[..., 1] * along[None, :, 0]) / turn
+        u = (between[..., 0] * along[:, None, 1] - between[..., 1] * along[:, None, 0]) / turn
+        cross = (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
+    i, j = np.nonzero(np.triu(cross, 1))
+    return np.concatenate([starts, starts[i] + t[i, j, None] * along[i]])
+
+
+def _grown(polygon: Array) -> Array:
+    """A polygon that is larger by `APART` all around."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    normal = np.column_stack([along[:, 1], -along[:, 0]])
+    normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
+    before = np.roll(normal, 1, axis=0)
+    return (
+        polygon
+        + APART * 1.001 * (before + normal) / (1.0 + np.sum(before * normal, axis=1))[:, None]
+    )

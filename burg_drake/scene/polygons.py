@@ -1,0 +1,143 @@
+"""Convex polygons of the plane: the shadows that objects cast on the board.
+
+A polygon is an array (N, 2) of corners [m], counter-clockwise. Objects whose shadows are apart are
+apart themselves, at least as far.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from burg_drake.core.frames import Array
+
+_ANGLES = 2.0 * np.pi * np.arange(64) / 64
+DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+"""Unit vectors (64, 2) all around."""
+
+
+def convex_polygon(points: Array) -> Array:
+    """The corners (M, 2) of the convex hull of points (N, 2) that span an area [m]."""
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def turned(polygon: Array, angle: float) -> Array:
+    """A polygon turned counter-clockwise about the origin by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = polygon[:, 0], polygon[:, 1]
+    return np.column_stack([c * x - s * y, s * x + c * y])
+
+
+def area(polygon: Array) -> float:
+    """Area [m^2], by the shoelace formula."""
+    x, y = polygon[:, 0], polygon[:, 1]
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2.0)
+
+
+def forbidden(still: Array, moving: Array) -> Array:
+    """Where a polygon's origin must not be, so that it does not overlap another one.
+
+    Args:
+        still: (N, 2) the other one.
+        moving: (M, 2) corners relative to the origin that is to be placed.
+
+    Returns:
+        The Minkowski difference (K, 2): the two touch where the origin is on its edge, and are as
+        far apart as the origin is from it.
+    """
+    one, other = _from_lowest(still), _from_lowest(-moving)
+    sides = np.concatenate([np.roll(p, -1, axis=0) - p for p in (one, other)])
+    heading = np.arctan2(sides[:, 1], sides[:, 0]) % (2.0 * np.pi)
+    sides = sides[np.argsort(heading, kind="stable")]
+    return np.asarray(one[0] + other[0] + np.cumsum(sides, axis=0) - sides)
+
+
+def support_area(reach: Array) -> Array:
+    """Areas (...) of the polygons between lines that are evenly spread around the origin.
+
+    Args:
+        reach: (..., K) largest `direction . point` of a shape along K directions, such as those of
+            `DIRECTIONS`: the result is the area of its convex hull, and a little above it [m^2].
+    """
+    step = 2.0 * np.pi / reach.shape[-1]
+    before, after = np.roll(reach, 1, axis=-1), np.roll(reach, -1, axis=-1)
+    side = (before + after - 2.0 * np.cos(step) * reach) / np.sin(step)
+    return np.asarray((reach * side).sum(axis=-1) / 2.0)
+
+
+def reach(polygon: Array) -> Array:
+    """(K,) largest `direction . corner` of a polygon along `DIRECTIONS` [m]."""
+    return np.asarray((polygon @ DIRECTIONS.T).max(axis=0))
+
+
+def without_short_sides(polygon: Array, most: float) -> Array:
+    """A polygon with fewer corners around a polygon: short sides are left out, and their
+    neighbours go on until they meet.
+
+    Args:
+        polygon: (N, 2).
+        most: that it may reach beyond a side that is left out [m].
+    """
+    while len(polygon) > 3:
+        ends, after = np.roll(polygon, -1, axis=0), np.roll(polygon, -2, axis=0)
+        into, along, out = polygon - np.roll(polygon, 1, axis=0), ends - polygon, after - ends
+        turn = _cross(into, out)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tip = polygon + (_cross(along, out) / turn)[:, None] * into
+            beyond = -_cross(along, tip - polygon) / np.hypot(along[:, 0], along[:, 1])
+        beyond = np.where((turn > 0.0) & (beyond >= 0.0), beyond, np.inf)
+        k = int(beyond.argmin())
+        if beyond[k] > most:
+            break
+        polygon = polygon.copy()
+        polygon[k] = tip[k]
+        polygon = np.delete(polygon, (k + 1) % len(polygon), axis=0)
+    return polygon
+
+
+def gap(one: Array, other: Array) -> float:
+    """Distance of two polygons [m]; below 0 where they overlap."""
+    side, beside = _sides(one, other)
+    back, beyond = _sides(other, one)
+    apart = max(side.min(axis=0).max(), back.min(axis=0).max())
+    if apart <= 0.0:
+        return float(apart)
+    return float(np.sqrt(min((side**2 + beside**2).min(), (back**2 + beyond**2).min())))
+
+
+def distances(polygon: Array, points: Array) -> Array:
+    """Distances (M,) of points (M, 2) from a polygon [m], below 0 inside."""
+    side, beside = _sides(polygon, points)
+    inside = (side <= 0.0).all(axis=1)
+    return np.asarray(np.where(inside, side.max(axis=1), np.hypot(side, beside).min(axis=1)))
+
+
+def exit_distance(polygon: Array, origin: Array, direction: Array) -> float:
+    """How far a point (2,) inside a polygon has to go along a unit direction (2,) to leave it."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    normal = np.column_stack([along[:, 1], -along[:, 0]])
+    speed = normal @ direction
+    room = np.sum(normal * (polygon - origin), axis=1)
+    return float((room[speed > 0.0] / speed[speed > 0.0]).min())
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _from_lowest(polygon: Array) -> Array:
+    """The same polygon, beginning with its lowest corner, the left one of two."""
+    first = np.lexsort((polygon[:, 0], polygon[:, 1]))[0]
+    return np.roll(polygon, -int(first), axis=0)
+
+
+def _sides(polygon: Array, points: Array) -> tuple[Array, Array]:
+    """Of points (M, 2) and the edges of a polygon (N, 2): how far the points are outside of the
+    edges' lines (M, N), and how far beyond the edges' ends, seen along them (M, N) [m]."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    length = np.hypot(along[:, 0], along[:, 1])
+    along = along / length[:, None]
+    away = points[:, None] - polygon
+    t = away[..., 0] * along[:, 0] + away[..., 1] * along[:, 1]
+    side = away[..., 0] * along[:, 1] - away[..., 1] * along[:, 0]
+    return side, t - np.clip(t, 0.0, length)
