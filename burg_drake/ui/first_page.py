@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import html
-from functools import cache
 from importlib.resources import files
+
+from burg_drake.ui.uploads import LARGEST_UPLOAD
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; worker-src blob: data:;"
@@ -14,22 +15,28 @@ POLICY = (
 )
 """viser's page is one file, which unpacks its scripts and evaluates glue of WebAssembly. It may
 load nothing, and connect to nothing but this server, whatever an address (`?websocket=`) says."""
+WITHOUT_SCRIPTS = (
+    "This page needs JavaScript, which is switched off in this browser: allow it for this address"
+    " and reload."
+)
 
 
 def first_page(title: str) -> str:
-    """viser's page under another title, with words for browsers that cannot show it.
+    """viser's page under another title, with a script before its own.
 
     Args:
         title: of the page.
     """
-    page, name = _of_viser(), html.escape(title)
-    page = page.replace("<title>Viser</title>", f"<title>{name}</title>", 1)
-    return page.replace("<body>", f"<body>\n{_ADDED}", 1)
+    script = _read("burg_drake", "ui/first_page.js")
+    script = script.replace("LARGEST_UPLOAD = 0;", f"LARGEST_UPLOAD = {LARGEST_UPLOAD};")
+    page = _read("viser", "client/build/index.html")
+    for old, new in (
+        ("<title>Viser</title>", f"<title>{html.escape(title)}</title>\n<script>{script}</script>"),
+        ("You need to enable JavaScript to run this app.", WITHOUT_SCRIPTS),
+    ):
+        page = page.replace(old, new, 1)
+    return page
 
 
-@cache
-def _of_viser() -> str:
-    return (files("viser") / "client" / "build" / "index.html").read_text(encoding="utf-8")
-
-
-_ADDED = ""
+def _read(package: str, path: str) -> str:
+    return files(package).joinpath(*path.split("/")).read_text(encoding="utf-8")

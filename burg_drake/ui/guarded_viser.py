@@ -14,6 +14,7 @@ import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import rich
@@ -23,9 +24,9 @@ from websockets.asyncio.server import ServerConnection
 
 from burg_drake.core.errors import MissingDependencyError
 from burg_drake.ui.admission import Admission
+from burg_drake.ui.incoming import LARGEST_MESSAGE, BoundedConnection
+from burg_drake.ui.uploads import Uploads
 
-LARGEST_MESSAGE = 1 << 20
-"""Of what browsers send [bytes]; parts of an upload are half as large."""
 _CONSTRUCTION = threading.Lock()
 _LOG = logging.getLogger(__name__)
 _LOG.addHandler(logging.NullHandler())  # what clients do wrong is not worth a line in the terminal
@@ -75,6 +76,7 @@ def _guarded_serve(listener: socket.socket, admission: Admission) -> Iterator[li
             select_subprotocol=options["select_subprotocol"],
             compression=None,
             max_size=LARGEST_MESSAGE,
+            create_connection=partial(BoundedConnection, uploads=Uploads()),  # type: ignore[arg-type]
             logger=_LOG,
             server_header=None,
         )

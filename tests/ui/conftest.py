@@ -27,7 +27,8 @@ PATIENCE_MS = 60_000
 SIZE = {"width": 1280, "height": 800}
 
 
-def chromium_path() -> str:
+@pytest.fixture(scope="session")
+def chromium() -> str:
     """The system's Chromium; skips without one."""
     found = next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
@@ -36,18 +37,17 @@ def chromium_path() -> str:
 
 
 @pytest.fixture(scope="session")
-def playwright() -> Iterator[sync_api.Playwright]:
+def playwright(chromium: str) -> Iterator[sync_api.Playwright]:
     """Drives browsers, from this thread."""
-    chromium_path()
     with sync_api.sync_playwright() as driver:
         yield driver
 
 
 @pytest.fixture(scope="session")
-def browser(playwright: sync_api.Playwright) -> Iterator[sync_api.Browser]:
+def browser(playwright: sync_api.Playwright, chromium: str) -> Iterator[sync_api.Browser]:
     """One a process, which all tests share; each has cookies of its own by `page`."""
     browser = playwright.chromium.launch(
-        executable_path=chromium_path(), args=list(ARGUMENTS), timeout=PATIENCE_MS
+        executable_path=chromium, args=list(ARGUMENTS), timeout=PATIENCE_MS
     )
     yield browser
     browser.close()

@@ -1,0 +1,81 @@
+// Runs before viser's page does: says what is missing where it cannot run, and what cannot be sent.
+"use strict";
+(() => {
+  const LARGEST_UPLOAD = 0; // put in by first_page.py [bytes]
+
+  const styled = (tag, style, text = "") => {
+    const element = document.createElement(tag);
+    element.style.cssText = `font-family: sans-serif; line-height: 1.5; color: #222; ${style}`;
+    element.textContent = text;
+    return element;
+  };
+
+  // The token is used up, and what an address says of other servers is not believed.
+  const query = new URLSearchParams(location.search);
+  ["token", "websocket", "playbackPath"].forEach((name) => query.delete(name));
+  history.replaceState(null, "", query.size ? `/?${query}` : "/");
+
+  const missing = () => {
+    if (typeof WebAssembly !== "object" || typeof DecompressionStream !== "function") {
+      return [
+        "This browser is too old for this page",
+        "Use Chrome or Edge from 91, Firefox from 113 or Safari from 16.4.",
+      ];
+    }
+    const context = document.createElement("canvas").getContext("webgl2");
+    if (context === null) {
+      return [
+        "This browser shows no 3D: WebGL 2 is missing",
+        "Switch on hardware acceleration in the browser's settings and restart it, or use another" +
+          " browser. On a machine without a graphics card, Chrome renders in software if it is" +
+          " started with --enable-unsafe-swiftshader. Nothing is lost: the scene is with the" +
+          " program, and this page shows it when it is opened again.",
+      ];
+    }
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+    return null;
+  };
+
+  const lines = missing();
+  if (lines !== null) {
+    const box = styled("main", "max-width: 40em; margin: 15vh auto; padding: 0 2em");
+    box.setAttribute("role", "alert");
+    box.append(styled("h1", "font-size: 1.4em", lines[0]), styled("p", "", lines[1]));
+    document.addEventListener("DOMContentLoaded", () => document.body.append(box));
+    document.write("<template>"); // in which viser's own scripts, later in this file, do not run
+    return;
+  }
+
+  const complain = (text) => {
+    const box = styled(
+      "div",
+      "position: fixed; z-index: 100000; top: 1em; left: 50%; transform: translateX(-50%);" +
+        " max-width: 40em; padding: 0.8em 1.2em; background: #fff; border-left: 6px solid #c92a2a;" +
+        " box-shadow: 0 2px 12px #0005",
+      text,
+    );
+    box.setAttribute("role", "alert");
+    const close = styled("button", "margin-left: 1em; cursor: pointer", "Close");
+    close.addEventListener("click", () => box.remove());
+    box.append(close);
+    document.body.append(box);
+  };
+
+  document.addEventListener(
+    "change",
+    (event) => {
+      const input = event.target;
+      if (!(input instanceof HTMLInputElement) || input.type !== "file") return;
+      const large = [...input.files].find((file) => file.size > LARGEST_UPLOAD);
+      if (large === undefined) return;
+      event.stopImmediatePropagation();
+      input.value = "";
+      const mib = (bytes) => `${(bytes / 2 ** 20).toFixed(1)} MiB`;
+      complain(
+        `${large.name} was not sent: it has ${mib(large.size)}, and ` +
+          `${mib(LARGEST_UPLOAD)} are the most that this page takes.`,
+      );
+    },
+    true,
+  );
+})();

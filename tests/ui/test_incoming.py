@@ -1,0 +1,219 @@
+"""What the door lets through to viser, from a browser and from programs that are no page."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import viser
+import zstandard
+from viser._messages import FileTransferStartUpload, Message, ShareUrlRequest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from burg_drake.ui.door import Door, serve
+from burg_drake.ui.incoming import LARGEST_MESSAGE
+from burg_drake.ui.uploads import ALL_UPLOADS, LARGEST_UPLOAD
+
+TIMEOUT = 60.0
+CAMERA = {
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (0.0, 0.0, 1.0),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 10.0,
+    "image_height": 480,
+    "image_width": 640,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 1.0, 0.0),
+}
+
+
+@pytest.fixture(scope="module")
+def door() -> Iterator[Door]:
+    with serve(port=0) as door:
+        yield door
+
+
+@pytest.fixture(scope="module")
+def button(door: Door) -> viser.GuiUploadButtonHandle:
+    return door.server.gui.add_upload_button("Load a photo")
+
+
+@pytest.fixture
+def client(door: Door) -> Iterator[ClientConnection]:
+    """A program that came in as a page does; it may send anything."""
+    with coming_in(door) as client:
+        send(client, "ViewerCameraMessage", **CAMERA)
+        yield client
+
+
+def coming_in(door: Door) -> ClientConnection:
+    return connect(
+        f"ws://127.0.0.1:{door.port}/",
+        origin=f"http://127.0.0.1:{door.port}",
+        subprotocols=[f"viser-v{viser.__version__}"],
+        max_size=None,
+        compression=None,
+    )
+
+
+def send(client: ClientConnection, kind: str, **fields: Any) -> None:
+    client.send(msgspec.msgpack.encode({"type": kind, **fields}))
+
+
+def announce(client: ClientConnection, button: viser.GuiUploadButtonHandle, **fields: Any) -> None:
+    usual = {
+        "source_component_uuid": button._impl.uuid,
+        "transfer_uuid": "a",
+        "filename": "photo.png",
+        "mime_type": "image/png",
+        "size_bytes": 10,
+        "part_count": 1,
+    }
+    send(client, "FileTransferStartUpload", **usual | fields)
+
+
+def part(
+    client: ClientConnection, button: viser.GuiUploadButtonHandle, content: bytes, **fields: Any
+) -> None:
+    usual = {"source_component_uuid": button._impl.uuid, "transfer_uuid": "a", "part_index": 0}
+    send(client, "FileTransferPart", **usual | fields, content=content)
+
+
+def closed(client: ClientConnection) -> tuple[int, str]:
+    """Code and reason by which the door closes the connection."""
+    with pytest.raises(ConnectionClosed) as caught:
+        while True:
+            client.recv(timeout=TIMEOUT)
+    assert caught.value.rcvd is not None
+    return caught.value.rcvd.code, caught.value.rcvd.reason
+
+
+def test_a_browser_uploads_what_is_small_enough(door: Door, button, page, tmp_path: Path) -> None:
+    arrived = threading.Event()
+    button.on_upload(lambda event: arrived.set())
+    photo, film = tmp_path / "photo.png", tmp_path / "film.png"
+    photo.write_bytes(bytes(range(256)) * 4000)
+    with film.open("wb") as file:
+        file.truncate(LARGEST_UPLOAD + 1)
+    page.goto(door.url)
+    page.get_by_role("button", name="Load a photo").wait_for()
+    page.set_input_files("input[type=file]", film)
+    page.get_by_role("alert").get_by_text("film.png was not sent: it has 32.0 MiB").wait_for()
+    page.get_by_role("button", name="Close").click()
+    assert page.get_by_text("film.png").count() == 0
+    page.set_input_files("input[type=file]", photo)
+    assert arrived.wait(TIMEOUT)
+    assert button.value.name == "photo.png" and button.value.content == photo.read_bytes()
+    assert door.server.gui._current_file_upload_states == {}
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        ({"size_bytes": LARGEST_UPLOAD + 1, "part_count": 100}, "bytes is refused"),
+        ({"size_bytes": -1, "part_count": 1}, "bytes is refused"),
+        ({"size_bytes": 10, "part_count": 1 << 40}, "parts is refused"),
+        ({"size_bytes": 10, "part_count": 0}, "parts is refused"),
+        ({"size_bytes": 10, "part_count": -1}, "parts is refused"),
+        ({"filename": "../photo.png"}, "this name"),
+        ({"filename": "/etc/passwd"}, "this name"),
+        ({"filename": "..\\photo.png"}, "this name"),
+        ({"filename": ".."}, "this name"),
+        ({"filename": "a" * 256}, "this name"),
+    ],
+)
+def test_a_file_that_no_page_sends_is_refused_before_it_comes(
+    door: Door, button, client: ClientConnection, fields: dict[str, Any], reason: str
+) -> None:
+    announce(client, button, **fields)
+    code, said = closed(client)
+    assert code == 1008 and reason in said
+    assert door.server.gui._current_file_upload_states == {}
+
+
+def test_more_than_was_announced_is_refused(button, client: ClientConnection) -> None:
+    announce(client, button)
+    part(client, button, bytes(11))
+    assert closed(client) == (1008, "a file is larger than it was announced")
+
+
+def test_many_files_at_once_are_bounded(button, client: ClientConnection) -> None:
+    for k in range(ALL_UPLOADS // LARGEST_UPLOAD + 1):
+        announce(client, button, transfer_uuid=str(k), size_bytes=LARGEST_UPLOAD, part_count=64)
+    assert closed(client) == (1008, "too many files at once")
+
+
+def test_who_goes_away_leaves_nothing_behind(door: Door, button) -> None:
+    with coming_in(door) as client:  # viser would keep the parts of those who show no camera
+        announce(client, button)
+        assert closed(client)[0] == 1008
+    for key in ("b", "c", "d"):  # more than may be on their way at once
+        with coming_in(door) as client:
+            send(client, "ViewerCameraMessage", **CAMERA)
+            announce(client, button, transfer_uuid=key, size_bytes=LARGEST_UPLOAD, part_count=64)
+            part(client, button, bytes(1000), transfer_uuid=key)
+            wait_for(client, key)
+    end = time.monotonic() + TIMEOUT
+    while door.server.gui._current_file_upload_states:  # the server hears of it in a moment
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def wait_for(client: ClientConnection, key: str) -> None:
+    """Waits until viser has taken a part of this file."""
+    taken = msgspec.msgpack.encode("transfer_uuid") + msgspec.msgpack.encode(key)
+    while taken not in unpacked(client.recv(timeout=TIMEOUT)):
+        pass
+
+
+def unpacked(raw: str | bytes) -> bytes:
+    """The messages of viser in MessagePack."""
+    assert isinstance(raw, bytes)
+    size = int.from_bytes(raw[8:16], "little")
+    return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
+
+
+def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnection) -> None:
+    asked: list[Message] = []
+    for kind in (ShareUrlRequest, FileTransferStartUpload):
+        door.server._websock_server.register_handler(kind, lambda _, message: asked.append(message))
+    send(client, "ShareUrlRequest")
+    announce(client, button, transfer_uuid="e")
+    part(client, button, bytes(10), transfer_uuid="e")
+    wait_for(client, "e")
+    assert [type(message) for message in asked] == [FileTransferStartUpload]
+    assert door.server._share_tunnel is None
+
+
+def test_only_values_of_controls_are_set(door: Door, client: ClientConnection) -> None:
+    slider = door.server.gui.add_slider("Size", 0.0, 1.0, 0.1, 0.5)
+    send(client, "GuiUpdateMessage", uuid=slider._impl.uuid, updates={"update_cb": []})
+    assert closed(client) == (1008, "only values of controls can be set")
+
+
+@pytest.mark.parametrize(
+    ("raw", "code"),
+    [
+        ("text", 1003),
+        (b"", 1007),
+        (b"\xc1", 1007),
+        (b"\x91" * 100_000, 1007),
+        (msgspec.msgpack.encode({"type": 1}), 1007),
+        (msgspec.msgpack.encode({"type": "FileTransferPart", "content": [1]}), 1007),
+        (bytes(LARGEST_MESSAGE + 1), 1009),
+    ],
+    ids=["text", "empty", "invalid", "nested", "type", "content", "large"],
+)
+def test_malformed_messages_end_the_connection_quietly(
+    client: ClientConnection, capfd: pytest.CaptureFixture[str], raw: str | bytes, code: int
+) -> None:
+    client.send(raw)
+    assert closed(client)[0] == code
+    assert capfd.readouterr() == ("", "")
