@@ -6,7 +6,7 @@ diagram holds; `station.check` finds those.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -15,6 +15,7 @@ import numpy as np
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, transform_points
+from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Scene
 
 IN_BOUNDS_TOLERANCE = 1e-4
@@ -57,25 +58,47 @@ class SceneIssue:
         return self.kind != "hovering"
 
 
-def validate_scene(scene: Scene) -> tuple[SceneIssue, ...]:
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The box around a placed object, along the axes of the board.
+
+    Attributes:
+        low, high: (3,) its corners in the scene frame [m].
+    """
+
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, p_SV: Array) -> Extent:
+        """The box around points (N, 3)."""
+        return cls(p_SV.min(axis=0), p_SV.max(axis=0))
+
+
+def validate_scene(
+    scene: Scene, extents: Mapping[str, Extent] | None = None
+) -> tuple[SceneIssue, ...]:
     """Checks where the instances of a scene stand on the board.
 
     Args:
         scene: the scene; fixed background objects may stand anywhere.
+        extents: of all instances, background included, if they are known; read from the library's
+            meshes otherwise.
 
     Returns:
         What was found, in the order of the document; nothing if all is well.
     """
-    placed = {name: placed_vertices(scene, name) for name in (*scene.instances, *scene.background)}
+    if extents is None:
+        names = (*scene.instances, *scene.background)
+        extents = {name: Extent.of(placed_vertices(scene, name)) for name in names}
     issues: list[SceneIssue] = []
     for name in scene.instances:
-        issue = _bounds_issue(scene, name, placed[name])
-        if issue is not None:
-            issues.append(issue)
-        others = [p for other, p in placed.items() if other != name]
-        issue = _ground_issue(scene, name, placed[name], others)
-        if issue is not None:
-            issues.append(issue)
+        others = [extent for other, extent in extents.items() if other != name]
+        found = (
+            _bounds_issue(scene, name, extents[name]),
+            _ground_issue(scene, name, extents[name], others),
+        )
+        issues += [issue for issue in found if issue is not None]
     return tuple(issues)
 
 
@@ -94,13 +117,23 @@ def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
 
 def placed_vertices(scene: Scene, instance: str) -> Array:
     """(N, 3) vertices of an instance's surface in the scene frame [m]."""
-    entry = scene.entry(instance)
-    mesh = scene.library.path(entry.surface or entry.mesh)
-    try:
-        p_OV = read_vertices(mesh)
-    except (OSError, ValueError) as error:
-        raise scene.library.damaged(mesh) from error
+    p_OV = surface_vertices(scene.library, scene.instance(instance).object)
     return transform_points(scene.X_SO(instance), p_OV)
+
+
+def surface_vertices(library: ObjectLibrary, name: str) -> Array:
+    """(N, 3) vertices of an object's surface in the object frame [m].
+
+    Raises:
+        UnknownNameError: there is no such object, or its mesh file is missing.
+        MeshError: the mesh file is damaged.
+    """
+    entry = library.entry(name)
+    mesh = library.path(entry.surface or entry.mesh)
+    try:
+        return read_vertices(mesh)
+    except (OSError, ValueError) as error:
+        raise library.damaged(mesh) from error
 
 
 def read_vertices(mesh: Path) -> Array:
@@ -116,14 +149,14 @@ def read_vertices(mesh: Path) -> Array:
     return p_OV
 
 
-def _bounds_issue(scene: Scene, name: str, p_SV: Array) -> SceneIssue | None:
-    size = np.array(scene.board.size)
-    lower, upper = p_SV[:, :2].min(axis=0), p_SV[:, :2].max(axis=0)
+def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
+    size = scene.board.size
+    lower, upper = extent.low, extent.high
     beyond = {
-        "left": -lower[0],
-        "right": upper[0] - size[0],
-        "lower": -lower[1],
-        "upper": upper[1] - size[1],
+        "left": float(-lower[0]),
+        "right": float(upper[0] - size[0]),
+        "lower": float(-lower[1]),
+        "upper": float(upper[1] - size[1]),
     }
     sides = sorted((s for s in beyond if beyond[s] > IN_BOUNDS_TOLERANCE), key=lambda s: -beyond[s])
     if not sides:
@@ -131,20 +164,22 @@ def _bounds_issue(scene: Scene, name: str, p_SV: Array) -> SceneIssue | None:
     where = " and ".join(f"{_mm(beyond[s])} over the {s} edge" for s in sides)
     board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
     hint = ""
-    if np.abs(scene.X_SO(name)[:3, 3]).max() >= MILLIMETRES_SUSPECTED:
+    if np.abs(scene.instance(name).X_SO.translation).max() >= MILLIMETRES_SUSPECTED:
         hint = "; translations are in metres"
     return SceneIssue(
         instance=name,
         kind="out_of_bounds",
-        amount=float(beyond[sides[0]]),
+        amount=beyond[sides[0]],
         message=f"{name!r} is out of bounds: {where} of the board ({board}){hint}",
     )
 
 
-def _ground_issue(scene: Scene, name: str, p_SV: Array, others: list[Array]) -> SceneIssue | None:
-    lowest = float(p_SV[:, 2].min())
+def _ground_issue(
+    scene: Scene, name: str, extent: Extent, others: Iterable[Extent]
+) -> SceneIssue | None:
+    lowest = float(extent.low[2])
     if lowest < -TOUCH_TOLERANCE:
-        height = round(float(scene.X_SO(name)[2, 3]) - lowest, 4) + 0.0
+        height = round(scene.instance(name).X_SO.translation[2] - lowest, 4) + 0.0
         return SceneIssue(
             instance=name,
             kind="in_ground",
@@ -152,7 +187,7 @@ def _ground_issue(scene: Scene, name: str, p_SV: Array, others: list[Array]) -> 
             message=f"{name!r} is in the ground: it reaches {_mm(-lowest)} below the board;"
             f" z = {height:.4f} would put it on top",
         )
-    if lowest > HOVER_TOLERANCE and not any(_may_support(other, p_SV) for other in others):
+    if lowest > HOVER_TOLERANCE and not any(_may_support(other, extent) for other in others):
         return SceneIssue(
             instance=name,
             kind="hovering",
@@ -162,11 +197,11 @@ def _ground_issue(scene: Scene, name: str, p_SV: Array, others: list[Array]) -> 
     return None
 
 
-def _may_support(below: Array, above: Array) -> bool:
-    """Whether the bounding boxes let `above` rest on `below`; both (N, 3) points."""
-    overlap = (below.min(axis=0) < above.max(axis=0)) & (above.min(axis=0) < below.max(axis=0))
-    lowest = above[:, 2].min()
-    reach = below[:, 2].min() < lowest < below[:, 2].max() + SUPPORT_TOLERANCE
+def _may_support(below: Extent, above: Extent) -> bool:
+    """Whether the bounding boxes let `above` rest on `below`."""
+    overlap = (below.low < above.high) & (above.low < below.high)
+    lowest = above.low[2]
+    reach = below.low[2] < lowest < below.high[2] + SUPPORT_TOLERANCE
     return bool(overlap[:2].all() and reach)
 
 

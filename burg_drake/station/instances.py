@@ -33,9 +33,7 @@ def add_instance(
     """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-        raise InvalidInputError(
-            f"{scene.path}: instance name {name!r} is taken by the station; choose another"
-        )
+        raise taken_name(scene, name)
     path = scene.library.path(scene.entry(name).sdf)
     try:
         with held_remarks() as remarks:
@@ -54,6 +52,13 @@ def add_instance(
         logging.getLogger("drake").handle(remark)
     plant.RenameModelInstance(model, name)
     return body
+
+
+def taken_name(scene: Scene, name: str) -> InvalidInputError:
+    """The error of an instance whose name is one of the station's."""
+    return InvalidInputError(
+        f"{scene.path}: instance name {name!r} is taken by the station; choose another"
+    )
 
 
 def _require_inertia(body: RigidBody, listed: MassProperties) -> None:

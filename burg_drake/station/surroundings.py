@@ -86,13 +86,18 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
     bodies = {}
     for name, box in station.document.background.items():
         if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-            raise InvalidInputError(
-                f"{station.path}: background.{name}: the name is taken by the scene or the robot;"
-                " choose another"
-            )
+            raise taken_obstacle(station, name)
         size = np.array(box.size)
         bodies[name] = _add_box(plant, name, box.X_WB.matrix(), size, friction, OBSTACLE_COLOR)
     return bodies
+
+
+def taken_obstacle(station: Station, name: str) -> InvalidInputError:
+    """The error of an obstacle whose name the scene or the robot has, too."""
+    return InvalidInputError(
+        f"{station.path}: background.{name}: the name is taken by the scene or the robot;"
+        " choose another"
+    )
 
 
 def _add_box(

@@ -1,0 +1,206 @@
+"""Whether scenes can stand on a station, asked again and again while one is composed.
+
+Only what changed since the last question costs time: the robot is looked at once, each object once,
+and what is added is registered beside what is there.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform
+from scipy.spatial import ConvexHull, QhullError
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array, check_pose, transform_points
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.scene.validate import (
+    TOUCH_TOLERANCE,
+    Extent,
+    SceneIssue,
+    surface_vertices,
+    validate_scene,
+)
+from burg_drake.station.body_shapes import object_shapes, surrounding_shapes
+from burg_drake.station.collision_world import CollisionWorld
+from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
+from burg_drake.station.instances import taken_name
+from burg_drake.station.robot import ROBOT_MODELS
+from burg_drake.station.station import Station
+from burg_drake.station.surroundings import taken_obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """An instance as it was last looked at.
+
+    Attributes:
+        instance: of the document.
+        X_WO: pose in the world.
+        extent: the box around its surface, along the axes of the board.
+    """
+
+    instance: Instance
+    X_WO: RigidTransform
+    extent: Extent
+
+
+class SceneCheck:
+    """Says of scenes of one library what is wrong with them on a station.
+
+    Verdicts are those of `burg_drake.station.check.check_scene`. Overlaps are those of the convex
+    shapes that objects touch others with; the arm is in its home posture. To be used from one
+    thread at a time.
+
+    Args:
+        station: where the scenes stand.
+        library: the objects of the scenes.
+
+    Raises:
+        InvalidInputError, UnknownNameError: the station's robot cannot be built.
+    """
+
+    def __init__(self, station: Station, library: ObjectLibrary) -> None:
+        self._station, self._library = station, library
+        self._X_WS = station.document.X_WS.matrix()
+        self._around = _empty_station(station, library)
+        self._parts = _robot_parts(self._around)
+        fixed = surrounding_shapes(self._around)
+        self._rank = {name: i for i, name in enumerate(fixed)}
+        shapes = partial(object_shapes, library, packages=station.packages)
+        self._world = CollisionWorld(fixed, shapes)
+        self._corners: dict[str, Array] = {}
+        self._placed: dict[str, _Placed] = {}
+
+    def issues(self, scene: Scene) -> tuple[SceneIssue, ...]:
+        """What is wrong with a scene: objects out of bounds, in the ground, hovering, beside the
+        table, or overlapping.
+
+        Args:
+            scene: of this library.
+
+        Returns:
+            What was found, in the order of the document; nothing if all is well.
+
+        Raises:
+            UnknownNameError: an object is not in the library, or one of its files is missing.
+            MeshError: the surface of an object is damaged.
+            InvalidInputError: the scene is of another library, a pose is not of finite numbers, a
+                name is taken by the station, or a model cannot be loaded.
+        """
+        self._place(scene)
+        placed = self._placed
+        issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
+        buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
+        beside = (self._table_issue(name) for name in scene.instances)
+        issues += [issue for issue in beside if issue is not None]
+        order = {name: i for i, name in enumerate((*scene.instances, *scene.background))}
+        rank = order | {name: len(order) + i for name, i in self._rank.items()}
+        overlaps = self._world.overlaps()
+        pairs = {tuple(sorted(pair, key=rank.__getitem__)): overlaps[pair] for pair in overlaps}
+        for (a, b), depth in sorted(pairs.items(), key=lambda item: [rank[n] for n in item[0]]):
+            if depth <= TOUCH_TOLERANCE or a not in scene.instances:
+                continue
+            if b == "table" and a in buried:
+                continue
+            message = _overlap(a, b, depth, self._parts, self._station.path)
+            issues.append(
+                SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
+            )
+        return tuple(issues)
+
+    def _place(self, scene: Scene) -> None:
+        """Takes over where the instances of a scene stand."""
+        if scene.library is not self._library and scene.library != self._library:
+            raise InvalidInputError(
+                f"{scene.path}: the scene's library is {scene.library.root}; it is checked with"
+                f" {self._library.root}"
+            )
+        self._require_free_names(scene)
+        instances = {**scene.instances, **scene.background}
+        known = self._placed
+        self._placed = {
+            name: known[name]
+            if name in known and known[name].instance == instance
+            else self._look_at(scene, name, instance)
+            for name, instance in instances.items()
+        }
+        self._world.place(
+            {name: (one.instance.object, one.X_WO) for name, one in self._placed.items()}
+        )
+
+    def _look_at(self, scene: Scene, name: str, instance: Instance) -> _Placed:
+        X_SO = check_pose(instance.X_SO.matrix(), f"{scene.path}: X_SO of {name!r}")
+        extent = Extent.of(transform_points(X_SO, self._surface(instance.object)))
+        return _Placed(instance, RigidTransform(self._X_WS @ X_SO), extent)
+
+    def _surface(self, name: str) -> Array:
+        """(N, 3) points of an object in its frame [m] that its surface lies between."""
+        if name not in self._corners:
+            p_OV = surface_vertices(self._library, name)
+            with suppress(QhullError, ValueError):  # of flat surfaces: then all points remain
+                p_OV = p_OV[ConvexHull(p_OV).vertices]
+            self._corners[name] = p_OV
+        return self._corners[name]
+
+    def _require_free_names(self, scene: Scene) -> None:
+        for name in (*scene.instances, *scene.background):
+            if name in self._station.document.background:
+                raise taken_obstacle(self._station, name)
+            if name in ROBOT_MODELS or self._around.plant.HasModelInstanceNamed(name):
+                raise taken_name(scene, name)
+
+    def _table_issue(self, name: str) -> SceneIssue | None:
+        """Whether the centre of mass is beside the table, so that the object cannot stay."""
+        table, placed = self._station.document.table, self._placed[name]
+        entry = self._library.entry(placed.instance.object)
+        p_WOcm = placed.X_WO @ np.array(entry.mass_properties.center_of_mass)
+        beyond = float((np.abs(p_WOcm[:2] - table.center) - np.array(table.size[:2]) / 2).max())
+        if beyond <= 0.0:
+            return None
+        return SceneIssue(
+            instance=name,
+            kind="out_of_bounds",
+            amount=beyond,
+            message=(
+                f"{name!r} stands {beyond * 1e3:.0f} mm beside the table of station"
+                f" {self._station.name!r}"
+            ),
+        )
+
+
+def _empty_station(station: Station, library: ObjectLibrary) -> StationDiagram:
+    """The station with nothing on it; the arm is in its home posture."""
+    document = SceneDocument(name="empty_board", library=str(library.root))
+    robot: Robot = "arm" if station.document.arm is not None else "none"
+    return build_station_diagram(Scene(document, library, library.root), station, robot=robot)
+
+
+def _robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
+    """Of each body of the robot, by name: what to say of it, and what of the station puts it
+    there."""
+    arm, plant = station_diagram.station.document.arm, station_diagram.plant
+    if arm is None:
+        return {}
+    base = plant.GetFrameByName(arm.base, plant.GetModelInstanceByName("arm")).body()
+    still = {body.index() for body in plant.GetBodiesWeldedTo(base)}
+    return {
+        plant.get_body(index).name(): ("where the arm stands", "arm.X_WA")
+        if index in still
+        else ("of the arm in its home posture", "arm.home")
+        for index in station_diagram.robot_bodies
+    }
+
+
+def _overlap(a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path) -> str:
+    """One line about two bodies that overlap; a is an instance."""
+    by = f"by {depth * 1e3:.1f} mm"
+    if b not in parts:
+        return f"{a!r} and {b!r} overlap {by}; move them apart"
+    what, key = parts[b]
+    return f"{a!r} overlaps {b!r} {what} {by}; move {a!r}, or change {key} in {path}"
