@@ -1,0 +1,50 @@
+"""Colours of the setup page: what is well, what collides, what leaves the board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Rgb = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class StatusLook:
+    """How a status of an instance is shown.
+
+    Attributes:
+        color: red, green, blue as bytes.
+        words: for people.
+    """
+
+    color: Rgb
+    words: str
+
+    @property
+    def hex(self) -> str:
+        """The colour as HTML has it."""
+        return hex_color(self.color)
+
+
+LOOKS: dict[str, StatusLook] = {
+    "ok": StatusLook((46, 160, 67), "ok"),
+    "collision": StatusLook((214, 40, 40), "in collision"),
+    "out_of_bounds": StatusLook((236, 90, 180), "out of bounds"),
+    "in_ground": StatusLook((140, 80, 30), "in the ground"),
+    "hovering": StatusLook((64, 140, 230), "hovering"),
+}
+"""By status: green, red and pink as in the tool that goes with the paper (Rudorfer et al., 2022)."""
+
+OTHER = StatusLook((120, 120, 120), "not checked")
+SELECTED: Rgb = (25, 110, 255)
+FIXED: Rgb = (150, 155, 162)
+"""Of background objects and obstacles."""
+
+
+def look_of(status: str) -> StatusLook:
+    """How a status is shown."""
+    return LOOKS.get(status, OTHER)
+
+
+def hex_color(color: Rgb) -> str:
+    """A colour as HTML has it."""
+    return "#" + "".join(f"{channel:02x}" for channel in color)
