@@ -1,0 +1,175 @@
+"""The panel of what is selected: its name, numbers for its pose, and what can be done with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from burg_drake.compose.moving import Move, Turn
+from burg_drake.compose.placing import Delete, Duplicate, Rename, SetFixed
+from burg_drake.compose.view import View
+from burg_drake.core.frames import Array, rotation_from_rpy, rpy_from_rotation
+from burg_drake.ui.buttons import quiet_button
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_text import all_of, box, dot, quiet, title
+from burg_drake.ui.status_colors import look_of
+
+QUARTER_DEG = 90.0
+DECIMALS_MM, DECIMALS_DEG = 2, 2
+LARGEST_MM = 100_000.0
+
+
+class ObjectPanel:
+    """Shows the selection and edits it.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        self._text = gui.add_html("")
+        self._one = gui.add_folder(None)
+        with self._one:
+            self._name = actions.typed(gui.add_text("Name", ""), self._rename)
+            self._fixed = actions.chosen(
+                gui.add_checkbox(
+                    "Background", False, hint="It stays where it is when the scene is simulated"
+                ),
+                self._fix,
+            )
+            self._planar = _Numbers(gui, actions, free=False)
+            self._free = _Numbers(gui, actions, free=True)
+        self._restrict = actions.chosen(
+            gui.add_checkbox(
+                "x, y, yaw only",
+                True,
+                hint="Objects keep their height and tilt while they are moved; without it they are"
+                " free, and have handles for all six directions",
+            ),
+            lambda planar: actions.session.restrict_movement(planar),
+        )
+        self._some = gui.add_folder(None)
+        with self._some:
+            self._buttons(gui, actions)
+
+    def show(self, view: View) -> None:
+        """Brings the panel to a view."""
+        names = view.selection
+        self._restrict.value = view.planar
+        self._one.visible = len(names) == 1
+        self._some.visible = bool(names)
+        self._text.content = _about(view)
+        if len(names) == 1:
+            self._name.value = names[0]
+            self._fixed.value = view.instances[names[0]] in view.document.background
+            for numbers, shown in ((self._planar, view.planar), (self._free, not view.planar)):
+                numbers.show(view.X_SO(names[0]), shown)
+
+    def _rename(self, new: str) -> None:
+        names = self._actions.session.view.selection
+        if len(names) == 1:
+            self._actions.session.do(Rename(names[0], new))
+
+    def _fix(self, fixed: bool) -> None:
+        self._actions.session.do(SetFixed(self._actions.session.view.selection, fixed))
+
+    def _buttons(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        icon, selected = viser.Icon, actions.with_selection
+        actions.clicked(
+            quiet_button(gui, "−90°", width=3, hint="Turn clockwise"),
+            selected(lambda names: Turn(names, -QUARTER_DEG)),
+        )
+        actions.clicked(
+            quiet_button(gui, "+90°", width=3, hint="Turn counter-clockwise"),
+            selected(lambda names: Turn(names, QUARTER_DEG)),
+        )
+        actions.clicked(
+            quiet_button(gui, "Copy", width=3, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
+            selected(Duplicate),
+        )
+        actions.clicked(
+            quiet_button(gui, "Delete", width=3, icon=icon.TRASH, hint="Delete (Del)"),
+            selected(Delete),
+        )
+
+
+class _Numbers:
+    """Fields of a pose: x, y and yaw, or all six."""
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, *, free: bool) -> None:
+        self._actions, self._free = actions, free
+        limit = LARGEST_MM
+        if free:
+            self._position: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.01)
+            self._angles: Any = gui.add_vector3("roll, pitch, yaw [°]", (0.0, 0.0, 0.0), step=0.01)
+        else:
+            self._position = gui.add_vector2("x, y [mm]", (0.0, 0.0), step=0.01)
+            self._angles = gui.add_number("yaw [°]", 0.0, step=0.01, min=-limit, max=limit)
+        for field in (self._position, self._angles):
+            actions.typed(field, lambda value: self._move())
+
+    def show(self, X_SO: Array, visible: bool) -> None:
+        """Shows a pose (4, 4), or nothing."""
+        position, angles = _numbers(X_SO)
+        self._position.visible = self._angles.visible = visible
+        self._position.value = position if self._free else position[:2]
+        self._angles.value = angles if self._free else angles[2]
+
+    def _move(self) -> None:
+        """Moves the selected object to what the fields say; fields that were left alone keep its
+        exact numbers."""
+        session = self._actions.session
+        if len(session.view.selection) != 1:
+            return
+        (name,) = session.view.selection
+        X_SO = session.view.X_SO(name)
+        shown_mm, shown_deg = _numbers(X_SO)
+        typed_mm = (*self._position.value, shown_mm[2])[:3]
+        typed_deg = self._angles.value if self._free else (*shown_deg[:2], self._angles.value)
+        exact_mm = 1e3 * X_SO[:3, 3]
+        exact_deg = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
+        p_mm = [e if t == s else t for t, s, e in zip(typed_mm, shown_mm, exact_mm, strict=True)]
+        rpy = [e if t == s else t for t, s, e in zip(typed_deg, shown_deg, exact_deg, strict=True)]
+        R_SO = X_SO[:3, :3]
+        if tuple(typed_deg) != shown_deg:
+            R_SO = rotation_from_rpy(np.deg2rad(rpy))
+        session.do(Move({name: _pose(R_SO, p_mm)}))
+
+
+def _pose(R_SO: Array, p_mm: list[float]) -> Array:
+    X_SO = np.eye(4)
+    X_SO[:3, :3], X_SO[:3, 3] = R_SO, 1e-3 * np.array(p_mm)
+    return X_SO
+
+
+def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """x, y, z [mm] and roll, pitch, yaw [degrees], rounded for people."""
+    position = tuple((np.round(1e3 * X_SO[:3, 3], DECIMALS_MM) + 0.0).tolist())
+    angles = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
+    return position, tuple((np.round(angles, DECIMALS_DEG) + 0.0).tolist())
+
+
+def _about(view: View) -> str:
+    names = view.selection
+    if not names:
+        return all_of(
+            box(
+                quiet(
+                    "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag beside"
+                    " objects selects all in a rectangle."
+                )
+            )
+        )
+    if len(names) > 1:
+        return all_of(box(title(f"{len(names)} objects"), quiet(", ".join(names))))
+    status = view.status.get(names[0], "ok")
+    entry = view.library.objects.get(view.instances[names[0]].object)
+    kind = view.instances[names[0]].object
+    if entry is not None and not entry.is_fixed:
+        kind = f"{kind}, {1e3 * entry.mass:.0f} g"
+    look = look_of(status)
+    return all_of(box(title(names[0]), quiet(kind), dot(look.hex), look.words))
