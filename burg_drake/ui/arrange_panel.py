@@ -29,7 +29,6 @@ class ArrangePanel:
         self._gui, self._actions = gui, actions
         self._folder = gui.add_folder("Arrange")
         with self._folder:
-            self._contact()
             self._grid = gui.add_number(
                 "Grid [mm]", GRID_MM, min=FINEST_MM, max=COARSEST_MM, step=0.1
             )
@@ -56,19 +55,6 @@ class ArrangePanel:
         self._folder.visible = bool(view.selection)
         self._several.visible = len(view.selection) > 1
 
-    def _contact(self) -> None:
-        from burg_drake.compose.contact import PutDown, SnapToContact
-
-        self._gui.add_html(all_of(box(head("Move until it touches"))))
-        for label, direction in (("←", "-x"), ("→", "x"), ("↓", "-y"), ("↑", "y")):
-            self._button(
-                label,
-                2,
-                "towards the left right front back".split()[("-x", "x", "-y", "y").index(direction)],
-                lambda names, d=direction: SnapToContact(names, d),
-            )
-        self._button("Put down", 4, "Lower it until it stands", PutDown)
-
     def _alignment(self) -> None:
         self._gui.add_html(all_of(box(head("Align"))))
         icon = viser.Icon
@@ -80,15 +66,9 @@ class ArrangePanel:
             ("center_y", icon.LAYOUT_ALIGN_MIDDLE, "middles, in a row"),
             ("bottom", icon.LAYOUT_ALIGN_BOTTOM, "near edges"),
         ):
-            self._button(
-                "", 2, f"Align {what}", lambda names, e=edge: Align(names, e), icon=drawn
-            )
-        self._button(
-            "Even gaps ↔", 6, "Distribute along x", lambda names: Distribute(names, "x")
-        )
-        self._button(
-            "Even gaps ↕", 6, "Distribute along y", lambda names: Distribute(names, "y")
-        )
+            self._button("", 2, f"Align {what}", lambda names, e=edge: Align(names, e), icon=drawn)
+        self._button("Even gaps ↔", 6, "Distribute along x", lambda names: Distribute(names, "x"))
+        self._button("Even gaps ↕", 6, "Distribute along y", lambda names: Distribute(names, "y"))
 
     def _button(self, label: str, width: int, hint: str, command: Any, **options: Any) -> None:
         button = quiet_button(self._gui, label, width=width, hint=hint, **options)

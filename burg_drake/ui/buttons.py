@@ -1,7 +1,7 @@
 """Buttons of a panel: several in a row, with pictures, and few that stand out.
 
-viser sets one button a row. A mark in a button's icon tells the style sheet (`page.css`) how wide it
-is and how it looks.
+viser sets one button a row. A mark in a button's icon tells the style sheet (`page.css`) how wide
+it is and how it looks.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import viser
@@ -12,7 +13,7 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.ui.buttons import picture_button, show_picture
 from burg_drake.ui.object_pictures import ObjectPictures
 from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_text import box, quiet, title
+from burg_drake.ui.panel_text import all_of, box, quiet, title
 from burg_drake.visualization.markup import element
 
 
@@ -32,7 +33,9 @@ class LibraryPanel:
         self._buttons: dict[str, Any] = {}
         self._title = gui.add_html("")
         self._search = actions.chosen(
-            gui.add_text("Search", "", hint="Shows objects whose name or description has all words"),
+            gui.add_text(
+                "Search", "", hint="Shows objects whose name or description has all words"
+            ),
             lambda words: self._filter(words),
             key="search",
         )
@@ -54,6 +57,9 @@ class LibraryPanel:
         """Shows the pictures that are there by now."""
         self._draw()
 
+    def _add(self, name: str) -> None:
+        self._actions.session.do(AddObject(name))
+
     def _fill(self, library: ObjectLibrary) -> None:
         for button in self._buttons.values():
             button.remove()
@@ -63,9 +69,7 @@ class LibraryPanel:
                 hint = entry.description or name
                 weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
                 button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
-                self._actions.clicked(
-                    button, lambda name=name: self._actions.session.do(AddObject(name))
-                )
+                self._actions.clicked(button, partial(self._add, name))
                 self._buttons[name] = button
         self._filter(self._search.value)
 
@@ -86,10 +90,12 @@ class LibraryPanel:
         total = len(library.objects)
         count = f"{total} objects" if found == total else f"{found} of {total} objects"
         why = self._pictures.missing if self._pictures else ""
-        content = box(
-            title(library.name),
-            element("span", f" {count}; click one to add it", class_="bd-quiet"),
-            quiet(why) if why else None,
+        content = all_of(
+            box(
+                title(library.name),
+                element("span", f" {count}; click one to add it", class_="bd-quiet"),
+                quiet(why) if why else None,
+            )
         )
         if self._title.content != content:
             self._title.content = content

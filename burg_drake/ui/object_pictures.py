@@ -106,14 +106,14 @@ class ObjectPictures:
         process, connection = self._worker
         try:
             connection.send((str(self.library.root), *wanted, SIZE))
-            png, error = connection.recv()
+            png, why = connection.recv()
         except (EOFError, OSError) as error:
             if self._closed:
                 raise BurgError("the page was closed") from error
             self._worker = None
             raise MissingDependencyError(cause_of_death(process)) from error
         if png is None:
-            raise BurgError(error)
+            raise BurgError(why)
         return np.frombuffer(png, dtype=np.uint8)
 
     def _end_worker(self) -> None:

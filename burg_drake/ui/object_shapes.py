@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,7 @@ from burg_drake.core.damaged import without_warnings
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import Array
 from burg_drake.objects.library import ObjectLibrary
+from burg_drake.visualization.color_map import linear_light
 
 ROUGHNESS = 0.75
 """Of all surfaces: paper, paint and plastic."""
@@ -79,7 +79,7 @@ def _read(library: ObjectLibrary, name: str) -> ObjectShape:
         raise MeshError(f"{path} has no faces")
     plain.merge_vertices(merge_tex=True, merge_norm=True)
     return ObjectShape(
-        bytes(io.BytesIO(glb).getvalue()),
+        bytes(glb),
         np.asarray(plain.vertices, dtype=np.float32),
         np.asarray(plain.faces, dtype=np.uint32),
     )
@@ -93,6 +93,9 @@ def _calm(part: trimesh.Trimesh) -> None:
     if hasattr(material, "to_pbr"):
         material = material.to_pbr()
     material.metallicFactor, material.roughnessFactor = 0.0, ROUGHNESS
+    if material.baseColorFactor is not None:  # of colours as files have them; glTF has light
+        r, g, b, a = np.asarray(material.baseColorFactor, dtype=float) / 255.0
+        material.baseColorFactor = [*(float(linear_light(c)) for c in (r, g, b)), a]
     image = material.baseColorTexture
     if image is not None and max(image.size) > MAX_TEXTURE:
         small = image.copy()

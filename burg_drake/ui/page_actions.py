@@ -50,19 +50,15 @@ class PageActions:
         """Has a step taken."""
         self.ask(lambda: self.session.do(command), client)
 
-    def with_selection(
-        self, command: Callable[[tuple[str, ...]], Command]
-    ) -> Callable[[], None]:
+    def with_selection(self, command: Callable[[tuple[str, ...]], Command]) -> Callable[[], Any]:
         """An action that takes a step with whatever is selected when it is done."""
-        return lambda: self.session.do(command(self.session.view.selection)) and None
+        return lambda: self.session.do(command(self.session.view.selection))
 
     def clicked(self, button: Any, action: Callable[[], Any]) -> Any:
         """Has something done at each click of a button; gives the button."""
         return self.clicked_by(button, lambda client: action())
 
-    def clicked_by(
-        self, button: Any, action: Callable[[viser.ClientHandle | None], Any]
-    ) -> Any:
+    def clicked_by(self, button: Any, action: Callable[[viser.ClientHandle | None], Any]) -> Any:
         """The same, of an action that needs to know whose page it was."""
 
         @button.on_click

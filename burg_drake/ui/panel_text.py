@@ -84,12 +84,12 @@ def notice(text: str) -> Html:
     return element("div", text, class_="bd-notice")
 
 
-def picture(png: bytes | None, kind: str) -> Html:
+def picture(png: bytes | None, kind: str) -> str:
     """A picture on a button; a blank in its place if there is none (yet)."""
     if png is None:
-        return element("span", class_=kind)
+        return str(element("span", class_=kind))
     source = f"data:image/png;base64,{base64.b64encode(png).decode()}"
-    return element("img", class_=kind, src=source)
+    return str(element("img", class_=kind, src=source))
 
 
 def all_of(*children: Child) -> str:

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.core.frames import Array, make_pose, rotation_from_quaternion, transform_points, inverse
+from burg_drake.core.frames import (
+    Array,
+    inverse,
+    make_pose,
+    rotation_from_quaternion,
+    transform_points,
+)
 
 GRAZING = 0.02
 """Sine of the least angle between a ray and a plane; a flatter one would hit it anywhere."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import viser
@@ -60,6 +61,10 @@ class PosePanel:
             picture = self._pictures.get(self._object, k)
             show_picture(button, picture, chosen=k == self._chosen)
 
+    def _set(self, stable_pose: int) -> None:
+        session = self._actions.session
+        session.do(SetPose(session.view.selection, stable_pose))
+
     def _fill(self, entry: ObjectEntry | None) -> None:
         for button in self._buttons:
             button.remove()
@@ -79,9 +84,7 @@ class PosePanel:
                     hint=f"Pose {k}: {100.0 * pose.probability:.1f} % of drops end so; {tested}"
                     + ("; it can roll on" if pose.rolls else ""),
                 )
-                self._actions.clicked(
-                    button, self._actions.with_selection(lambda names, k=k: SetPose(names, k))
-                )
+                self._actions.clicked(button, partial(self._set, k))
                 self._buttons.append(button)
 
 

@@ -25,6 +25,8 @@ OUTLINE_HEIGHT = 4e-4
 THIN, THICK = 2.5, 5.0
 """Lines of outlines and of those of selected objects [pixel]."""
 MISSING: Rgb = (200, 60, 200)
+UNKNOWN_RADIUS = 0.03
+"""Of the ball in place of an object whose shape cannot be read [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +114,17 @@ class SceneView:
 
     def _add(self, name: str, shown: Shown) -> _Nodes:
         frame = self._scene.add_frame(f"{ROOT}/{name}", show_axes=False)
+        look: Any
         try:
             shape = self._shapes[shown.object]
         except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
-            look = self._scene.add_icosphere(f"{ROOT}/{name}/look", radius=0.03, color=MISSING)
-            p_OV = np.asarray(look.radius) * np.vstack([np.eye(3), -np.eye(3)])
+            look = self._scene.add_icosphere(
+                f"{ROOT}/{name}/look", radius=UNKNOWN_RADIUS, color=MISSING
+            )
+            p_OV = UNKNOWN_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
         else:
             look = self._scene.add_glb(f"{ROOT}/{name}/look", shape.glb)
-            p_OV = hull_mesh(shape.vertices).vertices
+            p_OV = hull_mesh(shape.vertices.astype(float)).vertices
         self._attach(look, name)
         outline = self._scene.add_line_segments(
             f"/outlines/{name}",
@@ -140,7 +145,8 @@ class SceneView:
         drawn = (shown.X_SO.tobytes(), shown.status, shown.selected)
         if drawn != nodes.drawn:
             nodes.drawn = drawn
-            nodes.outline.points = footprint(nodes.p_OV, shown.X_SO, OUTLINE_HEIGHT)
+            line = footprint(nodes.p_OV, shown.X_SO, OUTLINE_HEIGHT)
+            nodes.outline.points = line.astype(np.float32)
             nodes.outline.colors = np.array(_outline_color(shown), dtype=np.uint8)
             nodes.outline.thickness = THICK if shown.selected else THIN
 

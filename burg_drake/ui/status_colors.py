@@ -32,7 +32,7 @@ LOOKS: dict[str, StatusLook] = {
     "in_ground": StatusLook((140, 80, 30), "in the ground"),
     "hovering": StatusLook((64, 140, 230), "hovering"),
 }
-"""By status: green, red and pink as in the tool that goes with the paper (Rudorfer et al., 2022)."""
+"""By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022)."""
 
 OTHER = StatusLook((120, 120, 120), "not checked")
 SELECTED: Rgb = (25, 110, 255)

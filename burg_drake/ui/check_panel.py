@@ -1,0 +1,44 @@
+"""The panel of the check: what is wrong with the scene, line by line."""
+
+from __future__ import annotations
+
+import viser
+
+from burg_drake.compose.view import STATUS, View
+from burg_drake.ui.panel_text import all_of, box, dot, listing, quiet
+from burg_drake.ui.status_colors import look_of
+from burg_drake.visualization.markup import Child, element
+
+MOST = 30
+"""Lines that are shown."""
+
+
+class CheckPanel:
+    """Lists issues.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+    """
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        with gui.add_folder("Validate"):
+            self._text = gui.add_html("")
+
+    def show(self, view: View) -> None:
+        """Brings the panel to a view."""
+        text = all_of(box(*_found(view)))
+        if self._text.content != text:
+            self._text.content = text
+
+
+def _found(view: View) -> list[Child]:
+    if not view.instances:
+        return [quiet("Add objects; they are checked as they are moved.")]
+    if not view.issues:
+        return [dot(look_of("ok").hex), "All objects are on the board, free and supported."]
+    rows = [
+        element("span", dot(look_of(STATUS[issue.kind]).hex), issue.message)
+        for issue in view.issues[:MOST]
+    ]
+    more = len(view.issues) - MOST
+    return [listing(rows), quiet(f"and {more} more" if more > 0 else None)]

@@ -1,0 +1,101 @@
+"""Handles at the selection: arrows and rings that move and turn it, in the plane or freely."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from burg_drake.compose.drag import Drag
+from burg_drake.compose.view import View
+from burg_drake.core.frames import (
+    Array,
+    inverse,
+    make_pose,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
+from burg_drake.ui.page_actions import PageActions
+
+SIZE = 0.11
+"""Length of the arrows [m]."""
+
+
+class Gizmo:
+    """Shows handles at what is selected.
+
+    Args:
+        scene: of viser.
+        actions: what may be done with the session.
+    """
+
+    def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:
+        self._scene, self._actions = scene, actions
+        self._handle: viser.TransformControlsHandle | None = None
+        self._planar = True
+        self._drag: Drag | None = None
+        self._X_SGi = np.eye(4)
+        self._start: dict[str, Array] = {}
+        self.enabled = True
+
+    def show(self, view: View) -> None:
+        """Brings the handles to a view; while they are dragged they are the pointer's."""
+        if self._drag is not None and not self._drag.is_over:
+            return
+        if not view.selection or not self.enabled:
+            if self._handle is not None:
+                self._handle.visible = False
+            return
+        if self._handle is None or self._planar != view.planar:
+            self._planar = view.planar
+            self._make()
+        assert self._handle is not None
+        poses = [view.X_SO(name) for name in view.selection]
+        R_SG = np.eye(3) if len(poses) > 1 or view.planar else poses[0][:3, :3]
+        middle = np.mean([X[:3, 3] for X in poses], axis=0)
+        self._handle.position = middle
+        self._handle.wxyz = quaternion_from_rotation(R_SG)
+        self._handle.visible = True
+
+    def _make(self) -> None:
+        handle = self._scene.add_transform_controls(
+            "/gizmo",
+            scale=SIZE,
+            line_width=3.0,
+            active_axes=(True, True, not self._planar),
+            depth_test=False,
+            opacity=0.9,
+        )
+
+        @handle.on_update
+        async def _(event: Any) -> None:
+            X_SG = make_pose(
+                rotation_from_quaternion(event.target.wxyz), np.array(event.target.position)
+            )
+            if event.phase == "start":
+                self._actions.ask(lambda: self._begin(X_SG), event.client)
+            elif event.phase == "update":
+                self._actions.ask(lambda: self._move(X_SG), event.client, key="gizmo")
+            else:
+                self._actions.ask(self._end, event.client)
+
+        self._handle = handle
+
+    def _begin(self, X_SG: Array) -> None:
+        view = self._actions.session.view
+        self._X_SGi = X_SG
+        self._start = {name: view.X_SO(name) for name in view.selection}
+        self._drag = self._actions.session.drag(view.selection)
+
+    def _move(self, X_SG: Array) -> None:
+        if self._drag is None or self._drag.is_over:
+            return
+        X = X_SG @ inverse(self._X_SGi)
+        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()})
+
+    def _end(self) -> None:
+        drag, self._drag = self._drag, None
+        if drag is not None and not drag.is_over:
+            drag.end()
+        self.show(self._actions.session.view)

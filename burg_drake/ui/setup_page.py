@@ -1,0 +1,187 @@
+"""The setup page: composes a scene in the browser.
+
+It only puts together what the other files of this room show, and passes every view of the session
+on to all of them; whatever is decided is decided by the session.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from burg_drake.compose.session import ComposeSession
+from burg_drake.compose.view import View
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.ui.arrange_panel import ArrangePanel
+from burg_drake.ui.board_panel import BoardPanel
+from burg_drake.ui.board_view import BoardView
+from burg_drake.ui.check_panel import CheckPanel
+from burg_drake.ui.display_panel import DisplayPanel
+from burg_drake.ui.file_panel import FilePanel
+from burg_drake.ui.fill_panel import FillPanel
+from burg_drake.ui.gizmo import Gizmo
+from burg_drake.ui.key_calls import selection_calls
+from burg_drake.ui.library_panel import LibraryPanel
+from burg_drake.ui.object_drags import ObjectDrags
+from burg_drake.ui.object_panel import ObjectPanel
+from burg_drake.ui.object_pictures import ObjectPictures
+from burg_drake.ui.object_shapes import ObjectShapes
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_text import style
+from burg_drake.ui.picking import Picking
+from burg_drake.ui.pose_panel import PosePanel
+from burg_drake.ui.scene_view import SceneView, Shown
+from burg_drake.ui.shortcuts import Call, register, show_overlay
+from burg_drake.ui.summary_panel import SummaryPanel
+from burg_drake.ui.views import begin_with
+
+LEFT_WIDTH, RIGHT_WIDTH = 290, 330
+"""Of the panels [pixel]."""
+BLUE = (34, 139, 230)
+
+
+class SetupPage:
+    """A page on a session.
+
+    Args:
+        server: viser's, with nothing on it yet; see `door.serve`.
+        session: the scene.
+
+    Attributes:
+        actions: what pages ask for, and the queue in which it is done.
+    """
+
+    def __init__(self, server: viser.ViserServer, session: ComposeSession) -> None:
+        self.actions = PageActions(server, session)
+        self._server, self._session = server, session
+        view = session.view
+        self._pictures = self._pictures_of(view.library)
+        self._shapes = ObjectShapes(view.library)
+        self._set_stage(view)
+        self._board = BoardView(server.scene, session.station)
+        self._drags = ObjectDrags(self.actions)
+        self._picking = Picking(server.scene, self.actions)
+        self._scene = SceneView(server.scene, self._shapes, self._attach)
+        self._gizmo = Gizmo(server.scene, self.actions)
+        self._build()
+        self.actions.on_refused = self._refresh
+        self._unsubscribe = session.on_change(lambda view: self._changed())
+        server.on_client_disconnect(self._gone)
+        self._refresh()
+
+    def close(self) -> None:
+        """Finishes what was asked for, and lets go of the session."""
+        self._unsubscribe()
+        self.actions.queue.close()
+        self._pictures.close()
+
+    def _set_stage(self, view: View) -> None:
+        scene, gui = self._server.scene, self._server.gui
+        scene.set_up_direction("+z")
+        scene.world_axes.visible = False
+        gui.configure_theme(
+            show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
+        )
+        gui.set_panel_label("Setup")
+        begin_with(self._server, view.document.board)
+
+    def _build(self) -> None:
+        gui, actions = self._server.gui, self.actions
+        left = gui.add_panel()
+        with left.add_tab("Library", viser.Icon.PACKAGE):
+            gui.add_html(style())
+            self._library = LibraryPanel(gui, actions)
+        left.dock_left()
+        left.set_width(LEFT_WIDTH)
+        gui.add_html(style())
+        self._summary = SummaryPanel(gui, actions)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Object", viser.Icon.CUBE):
+            self._object = ObjectPanel(gui, actions)
+            self._poses = PosePanel(gui, actions)
+            self._arrange = ArrangePanel(gui, actions)
+        with tabs.add_tab("Scene", viser.Icon.LAYOUT_GRID):
+            self._board_panel = BoardPanel(gui, actions)
+            self._fill = FillPanel(gui, actions)
+            self._files = FilePanel(gui, actions)
+        with tabs.add_tab("Check", viser.Icon.CHECKLIST):
+            self._check = CheckPanel(gui)
+        with tabs.add_tab("View", viser.Icon.EYE):
+            self._display = DisplayPanel(gui, actions, self._refresh)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(RIGHT_WIDTH)
+        register(gui, actions, self._calls())
+
+    def _calls(self) -> dict[str, Call]:
+        """What keys do; see `shortcuts`."""
+
+        def anywhere(action: Callable[[], Any]) -> Call:
+            return lambda client: action()
+
+        calls = selection_calls(self._session)
+        return {name: anywhere(action) for name, action in calls.items()} | {
+            "save": self._files.save,
+            "snap": anywhere(self._arrange.snap),
+            "top": self._display.look_from_above,
+            "front": self._display.look_from_front,
+            "colors": anywhere(self._display.next_colors),
+            "help": show_overlay,
+        }
+
+    def _attach(self, handle: Any, name: str) -> None:
+        self._drags.attach(handle, name)
+        self._picking.attach(handle, name)
+
+    def _pictures_of(self, library: ObjectLibrary) -> ObjectPictures:
+        def ready(wanted: object) -> None:
+            self.actions.ask(self._draw_pictures, key="pictures", after=0.1)
+
+        return ObjectPictures(library, ready)
+
+    def _draw_pictures(self) -> None:
+        with self._server.atomic():
+            self._library.draw()
+            self._poses.draw()
+
+    def _changed(self) -> None:
+        self.actions.ask(self._refresh, key="refresh")
+
+    def _refresh(self) -> None:
+        """Brings everything to the session's view of now."""
+        view = self._session.view
+        if view.library is not self._shapes.library:
+            self._pictures.close()
+            self._pictures = self._pictures_of(view.library)
+            self._shapes = ObjectShapes(view.library)
+            self._scene.use(self._shapes)
+        with self._server.atomic():
+            self._board.show(view.document.board, markers=self._display.markers)
+            self._scene.show(_shown(view), self._display.coloring)
+            self._gizmo.enabled = self._display.handles
+            self._gizmo.show(view)
+            for panel in (self._summary, self._object, self._arrange, self._check, self._fill):
+                panel.show(view)
+            self._board_panel.show(view)
+            self._files.show(view)
+            self._library.show(view, self._pictures)
+            self._poses.show(view, self._pictures)
+        self._server.flush()
+
+    async def _gone(self, client: viser.ClientHandle) -> None:
+        self._drags.drop(client.client_id)
+
+
+def _shown(view: View) -> dict[str, Shown]:
+    fixed = {id(instance) for instance in view.document.background}
+    return {
+        name: Shown(
+            instance.object,
+            view.X_SO(name),
+            view.status.get(name, "ok"),
+            name in view.selection,
+            id(instance) in fixed,
+        )
+        for name, instance in view.instances.items()
+    }
