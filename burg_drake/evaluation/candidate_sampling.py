@@ -90,7 +90,7 @@ def _sampled_scene(
     settings: SamplingSettings,
     names: tuple[str, ...],
 ) -> Iterator[tuple[str, GraspSet]]:
-    draw = _Sampler(scene.library, station, n, seed, settings)
+    draw = ObjectSampler(scene.library, station, n, seed, settings)
     screen = None if settings.blind else _scene_screen(scene, station)
     found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
     for name in names:
@@ -150,7 +150,7 @@ def _sampled_library(
 ) -> Iterator[tuple[str, GraspSet]]:
     from burg_drake.grasping.clearance import hand_clearance_alone
 
-    draw = _Sampler(library, station, n, seed, settings)
+    draw = ObjectSampler(library, station, n, seed, settings)
     for name in names:
         if settings.blind:
             yield name, draw(name, ())
@@ -159,7 +159,7 @@ def _sampled_library(
             yield name, draw.clear(name, (), screen, name, np.eye(4))
 
 
-class _Sampler:
+class ObjectSampler:
     """Samples on objects of one library with the same settings."""
 
     def __init__(

@@ -1,0 +1,141 @@
+"""How many grasps of each object of a scene are clear and reachable, and what is in the way of the
+others: what a page tells while a scene is composed, and what sampled scenes are accepted by.
+
+Every object brings the same grasps to every scene, those that hand and object allow when it stands
+on the table alone (`object_grasps`), so that counts before and after a move compare. Verdicts are
+those of `evaluation.reach`: the same screen, the same arm.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.evaluation.instance_names import chosen_instances
+from burg_drake.evaluation.object_grasps import ObjectGrasps, object_grasps
+from burg_drake.evaluation.screens import arm_reach, hand_alone
+from burg_drake.motion.verdict import Reach
+from burg_drake.scene.scene import Scene
+from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.station.station import Station
+
+THE_ARM = "the arm"
+"""Stands among what is in the way for the arm's own limits: its range, its joints, its links among
+each other. No instance goes by a name with a space."""
+
+
+@dataclass(frozen=True)
+class GraspCount:
+    """What becomes of the grasps of one object.
+
+    Attributes:
+        sampled: grasps that hand and object allow when it stands on the table alone.
+        clear: those at which the open hand overlaps nothing.
+        reachable: clear ones that the arm can execute, all the way; None if it was not asked.
+        in_the_way: of the others, numbers by what is in the way, the most first: instances,
+            obstacles of the station, `table`, or `THE_ARM`. Where several things are, the one
+            counts that would be in the way in an emptier scene, too.
+        note: why fewer grasps were sampled than asked, in words; "" if not fewer were.
+    """
+
+    sampled: int
+    clear: int
+    reachable: int | None
+    in_the_way: Mapping[str, int]
+    note: str = ""
+
+    @property
+    def good(self) -> int:
+        """Reachable grasps; clear ones where no arm was asked."""
+        return self.clear if self.reachable is None else self.reachable
+
+
+def count_grasps(
+    scene: Scene,
+    station: Station,
+    *,
+    only: Iterable[str] | None = None,
+    grasps_per_object: int = 50,
+    reach: bool = True,
+    motion: GraspMotion | None = None,
+    exact: bool = True,
+    seed: int = 0,
+) -> dict[str, GraspCount]:
+    """Counts grasps of a scene's free objects, which need not be sound: overlaps are tolerated.
+
+    Args:
+        scene: what stands where.
+        station: hand, arm and surroundings.
+        only: names of instances, or of objects for all their instances; all if None.
+        grasps_per_object: grasps that are sampled for each object.
+        reach: whether to ask the arm, which takes some ten times as long as the hand alone; a
+            station without an arm is never asked.
+        motion: how the hand goes to a grasp and away from it; as the station says if None.
+        exact: whether Drake's collision checker sees each yes of the arm; see `reach`.
+        seed: of the samples.
+
+    Returns:
+        Counts by instance, in the scene's order.
+
+    Raises:
+        InvalidInputError: the arm collides with something in its home posture, or the number of
+            grasps is below 1.
+        UnknownNameError: no such instance or object, or a mesh file is missing.
+        MeshError: a mesh file is damaged.
+    """
+    if grasps_per_object < 1:
+        raise InvalidInputError(f"grasps per object is {grasps_per_object}; give 1 or more")
+    names = chosen_instances(scene, only)
+    if not names:
+        return {}
+    hand, X_WO = hand_alone(scene, station)
+    grasps = {
+        name: object_grasps(
+            *(scene.library, scene.instance(name).object, X_WO[name], station),
+            *(grasps_per_object, seed),
+        )
+        for name in names
+    }
+    X_WG = {name: X_WO[name] @ grasps[name].X_OG for name in names}
+    blocker = {name: hand.measure(name, X_WG[name]).blocker.astype(object) for name in names}
+    clear = {name: int((blocker[name] == "").sum()) for name in names}
+    asked = reach and station.document.arm is not None
+    if asked and any(clear.values()):
+        arm = arm_reach(scene, station, motion or station.document.motion, exact=exact)
+        rows = {name: np.flatnonzero(blocker[name] == "") for name in names}
+        verdicts = arm.check_all(
+            [name for name in names for _ in rows[name]],
+            np.concatenate([X_WG[name][rows[name]] for name in names]),
+            np.concatenate([grasps[name].width[rows[name]] for name in names]),
+        )
+        others = {*scene.instances, *scene.background, *station.document.background, "table"}
+        for name in names:
+            some, verdicts = verdicts[: len(rows[name])], verdicts[len(rows[name]) :]
+            blocker[name][rows[name]] = [_in_the_way(verdict, others) for verdict in some]
+    return {name: _count(grasps[name], clear[name], blocker[name], asked=asked) for name in names}
+
+
+def _in_the_way(verdict: Reach, others: set[str]) -> str:
+    """What hinders the arm; "" if nothing does."""
+    if verdict.outcome is None:
+        return ""
+    body = verdict.blocker.rpartition(" vs ")[2]
+    return body if body in others else THE_ARM
+
+
+def _count(
+    grasps: ObjectGrasps, clear: int, blocker: NDArray[np.object_], *, asked: bool
+) -> GraspCount:
+    found = Counter(name for name in blocker.tolist() if name)
+    return GraspCount(
+        sampled=len(blocker),
+        clear=clear,
+        reachable=len(blocker) - found.total() if asked else None,
+        in_the_way=dict(found.most_common()),
+        note=grasps.note,
+    )
