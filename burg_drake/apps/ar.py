@@ -5,10 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-import signal
 import sys
-import threading
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
@@ -20,6 +17,8 @@ from burg_drake.apps.arguments import (
     positive,
     positive_int,
 )
+from burg_drake.apps.interrupts import deaf_to_interrupts, terminated_as_interrupted
+from burg_drake.apps.live import open_in_browser
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ def run_ar(arguments: argparse.Namespace) -> int:
     _require_places(arguments)
     intrinsics = _intrinsics(arguments)
     source = _open(arguments, scene, intrinsics)
-    with _terminated_as_interrupted():
+    with terminated_as_interrupted():
         try:
             live, actions = _session(arguments, scene, intrinsics, source)
         except BaseException:
@@ -167,7 +166,7 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
         except KeyboardInterrupt:
             interrupted = True
             print(file=sys.stderr)
-        with _deaf_to_interrupts():
+        with deaf_to_interrupts():
             closing.close()
         actions.wait_for_check()  # OpenCV must not be at work when Python ends
     if scripted or arguments.check or arguments.snapshot:
@@ -198,10 +197,7 @@ def _serve(
     print(f"{scene.name} over {live.source.name}: open {server.url} in a browser", flush=True)
     print("Press Ctrl-C to end.", flush=True)
     if arguments.open:
-        import webbrowser
-
-        if not webbrowser.open(server.url):
-            print("burg-drake: there is no browser to open it in", file=sys.stderr)
+        open_in_browser(server.url)
 
 
 def _session(
@@ -273,32 +269,6 @@ def _require_places(arguments: argparse.Namespace) -> None:
         require_new_folder(arguments.snapshot)
     if not arguments.no_browser:
         writable_folder(arguments.output)
-
-
-@contextlib.contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """SIGTERM ends as Ctrl-C does, so that a recording is finished."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextlib.contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """For the end of a recording: who presses Ctrl-C again would lose it."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def share(text: str) -> float:

@@ -31,6 +31,7 @@ from burg_drake.apps import (
     robustness,
     ros,
     scene,
+    setup,
     station,
 )
 from burg_drake.apps.arguments import Parser, examples
@@ -45,6 +46,7 @@ LONGEST_WORD = 300
 VERBS = (
     library,
     scene,
+    setup,
     printout,
     ar,
     camera,

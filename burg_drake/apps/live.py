@@ -98,3 +98,11 @@ def wait(poll: Callable[[], None] | None = None) -> None:
                 return
     except KeyboardInterrupt:
         print()
+
+
+def open_in_browser(url: str) -> None:
+    """Opens a page in the user's browser, or says that there is none."""
+    import webbrowser
+
+    if not webbrowser.open(url):
+        print("burg-drake: there is no browser to open it in", file=sys.stderr)

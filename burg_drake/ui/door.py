@@ -14,6 +14,7 @@ import errno
 import ipaddress
 import socket
 from dataclasses import dataclass
+from importlib.util import find_spec
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -70,6 +71,17 @@ class Door:
         self.close()
 
 
+def require_viser() -> None:
+    """Raises what is missing.
+
+    Raises:
+        MissingDependencyError: viser, or what the door needs besides, is not installed.
+    """
+    for name in ("viser", "websockets", "msgspec"):
+        if find_spec(name) is None:
+            raise MissingDependencyError(f"the page needs {name}: pip install 'burg-drake[ui]'")
+
+
 def serve(host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_drake") -> Door:
     """Opens the door to an empty page.
 
@@ -82,14 +94,10 @@ def serve(host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_
         InvalidInputError: the port is taken, or the address is not this machine's.
         MissingDependencyError: viser is not installed, or is one that cannot be guarded.
     """
-    try:
-        from burg_drake.ui.guarded_viser import guarded_server, stop
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"the page needs {error.name}: pip install 'burg-drake[ui]'"
-        ) from error
+    require_viser()
     from burg_drake.ui.admission import Admission
     from burg_drake.ui.door_trial import require_guarded
+    from burg_drake.ui.guarded_viser import guarded_server, stop
 
     listener = listen(host, port)
     address, bound = listener.getsockname()[:2]

@@ -15,6 +15,7 @@ import pytest
 
 from burg_drake.apps import ar
 from burg_drake.apps.cli import main
+from burg_drake.apps.interrupts import terminated_as_interrupted
 from burg_drake.cameras.event_log import EventLog
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.intrinsics_file import save_intrinsics
@@ -165,7 +166,7 @@ def test_the_end_finishes_the_recording(files: Path, tmp_path: Path) -> None:
 def test_sigterm_is_as_ctrl_c(files: Path) -> None:
     """All that follows is the same, so that one of them is enough for the test above."""
     before = signal.getsignal(signal.SIGTERM)
-    with ar._terminated_as_interrupted():
+    with terminated_as_interrupted():
         for each in (signal.SIGTERM, signal.SIGINT):
             with pytest.raises(KeyboardInterrupt):
                 signal.raise_signal(each)

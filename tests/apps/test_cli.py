@@ -37,7 +37,7 @@ HELP = (
     *(["station", v] for v in ("list", "check", "show")),
     *(["hand", v] for v in ("list", "check")),
     *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
-    *([v] for v in ("printout", "ar", "ros")),
+    *([v] for v in ("printout", "ar", "setup", "ros")),
 )
 
 

@@ -1,0 +1,110 @@
+"""`burg-drake setup`: composes a scene in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import threading
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import SCENE_NAMES, add_station, add_verb, port
+from burg_drake.apps.interrupts import deaf_to_interrupts, terminated_as_interrupted
+from burg_drake.apps.live import open_in_browser
+
+if TYPE_CHECKING:
+    from burg_drake.compose.session import ComposeSession
+    from burg_drake.ui.door import Door
+
+DEFAULT_LIBRARY = "household"
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "setup",
+        run_setup,
+        "compose a scene in the browser: place, check, settle, save, print",
+        "burg-drake setup",
+        "burg-drake setup my_scene.yaml --station my_station.yaml",
+        "burg-drake setup my_library",
+        "burg-drake setup tabletop_six --open",
+        "burg-drake setup my_scene.yaml --host 0.0.0.0",
+    )
+    parser.add_argument(
+        "what",
+        metavar="SCENE|LIBRARY",
+        nargs="?",
+        default=DEFAULT_LIBRARY,
+        help="scene file, which is opened in its folder; or the start of a new scene in the working"
+        f" directory: a library's folder, or a built-in name ({', '.join(SCENE_NAMES)},"
+        f" {DEFAULT_LIBRARY}) (default: %(default)s)",
+    )
+    add_station(parser)
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 any"
+        " other can open it, by an address that is printed and good for one browser",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+
+
+def run_setup(arguments: argparse.Namespace) -> int:
+    """Serves the page until told to end."""
+    from burg_drake.ui.door import require_viser
+
+    require_viser()  # before anything that takes time
+    with terminated_as_interrupted():
+        session = _open(arguments)
+        closing = contextlib.ExitStack()
+        try:
+            door = _serve(arguments, session, closing)
+            _tell(door, session)
+            if arguments.open:
+                open_in_browser(door.url)
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            with deaf_to_interrupts():
+                closing.close()
+    return 0
+
+
+def _open(arguments: argparse.Namespace) -> ComposeSession:
+    from burg_drake.compose.session import ComposeSession
+    from burg_drake.station.station import load_station
+
+    return ComposeSession.open(arguments.what, load_station(arguments.station))
+
+
+def _serve(
+    arguments: argparse.Namespace, session: ComposeSession, closing: contextlib.ExitStack
+) -> Door:
+    """Serves the page until all is closed."""
+    from burg_drake.ui.door import serve
+
+    door = closing.enter_context(serve(arguments.host, arguments.port, title="burg_drake: setup"))
+    door.admission.on_admitted = lambda address: _tell_next(door, address)
+    return door
+
+
+def _tell(door: Door, session: ComposeSession) -> None:
+    view = session.view
+    count = len(view.instances)
+    objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
+    where = view.path or f"not saved yet, to be saved in {session.folder}"
+    print(f"{view.document.name} ({objects}, {where}): open {door.url} in a browser", flush=True)
+    for notice in view.notices:
+        print(f"burg-drake: {notice}", file=sys.stderr, flush=True)
+    print("Press Ctrl-C to end.", flush=True)
+
+
+def _tell_next(door: Door, address: str) -> None:
+    print(f"opened by {address}; another browser: open {door.url}", flush=True)
