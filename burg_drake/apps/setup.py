@@ -89,8 +89,10 @@ def _serve(
 ) -> Door:
     """Serves the page until all is closed."""
     from burg_drake.ui.door import serve
+    from burg_drake.ui.setup_page import SetupPage
 
     door = closing.enter_context(serve(arguments.host, arguments.port, title="burg_drake: setup"))
+    closing.callback(SetupPage(door.server, session).close)
     door.admission.on_admitted = lambda address: _tell_next(door, address)
     return door
 
