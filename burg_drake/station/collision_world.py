@@ -45,18 +45,25 @@ class Body:
     geometries: tuple[GeometryId, ...]
 
 
+Depths = dict[tuple[str, str], float]
+
+
 class CollisionWorld:
     """Movable bodies among fixed ones.
 
     Args:
         fixed: shapes of fixed bodies in the world, by name.
         shapes: gives those of a kind of body in the body's frame; asked once a kind.
+
+    Attributes:
+        fixed: those shapes.
+        anchored: names of fixed bodies by geometry, in the order of their shapes.
     """
 
     def __init__(
         self, fixed: Mapping[str, PosedShapes], shapes: Callable[[str], PosedShapes]
     ) -> None:
-        self._fixed, self._shapes = fixed, shapes
+        self.fixed, self._shapes = fixed, shapes
         self._known: dict[str, PosedShapes] = {}
         self._start(PLACES)
 
@@ -69,30 +76,53 @@ class CollisionWorld:
         for name, body in list(self._used.items()):
             if name not in bodies or bodies[name][0] != body.kind:
                 self._waiting.setdefault(body.kind, []).append(self._used.pop(name))
-                self._poses.set_value(self._frames[body.index], _away(body.index))
+                self._frame_poses.set_value(self._frames[body.index], _away(body.index))
         if self._taken + len(bodies) - len(self._used) > len(self._frames):
             self._start(2 * max(len(self._frames), len(bodies)))
         for name, (kind, X_WB) in bodies.items():
             if name not in self._used:
                 waiting = self._waiting.get(kind)
                 self._used[name] = waiting.pop() if waiting else self._new_body(kind)
-            self._poses.set_value(self._frames[self._used[name].index], X_WB)
-        self._owner: dict[GeometryId, str] = {
-            g: name for name, body in self._used.items() for g in body.geometries
-        }
+            self._frame_poses.set_value(self._frames[self._used[name].index], X_WB)
+        self._owner = {g: name for name in bodies for g in self._used[name].geometries}
+        self._bodies: dict[str, tuple[str, RigidTransform]] = dict(bodies)
         port = self._graph.get_source_pose_port(self._source)
-        port.FixValue(self._context, Value(self._poses))
+        port.FixValue(self._context, Value(self._frame_poses))
 
-    def overlaps(self) -> dict[frozenset[str], float]:
-        """Depth of the deepest overlap [m] of each pair of bodies that overlap, by their names; of
-        two fixed ones none."""
-        found: dict[frozenset[str], float] = {}
+    @property
+    def bodies(self) -> Mapping[str, tuple[str, RigidTransform]]:
+        """Kind and pose `X_WB` of what is there, as it was placed."""
+        return self._bodies
+
+    def geometries(self, name: str) -> tuple[GeometryId, ...]:
+        """Those of a movable body that is there, in the order of its shapes."""
+        return self._used[name].geometries
+
+    def shapes(self, name: str) -> PosedShapes:
+        """Those of a movable body that is there, in its frame."""
+        return self._known[self._used[name].kind]
+
+    def overlaps(self) -> tuple[Depths, Depths]:
+        """Which bodies overlap.
+
+        Returns:
+            Depth of the deepest overlap [m] of each pair of movable bodies that overlap, in the
+            order in which they were placed, and of each movable body with a fixed one.
+        """
+        order = {name: i for i, name in enumerate(self._bodies)}
+        among: Depths = {}
+        fixed: Depths = {}
         for pair in self.query().ComputePointPairPenetration():
-            names = [self._owner.get(g) or self._anchored.get(g) for g in (pair.id_A, pair.id_B)]
-            if None not in names:
-                key = frozenset(name for name in names if name is not None)
-                found[key] = max(found.get(key, 0.0), pair.depth)
-        return found
+            ids = (pair.id_A, pair.id_B)
+            movable = [self._owner[g] for g in ids if g in self._owner]
+            still = [self.anchored[g] for g in ids if g in self.anchored]
+            if len(movable) == 2:
+                a, b = sorted(movable, key=order.__getitem__)
+                among[a, b] = max(among.get((a, b), 0.0), pair.depth)
+            elif movable and still:
+                key = movable[0], still[0]
+                fixed[key] = max(fixed.get(key, 0.0), pair.depth)
+        return among, fixed
 
     def query(self) -> QueryObject:
         """Drake's answers about the bodies as they stand; good until they are moved."""
@@ -103,16 +133,16 @@ class CollisionWorld:
         graph = SceneGraph()
         source = graph.RegisterSource("bodies")
         frames = [graph.RegisterFrame(source, GeometryFrame(f"{i}")) for i in range(places)]
-        self._anchored = {
+        self.anchored = {
             graph.RegisterAnchoredGeometry(source, _instance(f"{name}_{i}", *posed)): name
-            for name, shapes in self._fixed.items()
+            for name, shapes in self.fixed.items()
             for i, posed in enumerate(shapes)
         }
         self._graph, self._source, self._frames = graph, source, frames
         self._context = graph.CreateDefaultContext()
-        self._poses = FramePoseVector()
+        self._frame_poses = FramePoseVector()
         for index, frame in enumerate(frames):
-            self._poses.set_value(frame, _away(index))
+            self._frame_poses.set_value(frame, _away(index))
         self._taken = 0
         self._used: dict[str, Body] = {}
         self._waiting: dict[str, list[Body]] = {}

@@ -6,12 +6,14 @@ and what is added is registered beside what is there.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 from scipy.spatial import ConvexHull, QhullError
 
@@ -33,6 +35,7 @@ from burg_drake.station.instances import taken_name
 from burg_drake.station.robot import ROBOT_MODELS
 from burg_drake.station.station import Station
 from burg_drake.station.surroundings import taken_obstacle
+from burg_drake.station.travel import Travel
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +74,9 @@ class SceneCheck:
         self._around = _empty_station(station, library)
         self._parts = _robot_parts(self._around)
         fixed = surrounding_shapes(self._around)
-        self._rank = {name: i for i, name in enumerate(fixed)}
         shapes = partial(object_shapes, library, packages=station.packages)
         self._world = CollisionWorld(fixed, shapes)
+        self._travel: Travel | None = None
         self._corners: dict[str, Array] = {}
         self._placed: dict[str, _Placed] = {}
 
@@ -99,13 +102,7 @@ class SceneCheck:
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
         beside = (self._table_issue(name) for name in scene.instances)
         issues += [issue for issue in beside if issue is not None]
-        order = {name: i for i, name in enumerate((*scene.instances, *scene.background))}
-        rank = order | {name: len(order) + i for name, i in self._rank.items()}
-        overlaps = self._world.overlaps()
-        pairs = {tuple(sorted(pair, key=rank.__getitem__)): overlaps[pair] for pair in overlaps}
-        for (a, b), depth in sorted(pairs.items(), key=lambda item: [rank[n] for n in item[0]]):
-            if depth <= TOUCH_TOLERANCE or a not in scene.instances:
-                continue
+        for a, b, depth in self._overlaps(scene):
             if b == "table" and a in buried:
                 continue
             message = _overlap(a, b, depth, self._parts, self._station.path)
@@ -113,6 +110,61 @@ class SceneCheck:
                 SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
             )
         return tuple(issues)
+
+    def travel(
+        self, scene: Scene, names: Iterable[str], direction_S: ArrayLike, limit: float
+    ) -> float:
+        """How far instances can be moved together along a straight line until they touch something
+        else: another object, the table, an obstacle, or the arm in its home posture.
+
+        It is exact for the convex shapes that objects touch others with. What touches or overlaps
+        already is in the way only where the motion would drive it in deeper: objects slide on the
+        table that they stand on.
+
+        Args:
+            scene: of this library.
+            names: of instances, background included.
+            direction_S: (3,) direction in the scene frame, of any length above 0.
+            limit: longest way [m].
+
+        Returns:
+            The way [m], at most `limit`; 0 if something is in the way.
+
+        Raises:
+            UnknownNameError: the scene has no such instance.
+            InvalidInputError: no names, no direction, or a limit that is negative or no number;
+                and see `issues`.
+        """
+        chosen = list(dict.fromkeys(names))
+        if not chosen:
+            raise InvalidInputError("no instance is named; name those to move")
+        for name in chosen:
+            scene.instance(name)
+        direction = np.asarray(direction_S, dtype=float)
+        length = float(np.linalg.norm(direction))
+        if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
+            raise InvalidInputError(
+                f"direction {direction.tolist()} must be three finite numbers, not all 0"
+            )
+        if not limit >= 0.0:
+            raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")
+        self._place(scene)
+        if self._travel is None:
+            self._travel = Travel(self._world)
+        return self._travel.way(chosen, self._X_WS[:3, :3] @ direction / length, limit)
+
+    def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
+        """Instances, what they overlap, and how deep [m], in the order of the document."""
+        among, fixed = self._world.overlaps()
+        rank = {name: i for i, name in enumerate(self._world.bodies)}
+        of_fixed = {name: len(rank) + i for i, name in enumerate(self._world.fixed)}
+        found = [(rank[a], rank[b], a, b, depth) for (a, b), depth in among.items()]
+        found += [(rank[a], of_fixed[b], a, b, depth) for (a, b), depth in fixed.items()]
+        return [
+            (a, b, depth)
+            for _, _, a, b, depth in sorted(found)
+            if depth > TOUCH_TOLERANCE and a in scene.instances
+        ]
 
     def _place(self, scene: Scene) -> None:
         """Takes over where the instances of a scene stand."""
