@@ -14,7 +14,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rot_z
 
 if TYPE_CHECKING:
-    from burg_drake.compose.session import ComposeSession
+    from burg_drake.compose.editor import Editor
     from burg_drake.compose.view import View
 
 
@@ -28,7 +28,7 @@ class Drag:
         names: instances that are held.
     """
 
-    def __init__(self, session: ComposeSession, names: tuple[str, ...], start: View) -> None:
+    def __init__(self, session: Editor, names: tuple[str, ...], start: View) -> None:
         self.names = names
         self._session = session
         self._start = {name: start.X_SO(name) for name in names}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from burg_drake.compose.checker import lost
 from burg_drake.compose.footprint import bounds
 from burg_drake.compose.state import State
 from burg_drake.core.frames import Array
@@ -33,7 +34,7 @@ def free_spot(standing: Array, state: State) -> tuple[float, float]:
     spots = middle + offsets
     lower, upper = spots + standing[0, :2], spots + standing[1, :2]
     free = ((lower >= 0.0) & (upper <= size)).all(axis=1)
-    for name in state.instances:
+    for name in set(state.instances) - set(lost(state)):
         other = bounds(state, name)[:, :2]
         apart = (lower > other[1] + CLEARANCE) | (upper < other[0] - CLEARANCE)
         free &= apart.any(axis=1)

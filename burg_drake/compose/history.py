@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from burg_drake.compose.state import State, name_of
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.objects.library import ObjectLibrary
 
 
 @dataclass(frozen=True)
@@ -73,9 +74,35 @@ class History:
         self.position += 1
         return self.state
 
-    def rewrite(self, name: str, library: str) -> None:
-        """Gives the scene of every step another name, and its library another reference."""
-        self.steps = [Step(s.label, _renamed(s.state, name, library)) for s in self.steps]
+    def go_to(self, position: int) -> None:
+        """Goes to a step by its number, the first state being 0.
+
+        Raises:
+            IndexError: there is none.
+        """
+        if not 0 <= position < len(self.steps):
+            raise IndexError(f"step {position} of {len(self.steps)}")
+        self.position = position
+
+    def rename(self, name: str, reference: str, library: ObjectLibrary) -> None:
+        """Gives the scene of every step another name, and a library another reference."""
+
+        def renamed(state: State) -> State:
+            document = replace(state.document, name=name)
+            if state.library.root == library.root:
+                document = replace(document, library=reference)
+            return state if document == state.document else replace(state, document=document)
+
+        self.steps = [Step(step.label, renamed(step.state)) for step in self.steps]
+
+    def replace_library(self, library: ObjectLibrary) -> None:
+        """Puts what a library's folder holds now in place of what it held before."""
+        self.steps = [
+            Step(s.label, replace(s.state, library=library))
+            if s.state.library.root == library.root
+            else s
+            for s in self.steps
+        ]
 
     @property
     def _can_redo(self) -> bool:
@@ -92,9 +119,3 @@ def _selecting_changes(state: State, other: State) -> State:
         if there.get(name) != instance or (instance in fixed[0]) != (instance in fixed[1])
     ]
     return replace(state, selection=tuple(changed))
-
-
-def _renamed(state: State, name: str, library: str) -> State:
-    if (state.document.name, state.document.library) == (name, library):
-        return state
-    return replace(state, document=replace(state.document, name=name, library=library))

@@ -1,14 +1,21 @@
-"""What a session begins with: a scene from a file, a built-in one, or an empty board."""
+"""What a session begins with: a scene from a file, a built-in one, or an empty board; and what a
+session that was killed has left of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 
 from burg_drake.compose.board_change import board_size
+from burg_drake.compose.history import History
+from burg_drake.compose.journal import Recovered, journal_path, recover
 from burg_drake.compose.scene_file import fingerprint
+from burg_drake.compose.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.state import State
-from burg_drake.core.errors import UnknownNameError
+from burg_drake.compose.storage import Storage
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.resources import builtin_names, data_root, resolve
 from burg_drake.objects.library import LIBRARY_FILE, load_library
 from burg_drake.scene.scene import Board, SceneDocument, load_scene
@@ -22,54 +29,153 @@ class Opened:
     """What was opened.
 
     Attributes:
-        state: scene and library.
-        path: the scene's file; None if it has none yet.
-        known: `scene_file.fingerprint` of that file.
+        history: with the scene's state, and what came before it if it was recovered.
+        storage: its files.
+        notices: what the user should know, one line each.
     """
 
-    state: State
-    path: Path | None = None
-    known: str | None = None
+    history: History
+    storage: Storage
+    notices: tuple[str, ...] = ()
 
 
-def open_reference(reference: str | Path) -> Opened:
-    """Opens a scene, or a library; see `ComposeSession.open`."""
+def open_reference(reference: str | Path, folder: str | Path | None, address: str) -> Opened:
+    """Opens a scene, or begins a new one; see `ComposeSession.open`."""
     text = str(reference)
     if text in builtin_names("models"):
-        return new_scene(text)
+        return new_scene(text, _folder(folder), address)
     try:
         path = resolve(reference, "scenes")
     except UnknownNameError as error:
         known = f"; libraries: {', '.join(builtin_names('models'))}"
         raise UnknownNameError(f"{error}{known}") from error
     if path.is_dir() or path.name == LIBRARY_FILE:
-        return new_scene(text)
+        return new_scene(text, _folder(folder), address)
     if path.is_relative_to(data_root() / "scenes"):
-        return _built_in(path)
-    return open_scene_file(path)
+        return _built_in(path, _folder(folder), address)
+    return open_scene_file(path, address)
 
 
-def open_scene_file(path: Path) -> Opened:
-    """Opens a scene's file.
+def open_scene_file(path: Path, address: str = "") -> Opened:
+    """Opens a scene's file, or what a session that was killed has left of it.
 
     Raises:
+        SceneInUse: another session has it.
         UnknownNameError: there is none, or an instance's object is unknown.
         DocumentError: it does not fit the schema.
     """
-    known = fingerprint(path)
-    scene = load_scene(path)
-    return Opened(State(scene.document, scene.library), scene.path, known)
+    lock = SceneLock(path, address)
+    try:
+        found = recover(journal_path(path))
+        notices = _damage(found)
+        known = fingerprint(path)
+        if found and found.history and found.history.state.document != found.saved:
+            if found.known != known:
+                notices += (
+                    f"{path} was changed since; what you see are the changes of the last session,"
+                    " which were not saved",
+                )
+            return _recovered(path, path, found, lock, notices)
+        if found and found.history and found.known == known:
+            return _recovered(path, path, found, lock, notices, quiet=True)
+        scene = load_scene(path)
+        state = State(scene.document, scene.library)
+        storage = Storage(path, lock, path=path, known=known, saved=scene.document)
+        return Opened(History(state), storage, notices)
+    except BaseException:
+        lock.release()
+        raise
 
 
-def new_scene(library: str | Path) -> Opened:
+def new_scene(library: str | Path, folder: Path, address: str = "") -> Opened:
     """An empty board, A3 across, with the objects of a library at hand."""
     loaded = load_library(library)
-    name = str(library) if str(library) in builtin_names("models") else str(loaded.root)
-    document = SceneDocument(name=NEW_SCENE, library=name, board=Board(size=board_size("A3")))
-    return Opened(State(document, loaded))
+    built_in = str(library) in builtin_names("models")
+    reference = str(library) if built_in else str(loaded.root)
+
+    def make(name: str) -> State:
+        board = Board(size=board_size("A3"))
+        return State(SceneDocument(name=name, library=reference, board=board), loaded)
+
+    return _unsaved(NEW_SCENE, make, folder, reference, address)
 
 
-def _built_in(path: Path) -> Opened:
+def _built_in(path: Path, folder: Path, address: str) -> Opened:
     """A scene that the package installs: the start of a new one, as its file is not the user's."""
     scene = load_scene(path)
-    return Opened(State(scene.document, scene.library))
+
+    def make(name: str) -> State:
+        return State(replace(scene.document, name=name), scene.library)
+
+    return _unsaved(scene.name, make, folder, f"scene {path.stem}", address)
+
+
+def _unsaved(
+    name: str, make: Callable[[str], State], folder: Path, origin: str, address: str
+) -> Opened:
+    """A scene without a file, by the first name that is nobody else's: numbers are put behind it.
+
+    What a session of the same origin has left is recovered.
+    """
+    notices: tuple[str, ...] = ()
+    for number in count(1):
+        place = folder / (f"{name}.yaml" if number == 1 else f"{name}_{number}.yaml")
+        if place.exists():
+            continue
+        try:
+            lock = SceneLock(place, address)
+        except SceneInUse:
+            continue
+        try:
+            found = recover(journal_path(place))
+            notices += _damage(found)
+            if found is None or found.history is None:
+                return Opened(
+                    History(make(place.stem)), Storage(place, lock, origin=origin), notices
+                )
+            if found.origin == origin and found.saved is None:
+                return _recovered(place, None, found, lock, notices)
+        except BaseException:
+            lock.release()
+            raise
+        lock.release()
+    raise AssertionError("numbers do not end")
+
+
+def _recovered(
+    place: Path,
+    path: Path | None,
+    found: Recovered,
+    lock: SceneLock,
+    notices: tuple[str, ...],
+    *,
+    quiet: bool = False,
+) -> Opened:
+    history = found.history
+    assert history is not None
+    storage = Storage(
+        place, lock, path=path, known=found.known, saved=found.saved, origin=found.origin
+    )
+    storage.record_all(history)
+    if not quiet:
+        steps = f"{history.position} step{'' if history.position == 1 else 's'}"
+        notices += (f"recovered what was not saved of {place.stem!r}: {steps}, all can be undone",)
+    return Opened(history, storage, notices)
+
+
+def _damage(found: Recovered | None) -> tuple[str, ...]:
+    if found is None or found.aside is None:
+        return ()
+    return (f"the journal of the last session is damaged; it is kept as {found.aside}",)
+
+
+def _folder(folder: str | Path | None) -> Path:
+    """The folder for scenes.
+
+    Raises:
+        InvalidInputError: it is none.
+    """
+    path = Path.cwd() if folder is None else Path(folder)
+    if not path.is_dir():
+        raise InvalidInputError(f"{path} is no folder; give one for the scenes")
+    return path.resolve()

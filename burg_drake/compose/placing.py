@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from burg_drake.compose.checker import lost
 from burg_drake.compose.command import FARTHEST, label_of, require_number
 from burg_drake.compose.footprint import bounds, object_bounds
 from burg_drake.compose.free_spot import free_spot
@@ -191,7 +192,7 @@ def _beside(state: State, names: tuple[str, ...]) -> tuple[float, float]:
     """Offset of copies: to the first side of right, up, left, down where they fit."""
     corners = np.array([bounds(state, name) for name in names])
     lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-    others = [bounds(state, name) for name in state.instances]
+    others = [bounds(state, name) for name in state.instances if name not in lost(state)]
     width, depth = (float(v) for v in (upper - lower)[:2] + GAP)
     sides = [(width, 0.0), (0.0, depth), (-width, 0.0), (0.0, -depth)]
     for side in sides:

@@ -2,207 +2,109 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
 
-from burg_drake.compose.command import Command, label_of
-from burg_drake.compose.drag import Drag
-from burg_drake.compose.history import History, Step
-from burg_drake.compose.moving import Move
-from burg_drake.compose.opening import Opened, open_reference, open_scene_file
-from burg_drake.compose.scene_file import UnsavedChanges, scene_path, write_scene
-from burg_drake.compose.state import State, require_some
+from burg_drake.compose.checker import known_scene
+from burg_drake.compose.editor import Editor
+from burg_drake.compose.history import Step
+from burg_drake.compose.library_watch import LibraryWatch, changes_notice, require_objects
+from burg_drake.compose.opening import Opened, new_scene, open_reference, open_scene_file
+from burg_drake.compose.scene_file import UnsavedChanges, fingerprint, scene_path
+from burg_drake.compose.settling import Proposal, Settle
+from burg_drake.compose.state import State
 from burg_drake.compose.surroundings import Surroundings
-from burg_drake.compose.view import View, status_of
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.scene.scene import SceneDocument
-from burg_drake.scene.validate import SceneIssue
+from burg_drake.compose.view import View
+from burg_drake.compose.worker import Cancelled, Job, Worker
+from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.resources import builtin_names
+from burg_drake.objects.library import LIBRARY_FILE, ObjectLibrary, load_library
+from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import Station
 
-Callback = Callable[[View], None]
+if TYPE_CHECKING:
+    from burg_drake.printout.board_printout import Printout, PrintSettings
+
+SETTLE_TIME = 10.0
+"""Simulated time that a scene gets to settle, where nothing else is asked for [s]."""
 
 
-class ComposeSession:
+class ComposeSession(Editor):
     """Document, selection, commands and history of one scene, without any user interface.
 
     All methods may be called from any thread. What is refused raises a `BurgError`, and changes
-    nothing.
+    nothing. Each step is in a journal beside the scene, from which a session that was killed is
+    opened again, its history included.
 
     Attributes:
         station: where the scene stands.
         folder: scenes are saved to and loaded from here, and nowhere else.
     """
 
-    def __init__(self, opened: Opened, station: Station, folder: Path) -> None:
-        self.station = station
+    def __init__(self, opened: Opened, station: Station, folder: Path, address: str = "") -> None:
         self.folder = folder
-        self._lock = threading.RLock()
-        self._callbacks: list[Callback] = []
-        self._drag: Drag | None = None
-        self._planar = True
-        self._serial = self._revision = 0
-        self._notices: tuple[str, ...] = ()
-        self._path: Path | None
-        self._known: str | None
-        self._saved: SceneDocument | None
-        self._state: State
-        self._history: History
-        self._view: View
-        self._begin(opened)
+        self._address = address
+        self._watch: LibraryWatch | None = None
+        self._settler = Worker()
+        self._settling: Job[Proposal] | None = None
+        self._proposal: Proposal | None = None
+        super().__init__(opened, station)
 
     @classmethod
     def open(
-        cls, reference: str | Path, station: Station, *, folder: str | Path | None = None
+        cls,
+        reference: str | Path,
+        station: Station,
+        *,
+        folder: str | Path | None = None,
+        address: str = "",
     ) -> ComposeSession:
         """Opens a scene, or begins a new one with the objects of a library.
+
+        What a session that was killed has left is recovered, and a notice says so.
 
         Args:
             reference: of a scene (path or built-in name) or a library (folder or built-in name). A
                 built-in scene is the start of a new one: it has no file until it is saved.
             station: where it stands.
             folder: for scenes; that of the scene's file, or the working directory, if None.
+            address: of the page, for those who find the scene in use; see `announce`.
 
         Raises:
+            SceneInUse: another session has it; the error tells its address.
             UnknownNameError: there is neither, or an instance's object is unknown.
             DocumentError: the file does not fit the schema.
         """
-        opened = open_reference(reference)
-        if folder is None:
-            folder = Path.cwd() if opened.path is None else opened.path.parent
-        return cls(opened, station, Path(folder).resolve())
+        opened = open_reference(reference, folder, address)
+        place = opened.storage.place.parent if folder is None else Path(folder)
+        return cls(opened, station, place.resolve(), address)
 
-    @property
-    def view(self) -> View:
-        """What there is to see now."""
+    def __enter__(self) -> ComposeSession:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def announce(self, address: str) -> None:
+        """Says where the session's page is, for those who find the scene in use."""
         with self._lock:
-            return self._view
+            self._address = address
+            self._storage.announce(address)
 
-    def on_change(self, callback: Callback) -> Callable[[], None]:
-        """Calls `callback` with each new view, in the thread that caused it; see `View.serial`.
-
-        Returns:
-            What ends that.
-        """
-        with self._lock:
-            self._callbacks.append(callback)
-
-        def unsubscribe() -> None:
-            with self._lock:
-                if callback in self._callbacks:
-                    self._callbacks.remove(callback)
-
-        return unsubscribe
-
-    def do(self, command: Command) -> View:
-        """Takes a step; none if the command changes nothing.
-
-        Raises:
-            BurgError: it cannot be taken; one clear line says why.
-        """
-        with self._lock:
-            state = command.apply(self._state, self._surroundings)
-            self._drag = None
-            return self._take(Step(command.label, state))
-
-    def undo(self) -> View:
-        """Takes the last step back, and selects what it had changed.
-
-        Raises:
-            InvalidInputError: there is none.
-        """
-        with self._lock:
-            self._drag = None
-            return self._show(self._history.undo(), changed=True)
-
-    def redo(self) -> View:
-        """Takes the step again that was undone last.
-
-        Raises:
-            InvalidInputError: there is none.
-        """
-        with self._lock:
-            self._drag = None
-            return self._show(self._history.redo(), changed=True)
-
-    def select(self, names: Iterable[str]) -> View:
-        """Selects instances, and no others; this is no step.
-
-        Raises:
-            UnknownNameError: one is not there.
-        """
-        with self._lock:
-            return self._show(self._state.select(names), changed=False)
-
-    def restrict_movement(self, planar: bool) -> View:
-        """Whether what is moved from now on keeps its height and tilt."""
-        with self._lock:
-            self._planar = planar
-            return self._publish(self._view.issues)
-
-    def notify(self, notice: str) -> View:
-        """Adds a line to what the user should know."""
-        with self._lock:
-            if notice not in self._notices:
-                self._notices += (notice,)
-            return self._publish(self._view.issues)
-
-    def dismiss(self, notice: str) -> View:
-        """The user has read a notice."""
-        with self._lock:
-            self._notices = tuple(n for n in self._notices if n != notice)
-            return self._publish(self._view.issues)
-
-    # --- dragging -------------------------------------------------------------------------------
-
-    def drag(self, names: Iterable[str]) -> Drag:
-        """Takes instances in the hand; they are selected. A drag that is not over yet is put back.
-
-        Raises:
-            UnknownNameError: one is not there.
-        """
-        with self._lock:
-            if self._drag is not None:
-                self.put_back(self._drag)
-            held = require_some(names, self._state)
-            self.select(held)
-            self._drag = Drag(self, held, self._view)
-            return self._drag
-
-    def holds(self, drag: Drag) -> bool:
-        """Whether a drag is not over."""
-        with self._lock:
-            return self._drag is drag
-
-    def preview(self, drag: Drag, move: Move) -> View:
-        """Shows what is dragged elsewhere; see `Drag.move`.
-
-        Raises:
-            InvalidInputError: a pose is none, or the drag is over.
-        """
-        with self._lock:
-            self._require(drag)
-            start = self._history.state.select(drag.names)
-            self._state = move.apply(start, self._surroundings)
-            return self._publish(self._issues())
-
-    def drop(self, drag: Drag) -> View:
-        """Makes a drag a step; see `Drag.end`."""
-        with self._lock:
-            self._require(drag)
-            self._drag = None
-            return self._take(Step(label_of("move", drag.names), self._state))
-
-    def put_back(self, drag: Drag) -> View:
-        """Ends a drag without a step; see `Drag.cancel`."""
-        with self._lock:
-            if not self.holds(drag):
-                return self._view
-            self._drag = None
-            return self._show(self._history.state.select(drag.names), changed=False)
-
-    # --- files ----------------------------------------------------------------------------------
+    def close(self) -> None:
+        """Lets others open the scene. Changes that are in no file stay in the journal, and are
+        there when the scene is opened again."""
+        self._settler.close()
+        with self._alone():
+            self._callbacks.clear()
+            self._storage.close(keep=self._changed)
 
     def save(self, name: str | None = None, *, overwrite: bool = False) -> View:
         """Writes the scene to its file, or to another one in the folder, which is its file then.
@@ -213,29 +115,20 @@ class ComposeSession:
 
         Raises:
             FileChanged: the file is not as this session knows it.
-            InvalidInputError: it cannot be written: the old file is as it was.
+            SceneInUse: another session has it.
+            InvalidInputError: it cannot be written; the old file is as it was, and so is the
+                session.
         """
-        with self._lock:
-            state = self._history.state
-            path = self._path
-            if name is not None or path is None:
-                path = scene_path(name or state.document.name, self.folder)
-            document = state.document
-            if path != self._path:
-                document = replace(document, name=path.stem)
-            known = self._known if path == self._path else None
-            written, fingerprint = write_scene(
-                document, state.library, path, known=known, force=overwrite
-            )
-            self._path, self._known = path, fingerprint
-            self._history.rewrite(written.name, written.library)
-            self._saved = self._history.state.document
-            return self._show(
-                replace(self._history.state, selection=self._state.selection), changed=False
-            )
+        with self._alone():
+            self._storage.save(self._history, name, self.folder, overwrite=overwrite)
+            self._storage.announce(self._address)
+            selection = self._state.selection
+            self._drag = None
+            return self._show(replace(self._history.state, selection=selection))
 
     def load(self, name: str | None = None, *, discard: bool = False) -> View:
-        """Opens another scene of the folder, or its own file again; the history begins anew.
+        """Opens a scene of the folder. Its own file is a step, which can be undone; with another
+        one the history begins anew.
 
         Args:
             name: of the file; its own if None.
@@ -243,84 +136,201 @@ class ComposeSession:
 
         Raises:
             UnsavedChanges: there are such.
+            SceneInUse: another session has it.
             InvalidInputError: the scene has no file, or the name would lead elsewhere.
             BurgError: the file cannot be read, or does not fit.
         """
-        with self._lock:
-            if name is None and self._path is None:
+        with self._alone():
+            path = self._storage.path if name is None else scene_path(name, self.folder)
+            if path is None:
                 raise InvalidInputError("this scene was never saved, so there is nothing to load")
-            path = self._path if name is None else scene_path(name, self.folder)
-            assert path is not None
-            if not self._view.saved and not discard:
-                raise UnsavedChanges(
-                    f"scene {self._state.document.name!r} has changes that are not saved; save or"
-                    " discard them"
-                )
-            self._begin(open_scene_file(path))
+            self._require_saved(discard=discard)
+            if path != self._storage.path:
+                return self._change(open_scene_file(path, self._address))
+            known = fingerprint(path)
+            scene = load_scene(path)
+            self._drag = None
+            self._take(Step(f"load {path.name}", State(scene.document, scene.library)))
+            self._storage.known, self._storage.saved = known, scene.document
+            self._storage.record_all(self._history)
+            return self._publish()
+
+    def new(self, library: str | Path | None = None, *, discard: bool = False) -> View:
+        """Begins another scene with an empty board.
+
+        Args:
+            library: see `use_library`; that of this scene if None.
+            discard: changes that were not saved.
+
+        Raises:
+            UnsavedChanges: there are such.
+            BurgError: the library cannot be loaded.
+        """
+        with self._alone():
+            self._require_saved(discard=discard)
+            reference = self._history.state.library.root if library is None else library
+            if library is None and self._history.state.document.library in builtin_names("models"):
+                reference = self._history.state.document.library
+            return self._change(new_scene(reference, self.folder, self._address))
+
+    def printout(self, settings: PrintSettings | None = None) -> Printout:
+        """The board with the scene as it is, as PDF; see `printout.print_board`.
+
+        Raises:
+            InvalidInputError: the settings do not fit, or the markers do not.
+        """
+        from burg_drake.printout.board_printout import print_board
+
+        return print_board(known_scene(self._history.state, self._storage.place), settings)
+
+    def libraries(self) -> tuple[str, ...]:
+        """References of libraries that a page may offer: built-in ones, and folders of the folder
+        that was opened."""
+        try:
+            own = sorted(p.parent.name for p in self.folder.glob(f"*/{LIBRARY_FILE}"))
+        except OSError:
+            own = []
+        return (*builtin_names("models"), *(name for name in own if not name.startswith(".")))
+
+    def use_library(self, reference: str | Path) -> View:
+        """Takes the objects from another library; a step.
+
+        Args:
+            reference: one of `libraries`, or any folder as a `Path`.
+
+        Raises:
+            UnknownNameError: there is no such library, or it lacks objects of the scene.
+            DocumentError: its document does not fit the schema.
+        """
+        if isinstance(reference, str) and reference not in self.libraries():
+            raise UnknownNameError(
+                f"no library {reference!r} here; {nearest(reference, self.libraries())}"
+            )
+        built_in = str(reference) in builtin_names("models")
+        library = load_library(reference, self.folder)
+        return self.do(_UseLibrary(library, str(reference) if built_in else str(library.root)))
+
+    def refresh(self) -> View:
+        """Looks whether the library has changed on the disk; also before each step."""
+        with self._alone():
+            self._look_around()
             return self._view
 
-    # --- inside ---------------------------------------------------------------------------------
+    def settle(self, *, time_limit: float = SETTLE_TIME) -> Job[Proposal]:
+        """Lets the scene come to rest in a worker process; editing goes on meanwhile.
 
-    def _begin(self, opened: Opened) -> None:
-        self._drag = None
-        self._path, self._known = opened.path, opened.known
-        self._history = History(opened.state)
-        self._saved = None if opened.path is None else opened.state.document
-        self._state = opened.state
+        What comes of it is `View.proposal`. What was asked before is cancelled.
+
+        Args:
+            time_limit: simulated time allowed [s].
+        """
+        with self._alone():
+            self._drop_settling()
+            scene = known_scene(self._history.state, self._storage.place)
+            self._settling = self._settler.ask(
+                Settle(scene, self.station, time_limit), self._settled
+            )
+            self._publish()
+            return self._settling
+
+    def accept(self, proposal: Proposal | None = None) -> View:
+        """Makes a proposal a step.
+
+        Args:
+            proposal: the one in the view if None.
+
+        Raises:
+            InvalidInputError: there is none, or the scene has changed since it was made.
+        """
+        with self._alone():
+            proposal = proposal or self._proposal
+            if proposal is None:
+                raise InvalidInputError("there is no proposal to accept; settle the scene first")
+            if self._history.state.document != proposal.start:
+                raise InvalidInputError(
+                    "the scene has changed since it was settled; settle it again, or undo"
+                )
+            self._proposal = None
+            self._drag = None
+            state = replace(self._history.state, document=proposal.document)
+            moved = [n for n in proposal.displacements if n in state.instances]
+            return self._take(Step(proposal.label, state.select(moved)))
+
+    def revert(self) -> View:
+        """Drops the proposal, and what is being done for one."""
+        with self._alone():
+            self._drop_settling()
+            return self._publish()
+
+    def _change(self, opened: Opened) -> View:
+        """Goes over to another scene."""
+        self._drop_settling()
+        self._storage.close(keep=False)
+        self._begin(opened)
+        return self._view
+
+    def _require_saved(self, *, discard: bool) -> None:
+        if self._changed and not discard:
+            name = self._history.state.document.name
+            raise UnsavedChanges(
+                f"scene {name!r} has changes that are not saved; save or discard them"
+            )
+
+    def _look_around(self) -> None:
+        library = self._history.state.library
+        if self._watch is None or self._watch.library.root != library.root:
+            self._watch = LibraryWatch(library)
+        try:
+            changed = self._watch.look()
+        except BurgError as error:
+            self.notify(f"library {library.root} cannot be read any more: {error}")
+            return
+        if changed is None:
+            return
+        self.notify(changes_notice(self._history.state, changed))
+        self._history.replace_library(changed)
         self._revision += 1
-        self._publish(self._issues())
+        self._show(replace(self._state, library=changed))
+
+    def _settled(self, job: Job[Proposal]) -> None:
+        """Called by the worker's thread."""
+        with self._alone():
+            if job is not self._settling:
+                return
+            if job.done:
+                self._settling = None
+                if job.error is None:
+                    self._proposal = job.wait()
+                elif not isinstance(job.error, Cancelled):
+                    self.notify(f"cannot settle the scene: {job.error}")
+            self._publish()
+
+    def _drop_settling(self) -> None:
+        job, self._settling = self._settling, None
+        self._proposal = None
+        if job is not None:
+            job.cancel()
+
+    def _dressed(self, view: View) -> View:
+        working = None
+        if self._settling is not None:
+            share, word = self._settling.progress
+            working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
+        return replace(view, working=working, proposal=self._proposal)
+
+
+@dataclass(frozen=True)
+class _UseLibrary:
+    """Takes the objects from another library."""
+
+    library: ObjectLibrary
+    reference: str
 
     @property
-    def _surroundings(self) -> Surroundings:
-        path = self._path or self.folder / f"{self._history.state.document.name}.yaml"
-        return Surroundings(self.station, self._planar, path)
+    def label(self) -> str:
+        return f"use library {self.library.name}"
 
-    def _take(self, step: Step) -> View:
-        before = self._history.state
-        if step.state.document == before.document and step.state.library == before.library:
-            return self._show(step.state, changed=False)
-        self._history.add(step)
-        return self._show(step.state, changed=True)
-
-    def _show(self, state: State, *, changed: bool) -> View:
-        moved = state.document is not self._state.document
-        self._state = state
-        self._revision += changed
-        return self._publish(self._issues() if changed or moved else self._view.issues)
-
-    def _issues(self) -> tuple[SceneIssue, ...]:
-        from burg_drake.station.check import check_scene
-
-        try:
-            return check_scene(self._state.scene(self._surroundings.path), self.station)
-        except BurgError as error:
-            notice = f"the scene cannot be checked: {error}"
-            if notice not in self._notices:
-                self._notices += (notice,)
-            return ()
-
-    def _publish(self, issues: tuple[SceneIssue, ...]) -> View:
-        self._serial += 1
-        self._view = view = View(
-            serial=self._serial,
-            revision=self._revision,
-            state=self._state,
-            issues=issues,
-            status=status_of(self._state, issues),
-            undo_label=self._history.undo_label,
-            redo_label=self._history.redo_label,
-            saved=self._history.state.document == self._saved,
-            path=self._path,
-            planar=self._planar,
-            dragging=self._drag.names if self._drag else (),
-            notices=self._notices,
-        )
-        for callback in tuple(self._callbacks):
-            callback(view)
-        return view
-
-    def _require(self, drag: Drag) -> None:
-        if self._drag is not drag:
-            raise InvalidInputError(
-                "the drag is over: something else changed the scene; drag again"
-            )
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        require_objects(state, self.library)
+        document = replace(state.document, library=self.reference)
+        return replace(state, document=document, library=self.library)

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
+from burg_drake.compose.checker import SceneChecker
 from burg_drake.compose.state import State
 from burg_drake.core.errors import FieldError
 from burg_drake.core.names import require_name
@@ -21,11 +22,13 @@ class Surroundings:
         station: where the scene stands.
         planar: objects that are moved keep their height and tilt; only x, y and yaw change.
         path: of the scene's file, for messages.
+        checker: knows what touches what.
     """
 
     station: Station
-    planar: bool = True
-    path: Path = Path("scene.yaml")
+    planar: bool
+    path: Path
+    checker: SceneChecker
 
     def taken_names(self, state: State) -> Collection[str]:
         """Names that a new instance may not have."""

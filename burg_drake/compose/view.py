@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from burg_drake.compose.checker import lost
 from burg_drake.compose.state import State
 from burg_drake.core.frames import Array
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Instance, SceneDocument
 from burg_drake.scene.validate import SceneIssue
 
-Status = Literal["ok", "collision", "in_ground", "out_of_bounds", "hovering"]
+if TYPE_CHECKING:
+    from burg_drake.compose.settling import Proposal
+    from burg_drake.evaluation.grasp_counts import GraspCount
+
+Status = Literal["ok", "collision", "in_ground", "out_of_bounds", "hovering", "unknown"]
+"""`unknown`: the library has no such object any more, or the scene cannot be checked."""
 
 WORST_FIRST: tuple[Status, ...] = ("collision", "in_ground", "out_of_bounds", "hovering")
 STATUS: Mapping[str, Status] = {
@@ -38,10 +44,16 @@ class View:
         undo_label: of the step that undo takes back; None if there is none.
         redo_label: of the step that redo takes again; None if there is none.
         saved: the file holds the scene as it is.
+        changed: there are changes that are in no file.
         path: the file; None if the scene was never saved.
         planar: objects that are moved keep their height and tilt.
         dragging: instances that are being dragged.
         notices: what the user should know, one line each, until `ComposeSession.dismiss`.
+        working: what is being done beside, and how far it is; None if nothing is.
+        proposal: what came of it, to be accepted or reverted.
+        grasps: how many grasps of each instance are clear and reachable, when they were counted
+            last; see `ComposeSession.watch_grasps`.
+        grasps_revision: the revision that these counts belong to.
     """
 
     serial: int
@@ -52,10 +64,15 @@ class View:
     undo_label: str | None
     redo_label: str | None
     saved: bool
+    changed: bool
     path: Path | None
     planar: bool
     dragging: tuple[str, ...] = ()
     notices: tuple[str, ...] = ()
+    working: str | None = None
+    proposal: Proposal | None = None
+    grasps: Mapping[str, GraspCount] = field(default_factory=dict)
+    grasps_revision: int = 0
 
     @property
     def document(self) -> SceneDocument:
@@ -82,13 +99,22 @@ class View:
         return self.state.X_SO(name)
 
 
-def status_of(state: State, issues: tuple[SceneIssue, ...]) -> dict[str, Status]:
-    """The worst that is said of each instance; both of a pair that overlaps are in collision."""
+def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, Status]:
+    """The worst that is said of each instance; both of a pair that overlaps are in collision.
+
+    Args:
+        state: with the instances.
+        issues: of the scene; None if it cannot be checked.
+    """
+    if issues is None:
+        return dict.fromkeys(state.instances, "unknown")
     said: dict[str, set[Status]] = {name: set() for name in state.instances}
     for issue in issues:
         for name in (issue.instance, issue.other):
             if name in said:
                 said[name].add(STATUS[issue.kind])
-    return {
-        name: next((s for s in WORST_FIRST if s in found), "ok") for name, found in said.items()
+    found: dict[str, Status] = {
+        name: next((status for status in WORST_FIRST if status in all_said), "ok")
+        for name, all_said in said.items()
     }
+    return found | dict.fromkeys(lost(state), "unknown")

@@ -1,0 +1,249 @@
+"""A process beside the session for what takes long: it does what was asked last."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Generic, Protocol, TypeVar
+
+from burg_drake.core.errors import BurgError, SimulationError
+from burg_drake.core.processes import cause_of_death, start_worker
+
+Result = TypeVar("Result", covariant=True)
+T = TypeVar("T")
+
+
+class Task(Protocol[Result]):
+    """What a worker does: a dataclass that can be pickled, as can what it gives."""
+
+    def __call__(self, report: Callable[[float, str], None]) -> Result:
+        """Does it.
+
+        Args:
+            report: tells how far it is: a share in [0, 1], and a word.
+
+        Raises:
+            BurgError: it cannot be done.
+        """
+
+
+class Job(Generic[T]):
+    """Something that was asked of a worker.
+
+    Attributes:
+        progress: share that is done, in [0, 1], and a word.
+        cancelled: nobody waits for it any more.
+        error: why it has no result; None if it has, or is not done.
+    """
+
+    def __init__(self, worker: Worker, task: Task[T], on_change: Callable[[Job[T]], None]) -> None:
+        self.progress: tuple[float, str] = (0.0, "waiting")
+        self.cancelled = False
+        self.error: BurgError | None = None
+        self.task = task
+        self._worker, self._on_change = worker, on_change
+        self._result: list[T] = []
+        self._over = threading.Event()
+
+    @property
+    def done(self) -> bool:
+        """It has a result or an error, or was cancelled."""
+        return self._over.is_set()
+
+    def wait(self, timeout: float | None = None) -> T:
+        """The result, when it is there.
+
+        Args:
+            timeout: [s].
+
+        Raises:
+            TimeoutError: it is not there by then.
+            BurgError: it cannot be done, or was cancelled.
+        """
+        if not self._over.wait(timeout):
+            raise TimeoutError(f"nothing after {timeout:g} s")
+        if self.error is not None:
+            raise self.error
+        return self._result[0]
+
+    def cancel(self) -> None:
+        """Ends it; nothing if it is done."""
+        self._worker.cancel(self)
+
+    def report(self, share: float, word: str) -> None:
+        """The worker is so far."""
+        self.progress = (share, word)
+        self._on_change(self)
+
+    def finish(self, result: T | BurgError) -> None:
+        """It is done."""
+        if isinstance(result, BurgError):
+            self.error = result
+        else:
+            self._result.append(result)
+        self._over.set()
+        self._on_change(self)
+
+
+class Cancelled(BurgError):
+    """Nobody waits for a result any more."""
+
+
+@dataclass(frozen=True)
+class _Report:
+    share: float
+    word: str
+
+
+class Worker:
+    """One process, started with the first task; of tasks that wait only the newest is done."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._waiting: Job[Any] | None = None
+        self._running: Job[Any] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._connection: Connection | None = None
+        self._thread: threading.Thread | None = None
+        self._closed = False
+
+    def ask(self, task: Task[T], on_change: Callable[[Job[T]], None] = lambda job: None) -> Job[T]:
+        """Asks for something; what waits for its turn is cancelled.
+
+        Args:
+            task: what to do.
+            on_change: called with the job when it is further or done, in a thread of the worker.
+        """
+        job = Job(self, task, on_change)
+        with self._changed:
+            older, self._waiting = self._waiting, job
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._serve, daemon=True)
+                self._thread.start()
+            self._changed.notify()
+        if older is not None:
+            _call_off(older)
+        return job
+
+    def cancel(self, job: Job[Any]) -> None:
+        """See `Job.cancel`."""
+        with self._changed:
+            if job.done or job.cancelled:
+                return
+            job.cancelled = True
+            if job is self._waiting:
+                self._waiting = None
+            elif job is self._running and self._process is not None:
+                self._process.kill()
+                return  # its thread sees that, and finishes the job
+        _call_off(job)
+
+    def close(self) -> None:
+        """Ends the process."""
+        with self._changed:
+            self._closed = True
+            if self._waiting is not None:
+                self._waiting.cancelled = True
+            if self._running is not None:
+                self._running.cancelled = True
+            if self._process is not None:
+                self._process.kill()
+            self._changed.notify()
+            thread = self._thread
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(timeout=5.0)
+
+    def _serve(self) -> None:
+        while True:
+            with self._changed:
+                while self._waiting is None and not self._closed:
+                    self._changed.wait()
+                job, self._waiting = self._waiting, None
+                closed = self._closed
+                self._running = job
+            if closed or job is None:
+                self._end()
+                if job is not None:
+                    _call_off(job)
+                return
+            result = self._do(job)
+            with self._changed:
+                self._running = None
+            job.finish(result)
+
+    def _do(self, job: Job[Any]) -> Any:
+        """The result of a job, or why there is none."""
+        try:
+            if self._connection is None:
+                process, connection = start_worker("burg_drake.compose.worker")
+                with self._changed:
+                    self._process, self._connection = process, connection
+            assert self._connection is not None
+            if job.cancelled:
+                return _cancelled()
+            self._connection.send(job.task)
+            while True:
+                message = self._connection.recv()
+                if not isinstance(message, _Report):
+                    return _cancelled() if job.cancelled else message
+                job.report(message.share, message.word)
+        except (EOFError, OSError):
+            cause = "no worker process can be started"
+            if self._process is not None:
+                cause = cause_of_death(self._process)
+            self._end()
+            if job.cancelled:
+                return _cancelled()
+            return SimulationError(f"{cause}; the scene is as it was, try again")
+
+    def _end(self) -> None:
+        with self._changed:
+            process, connection = self._process, self._connection
+            self._process = self._connection = None
+        if connection is not None:
+            connection.close()
+        if process is not None:
+            process.kill()
+            process.wait()
+
+
+def _call_off(job: Job[Any]) -> None:
+    job.cancelled = True
+    job.finish(_cancelled())
+
+
+def _cancelled() -> Cancelled:
+    return Cancelled("this was cancelled")
+
+
+def main(handle: int) -> None:
+    """Runs a worker until its parent closes the pipe.
+
+    Args:
+        handle: file descriptor of this end of the pipe.
+    """
+    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
+    connection = Connection(handle)
+    try:
+        while True:
+            task = connection.recv()
+            connection.send(_result(task, connection))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        pass  # the parent is gone
+    os._exit(0)
+
+
+def _result(task: Task[Any], connection: Connection) -> Any:
+    try:
+        return task(lambda share, word: connection.send(_Report(share, word)))
+    except BurgError as error:
+        return error
+    except (Exception, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+        return SimulationError(
+            f"this failed: {' '.join(str(error).split()) or type(error).__name__}"
+        )
