@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from burg_drake import load_scene, load_station
+from burg_drake import load_scene
 from burg_drake.compose import AddObject, ComposeSession, Delete, Move
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
-from burg_drake.station.station import Station
-
-
-@pytest.fixture(scope="module")
-def station() -> Station:
-    return load_station("panda_tabletop")
-
-
-@pytest.fixture
-def session(station: Station, tmp_path: Path) -> ComposeSession:
-    return ComposeSession.open("household", station, folder=tmp_path)
 
 
 def test_steps_are_undone_and_redone(session: ComposeSession) -> None:

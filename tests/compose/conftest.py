@@ -1,0 +1,23 @@
+"""One station for all tests of sessions, without an arm, which would take a while."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from burg_drake import load_station
+from burg_drake.compose import ComposeSession
+from burg_drake.station.station import Station
+
+
+@pytest.fixture(scope="session")
+def station() -> Station:
+    return load_station("wsg_tabletop")
+
+
+@pytest.fixture
+def session(station: Station, tmp_path: Path) -> Iterator[ComposeSession]:
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        yield session

@@ -1,0 +1,52 @@
+"""A session in a process of its own, to be killed or to run out of disk; run by its path.
+
+Arguments: what to open, the folder, and `work`, `saved` or `full`.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from pathlib import Path
+
+from burg_drake import load_station
+from burg_drake.compose import AddObject, ComposeSession, Delete
+from burg_drake.core.errors import BurgError
+
+
+def main(reference: str, folder: str, what: str) -> None:
+    """Takes four steps, takes one of them back, and waits to be killed; or fills the disk."""
+    session = ComposeSession.open(
+        reference, load_station("wsg_tabletop"), folder=folder, address="http://127.0.0.1:8080"
+    )
+    for x in (0.1, 0.3):
+        session.do(AddObject("bowl", position=(x, 0.15)))
+    if what == "full":
+        fill_the_disk(session, folder)
+        return
+    session.do(AddObject("marble"))
+    session.do(Delete(("bowl",)))
+    session.undo()
+    if what == "saved":
+        session.save("breakfast")
+    print("ready", flush=True)
+    time.sleep(60)
+
+
+def fill_the_disk(session: ComposeSession, folder: str) -> None:
+    """Goes on with a file that was saved, when no file may grow beyond 200 bytes any more."""
+    session.save("breakfast")
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200, resource.RLIM_INFINITY))
+    view = session.do(AddObject("marble"))
+    print(len(view.instances), view.notices)
+    try:
+        session.save()
+    except BurgError as error:
+        print(error, (Path(folder) / "breakfast.yaml").read_text().count("object:"))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    print(session.do(Delete(("marble",))).notices, session.save().saved)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,137 @@
+"""What is left of a session that ends otherwise than by `close`, and what is done with it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from burg_drake.compose import AddObject, ComposeSession
+from burg_drake.compose.scene_file import FileChanged
+from burg_drake.compose.scene_lock import SceneInUse
+from burg_drake.station.station import Station
+
+SCRIPT = Path(__file__).with_name("scripted_session.py")
+
+
+def start(reference: str, folder: Path, what: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, str(SCRIPT), reference, str(folder), what],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+
+
+def test_a_killed_session_goes_on_where_it_was(station: Station, tmp_path: Path) -> None:
+    process = start("household", tmp_path, "work")
+    assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    try:
+        other = ComposeSession.open("household", station, folder=tmp_path)
+        assert other.view.document.name == "new_scene_2"  # the first one is in use
+        other.close()
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        view = session.view
+        assert view.notices == (
+            "recovered what was not saved of 'new_scene': 3 steps, all can be undone",
+        )
+        assert list(view.instances) == ["bowl", "bowl_2", "marble"]
+        assert (view.undo_label, view.redo_label) == ("add marble", "delete bowl")
+        assert list(session.redo().instances) == ["bowl_2", "marble"]
+        for _ in range(4):
+            session.undo()
+        assert not session.view.instances
+    assert not list(tmp_path.iterdir())  # nothing was left to keep
+
+
+def test_a_second_process_is_sent_to_the_first(station: Station, tmp_path: Path) -> None:
+    process = start("household", tmp_path, "saved")
+    assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    path = tmp_path / "breakfast.yaml"
+    try:
+        with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:8080; go there"):
+            ComposeSession.open(path, station)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    with ComposeSession.open(path, station) as session:  # saved, and with its history
+        assert session.view.saved and not session.view.notices
+        assert session.undo().undo_label == "add bowl"
+
+
+def test_with_a_full_disk_editing_goes_on_and_the_old_file_stays(tmp_path: Path) -> None:
+    process = start("household", tmp_path, "full")
+    assert process.stdout is not None
+    editing, saving, after = process.stdout.read().splitlines()
+    assert process.wait() == 0
+    assert editing.startswith("3 ") and "until then changes are kept in memory alone" in editing
+    assert saving.startswith(f"cannot write {tmp_path / 'breakfast.yaml'}: File too large")
+    assert saving.endswith(" 2")  # objects in the file
+    assert after == "() True"
+
+
+@pytest.fixture
+def left(station: Station, tmp_path: Path) -> Path:
+    """The journal of a session that had a file and two more steps."""
+    session = ComposeSession.open("household", station, folder=tmp_path)
+    session.do(AddObject("mug"))
+    session.save("breakfast")
+    session.do(AddObject("marble"))
+    session.do(AddObject("box", position=(0.3, 0.1)))
+    session.close()
+    return tmp_path / ".breakfast.yaml.journal"
+
+
+def test_a_torn_last_line_is_left_out(station: Station, left: Path) -> None:
+    left.write_bytes(left.read_bytes()[:-20])
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        assert list(session.view.instances) == ["mug", "marble"]
+
+
+def test_a_damaged_journal_is_kept_aside(station: Station, left: Path) -> None:
+    lines = left.read_text().splitlines()
+    lines[-1] = lines[-1].replace('"box"', '["box"]')
+    left.write_text("\n".join(lines) + "\n")
+    damaged = left.read_bytes()
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        aside = left.with_name(".breakfast.yaml.journal.damaged_1")
+        assert session.view.notices[0] == (
+            f"the journal of the last session is damaged; it is kept as {aside}"
+        )
+        assert list(session.view.instances) == ["mug", "marble"]
+    assert aside.read_bytes() == damaged
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\n", b"[]\n", b"{}\nnull\n", b'{"at": 3}\n'])
+def test_what_is_no_journal_is_no_obstacle(station: Station, left: Path, content: bytes) -> None:
+    left.write_bytes(content)
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        assert list(session.view.instances) == ["mug"]
+        assert "is damaged" in session.view.notices[0]
+
+
+def test_a_file_that_was_changed_since_is_not_overwritten(station: Station, left: Path) -> None:
+    path = left.with_name("breakfast.yaml")
+    path.write_text(path.read_text().replace("mug", "can"))
+    with ComposeSession.open(path, station) as session:
+        assert "was changed since" in session.view.notices[0]
+        assert list(session.view.instances) == ["mug", "marble", "box"]
+        with pytest.raises(FileChanged):
+            session.save()
+        assert list(session.load(discard=True).instances) == ["can"]
+        assert session.view.saved
+        assert list(session.undo().instances) == ["mug", "marble", "box"]
+
+
+def test_a_journal_writes_each_instance_once(left: Path) -> None:
+    lines = [json.loads(line) for line in left.read_text().splitlines()]
+    written = [instance[1] for line in lines for instance in line.get("new", ())]
+    assert written == ["mug", "marble", "box"]
