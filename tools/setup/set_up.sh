@@ -83,7 +83,7 @@ fi
 say "installing burg_drake and what it needs into $venv (Drake is large: this takes a minute or more)"
 quiet=(-qq)
 [ -t 1 ] && quiet=()
-"$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check -e '.[dev]'
+"$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check -e '.[dev,ui]'
 
 install_system_libraries
 say "done: $("$venv/bin/python" -c 'import importlib.metadata as m; print("drake", m.version("drake"))') in $venv"

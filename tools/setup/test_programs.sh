@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the programs that some tests hold burg_drake against, where apt is at hand and needs no
-# password: ROS 1 for the ROS node. Without them those tests skip and say so.
+# Installs the programs that some tests need, where apt is at hand and needs no password: Chromium for
+# pages, ROS 1 for the ROS node. Without them those tests skip and say so.
 set -euo pipefail
 # shellcheck source=tools/setup/apt.sh
 . "$(dirname "$0")/apt.sh"
@@ -18,6 +18,12 @@ want() {
   apt_install_within $((patience - SECONDS)) "${missing[@]}" ||
     say "no $name: tests that need it skip (missing: ${missing[*]})"
 }
+
+# Some 80 MB, and as much of libraries where nothing with a window is installed. Ubuntu's package of
+# that name only fetches a snap, which no test can use.
+if ! command -v chromium chromium-browser google-chrome > /dev/null; then
+  grep -q '^ID=ubuntu' /etc/os-release || want Chromium chromium
+fi
 
 want "ROS 1" python3-rospy python3-rosmaster python3-cv-bridge python3-sensor-msgs \
   python3-geometry-msgs python3-tf2-msgs
