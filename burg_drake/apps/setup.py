@@ -61,9 +61,10 @@ def run_setup(arguments: argparse.Namespace) -> int:
 
     require_viser()  # before anything that takes time
     with terminated_as_interrupted():
-        session = _open(arguments)
         closing = contextlib.ExitStack()
         try:
+            session = closing.enter_context(_open(arguments))
+            closing.callback(_say_what_is_left, session)
             door = _serve(arguments, session, closing)
             _tell(door, session)
             if arguments.open:
@@ -93,6 +94,7 @@ def _serve(
 
     door = closing.enter_context(serve(arguments.host, arguments.port, title="burg_drake: setup"))
     closing.callback(SetupPage(door.server, session).close)
+    session.announce(door.address)
     door.admission.on_admitted = lambda address: _tell_next(door, address)
     return door
 
@@ -106,6 +108,16 @@ def _tell(door: Door, session: ComposeSession) -> None:
     for notice in view.notices:
         print(f"burg-drake: {notice}", file=sys.stderr, flush=True)
     print("Press Ctrl-C to end.", flush=True)
+
+
+def _say_what_is_left(session: ComposeSession) -> None:
+    view = session.view
+    if not view.saved and (view.undo_label or view.redo_label):
+        print(
+            f"burg-drake: changes of {view.document.name} are not saved; they are there when the"
+            " same is opened again",
+            file=sys.stderr,
+        )
 
 
 def _tell_next(door: Door, address: str) -> None:

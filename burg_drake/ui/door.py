@@ -47,11 +47,16 @@ class Door:
     admission: Admission
 
     @property
+    def address(self) -> str:
+        """Of the page, for browsers that were let in."""
+        return page_url(self.host, self.port)
+
+    @property
     def url(self) -> str:
-        """Address of the page; with a token that one browser may use if other machines can
-        reach it. Once it has been used, there is a new one for the next browser."""
+        """Address of the page for the next browser; with a token, good for this one alone, if
+        other machines can reach it."""
         token = self.admission.token
-        return page_url(self.host, self.port) + (f"?token={token}" if token else "")
+        return f"{self.address}?token={token}" if token else self.address
 
     def close(self) -> None:
         """Stops serving; browsers see that the connection is lost."""

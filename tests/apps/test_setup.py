@@ -98,3 +98,13 @@ def test_without_viser(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
     assert main(["setup"]) == 2
     said = capsys.readouterr().err
     assert said == "burg-drake: error: the page needs viser: pip install 'burg-drake[ui]'\n"
+
+
+def test_a_second_process_is_told_where_the_first_one_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "breakfast.yaml"
+    scene.write_text(MUG)
+    with running(tmp_path, "breakfast.yaml") as (_, line):
+        assert main(["setup", str(scene)]) == 2
+        assert url_in(line) in capsys.readouterr().err
