@@ -1,4 +1,4 @@
-"""The panel of the display: colours of objects, markers, handles, where the camera looks from."""
+"""The panel of the display: colours of objects, markers, and where the camera looks from."""
 
 from __future__ import annotations
 
@@ -38,10 +38,7 @@ class DisplayPanel:
         with gui.add_folder("Display"):
             self._colors: Any = gui.add_dropdown("Objects", tuple(COLORINGS))
             self._markers = gui.add_checkbox("Markers", True)
-            self._handles = gui.add_checkbox(
-                "Handles", True, hint="Arrows and rings at what is selected"
-            )
-            for field in (self._colors, self._markers, self._handles):
+            for field in (self._colors, self._markers):
                 actions.chosen(field, lambda value: on_change())
             actions.clicked_by(
                 quiet_button(gui, "From above", width=6, icon=icon.ARROW_BAR_DOWN, hint="View (T)"),
@@ -63,11 +60,6 @@ class DisplayPanel:
     def markers(self) -> bool:
         """Whether markers are drawn on the board."""
         return bool(self._markers.value)
-
-    @property
-    def handles(self) -> bool:
-        """Whether what is selected has handles."""
-        return bool(self._handles.value)
 
     def next_colors(self) -> None:
         """Goes on to the next colours."""

@@ -1,4 +1,7 @@
-"""Handles at the selection: arrows and rings that move and turn it, in the plane or freely."""
+"""Handles at the selection while it may move freely: arrows and rings for all six directions.
+
+Where movement is restricted to the plane there are none; the mouse drags objects themselves there.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from burg_drake.core.frames import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
+from burg_drake.ui.middles import common_middle
 from burg_drake.ui.page_actions import PageActions
 
 SIZE = 0.11
@@ -33,37 +37,31 @@ class Gizmo:
     def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:
         self._scene, self._actions = scene, actions
         self._handle: viser.TransformControlsHandle | None = None
-        self._planar = True
         self._drag: Drag | None = None
         self._X_SGi = np.eye(4)
         self._start: dict[str, Array] = {}
-        self.enabled = True
 
     def show(self, view: View) -> None:
         """Brings the handles to a view; while they are dragged they are the pointer's."""
         if self._drag is not None and not self._drag.is_over:
             return
-        if not view.selection or not self.enabled:
+        if not view.selection or view.planar:
             if self._handle is not None:
                 self._handle.visible = False
             return
-        if self._handle is None or self._planar != view.planar:
-            self._planar = view.planar
-            self._make()
-        assert self._handle is not None
-        poses = [view.X_SO(name) for name in view.selection]
-        R_SG = np.eye(3) if len(poses) > 1 or view.planar else poses[0][:3, :3]
-        middle = np.mean([X[:3, 3] for X in poses], axis=0)
-        self._handle.position = middle
+        if self._handle is None:
+            self._handle = self._made()
+        alone = len(view.selection) == 1
+        R_SG = view.X_SO(view.selection[0])[:3, :3] if alone else np.eye(3)
+        self._handle.position = common_middle(view, view.selection)
         self._handle.wxyz = quaternion_from_rotation(R_SG)
         self._handle.visible = True
 
-    def _make(self) -> None:
+    def _made(self) -> viser.TransformControlsHandle:
         handle = self._scene.add_transform_controls(
             "/gizmo",
             scale=SIZE,
             line_width=3.0,
-            active_axes=(True, True, not self._planar),
             depth_test=False,
             opacity=0.9,
         )
@@ -80,7 +78,7 @@ class Gizmo:
             else:
                 self._actions.ask(self._end, event.client)
 
-        self._handle = handle
+        return handle
 
     def _begin(self, X_SG: Array) -> None:
         view = self._actions.session.view

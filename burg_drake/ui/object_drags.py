@@ -13,7 +13,8 @@ import numpy as np
 
 from burg_drake.compose.drag import Drag
 from burg_drake.core.errors import BurgError
-from burg_drake.core.frames import Array
+from burg_drake.core.frames import Array, make_pose, rot_z
+from burg_drake.ui.middles import about, common_middle
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.pointer import Eye
 
@@ -28,11 +29,15 @@ class _Held:
 
     Attributes:
         drag: of the session.
+        X_SO: (4, 4) poses by instance at the start.
+        p_SM: (3,) what turns go about [m].
         p_SG: (3,) what was grabbed [m].
         x: of the pointer on the page at the start, 0 to 1.
     """
 
     drag: Drag
+    X_SO: dict[str, Array]
+    p_SM: Array
     p_SG: Array
     x: float
 
@@ -83,9 +88,11 @@ class ObjectDrags:
 
     def _begin(self, who: int, name: str, p_SG: Array, x: float) -> None:
         self._end(who)
-        selection = self._actions.session.view.selection
-        names = selection if name in selection else (name,)
-        self._held[who] = _Held(self._actions.session.drag(names), p_SG, x)
+        view = self._actions.session.view
+        names = view.selection if name in view.selection else (name,)
+        X_SO = {held: view.X_SO(held) for held in names}
+        drag = self._actions.session.drag(names)
+        self._held[who] = _Held(drag, X_SO, common_middle(view, names), p_SG, x)
 
     def _move(self, who: int, eye: Eye, p_SQ: Array) -> None:
         held = self._held.get(who)
@@ -93,17 +100,18 @@ class ObjectDrags:
             return
         p_SP = eye.on_plane(p_SQ, held.p_SG, UP)
         if p_SP is not None:
-            x, y, _ = p_SP - held.p_SG
-            self._carry(who, held, (float(x), float(y)), 0.0)
+            self._carry(who, held, make_pose(p_AB=p_SP - held.p_SG))
 
     def _turn(self, who: int, x: float) -> None:
         held = self._held.get(who)
         if held is not None:
-            self._carry(who, held, (0.0, 0.0), FULL_TURN * (x - held.x))
+            R = rot_z(FULL_TURN * (x - held.x))
+            self._carry(who, held, about(held.p_SM, R, np.zeros(3)))
 
-    def _carry(self, who: int, held: _Held, offset: tuple[float, float], yaw: float) -> None:
+    def _carry(self, who: int, held: _Held, X: Array) -> None:
+        """Holds what is dragged where a motion (4, 4) in S brings it from the start."""
         try:
-            held.drag.move_by((*offset, 0.0), yaw)
+            held.drag.move({name: X @ X_SO for name, X_SO in held.X_SO.items()})
         except BurgError:
             self._held.pop(who, None)  # told once; the rest of the gesture is nothing any more
             raise

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from burg_drake.ui.middles import middle
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.pointer import Eye
 
@@ -72,8 +73,5 @@ class Picking:
 
 def _middle_in(view: Any, name: str, eye: Eye, lower: Any, upper: Any) -> bool:
     """Whether the middle of an instance's bounds is seen within a rectangle."""
-    entry = view.library.objects.get(view.instances[name].object)
-    p_OM = np.zeros(3) if entry is None else (np.array(entry.lower) + np.array(entry.upper)) / 2.0
-    X_SO = view.X_SO(name)
-    seen = eye.on_screen(X_SO[:3, :3] @ p_OM + X_SO[:3, 3])[0]
+    seen = eye.on_screen(middle(view, name))[0]
     return bool((seen >= lower).all() and (seen <= upper).all())

@@ -159,7 +159,6 @@ class SetupPage:
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
             self._scene.show(_shown(view), self._display.coloring)
-            self._gizmo.enabled = self._display.handles
             self._gizmo.show(view)
             for panel in (self._summary, self._object, self._arrange, self._check, self._fill):
                 panel.show(view)

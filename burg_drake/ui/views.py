@@ -14,6 +14,8 @@ TOP_FOV = float(np.deg2rad(18.0))
 FRONT_ELEVATION = float(np.deg2rad(50.0))
 ROOM = 1.22
 """How much more than the board is in view."""
+FIRST_ASPECT = 0.9
+"""Width over height that a new page has for the scene, at the least."""
 TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
 
@@ -53,7 +55,7 @@ def look(client: viser.ClientHandle, board: Board, *, from_above: bool) -> None:
 
 def begin_with(server: viser.ViserServer, board: Board) -> None:
     """Where the camera of a new page is."""
-    position, target, fov = viewpoint(board, from_above=False, aspect=1.0)
+    position, target, fov = viewpoint(board, from_above=False, aspect=FIRST_ASPECT)
     server.initial_camera.position = position
     server.initial_camera.look_at = target
     server.initial_camera.fov = fov

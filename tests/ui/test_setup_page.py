@@ -1,0 +1,160 @@
+"""The setup page in a real browser, by real mouse and keys; what counts is the session, and the
+file that it writes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from burg_drake.compose.session import ComposeSession
+from burg_drake.compose.view import View
+from burg_drake.station.station import load_station
+from burg_drake.ui.door import Door, serve
+from burg_drake.ui.pointer import Eye
+from burg_drake.ui.setup_page import SetupPage
+
+PATIENCE = 60.0
+ONE_TRY = 3.0
+
+
+def until(true: Callable[[], Any], what: str, patience: float = PATIENCE) -> None:
+    """Waits for a state."""
+    end = time.monotonic() + patience
+    while not true():
+        assert time.monotonic() < end, f"waited in vain: {what}"
+        time.sleep(0.02)
+
+
+@dataclass
+class Setup:
+    """A session, the page on it, and a browser's tab that has it open."""
+
+    session: ComposeSession
+    page: SetupPage
+    door: Door
+    tab: Any
+
+    @property
+    def view(self) -> View:
+        return self.session.view
+
+    def open(self) -> None:
+        """Opens the page, and waits until the server knows where its camera is."""
+        self.tab.goto(self.door.url)
+        self.tab.get_by_text("click one to add it").wait_for()
+        until(self.door.server.get_clients, "a browser")
+
+    def on_screen(self, p_SQ: Any) -> tuple[float, float]:
+        """Where a point of the scene is on the tab [pixel]."""
+        client = list(self.door.server.get_clients().values())[-1]
+        box = self.tab.locator("canvas").first.bounding_box()
+        x, y = Eye.of(client.camera).on_screen(p_SQ)[0]
+        return float(box["x"] + x * box["width"]), float(box["y"] + y * box["height"])
+
+    def middle(self, name: str) -> Any:
+        """(3,) middle of an instance's bounds in S [m]."""
+        entry = self.view.state.entry(name)
+        X_SO = self.view.X_SO(name)
+        return X_SO[:3, :3] @ (np.add(entry.lower, entry.upper) / 2.0) + X_SO[:3, 3]
+
+    def drag(self, name: str, offset: Any, key: str | None = None) -> None:
+        """Drags an instance by an offset (3,) in S with the mouse, and holds it there.
+
+        A press that comes before the browser has drawn the object takes hold of nothing: then it
+        is tried again.
+        """
+        mouse, start = self.tab.mouse, self.middle(name)
+        x, y = self.on_screen(start)
+        if key:
+            self.tab.keyboard.down(key)
+        for _ in range(20):
+            mouse.move(x, y)
+            mouse.down()
+            mouse.move(x + 6, y)
+            mouse.move(x + 8, y)
+            try:
+                until(lambda: self.view.dragging, f"hold of {name}", ONE_TRY)
+                break
+            except AssertionError:
+                mouse.up()
+        mouse.move(*self.on_screen(start + offset), steps=3)
+
+    def let_go(self, key: str | None = None) -> None:
+        self.tab.mouse.up()
+        if key:
+            self.tab.keyboard.up(key)
+        until(lambda: not self.view.dragging, "let go")
+
+    def click(self, name: str) -> None:
+        """Presses a button, of which there is one of that name."""
+        self.tab.get_by_role("button", name=name, exact=True).click()
+
+    def tab_of(self, name: str) -> None:
+        """Brings a tab of the panel to the front."""
+        self.tab.get_by_text(name, exact=True).first.click()
+
+
+@pytest.fixture
+def setup(page: Any, tmp_path: Path) -> Iterator[Setup]:
+    session = ComposeSession.open("household", load_station("panda_tabletop"), folder=tmp_path)
+    with serve(port=0) as door:
+        built = SetupPage(door.server, session)
+        page.set_viewport_size({"width": 1000, "height": 640})
+        yield Setup(session, built, door, page)
+        built.close()
+
+
+def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> None:
+    setup.open()
+    setup.click("box")
+    until(lambda: "box" in setup.view.instances, "a box")
+    before = setup.view.X_SO("box")
+
+    setup.drag("box", np.array([-0.15, 0.03, 0.0]))
+    until(lambda: setup.view.X_SO("box")[0, 3] < before[0, 3] - 0.13, "the box has moved")
+    setup.let_go()
+    moved = setup.view.X_SO("box")
+    # the pointer takes hold of the box's top, which is nearer to the camera than its middle
+    np.testing.assert_allclose(moved[:3, 3] - before[:3, 3], [-0.15, 0.03, 0.0], atol=0.012)
+    np.testing.assert_allclose(moved[:3, :3], before[:3, :3], atol=1e-6)
+
+    setup.tab.keyboard.press("Control+z")
+    until(lambda: np.array_equal(setup.view.X_SO("box"), before), "undone")
+    setup.tab.keyboard.press("Control+Shift+z")
+    until(lambda: np.array_equal(setup.view.X_SO("box"), moved), "done again")
+
+    setup.click("can")
+    until(lambda: "can" in setup.view.instances, "a can")
+    setup.drag("can", setup.middle("box") - setup.middle("can"))
+    until(lambda: setup.view.status["can"] == "collision", "a collision is seen while dragging")
+    assert setup.view.dragging == ("can",)
+    setup.tab.get_by_text("in collision").first.wait_for()
+    setup.let_go()
+    setup.tab.keyboard.press("Control+z")
+    until(lambda: setup.view.status["can"] == "ok", "apart again")
+
+    assert setup.view.selection == ("can",)
+    setup.tab.get_by_role("button", name="%").nth(1).click()
+    up_O = setup.view.state.entry("can").stable_poses[1].X_SO.matrix()[2, :3]
+    until(lambda: np.allclose(setup.view.X_SO("can")[2, :3], up_O, atol=1e-4), "another pose")
+
+    setup.tab_of("Scene")
+    setup.tab.get_by_label("Name").last.fill("breakfast")
+    setup.click("Save scene")
+    until(lambda: setup.view.saved, "saved")
+    document = yaml.safe_load((tmp_path / "breakfast.yaml").read_text())
+    assert document["name"] == "breakfast"
+    assert [i["object"] for i in document["instances"]] == ["box", "can"]
+    np.testing.assert_allclose(
+        document["instances"][0]["X_SO"]["translation"], moved[:3, 3], atol=1e-6
+    )
+    with setup.tab.expect_download() as download:
+        setup.click("Save printout")
+    assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
