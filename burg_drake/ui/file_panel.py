@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import viser
 
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
 from burg_drake.compose.view import View
-from burg_drake.printout.board_printout import PrintSettings, print_board
+from burg_drake.printout.board_printout import PrintSettings
 from burg_drake.printout.paper import PAPERS
 from burg_drake.ui.buttons import quiet_button, strong_button
 from burg_drake.ui.dialogs import confirm
@@ -37,8 +37,23 @@ class FilePanel:
             actions.clicked_by(strong_button(gui, "Save scene", icon=icon.DEVICE_FLOPPY), self.save)
         with gui.add_folder("Load"):
             self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
+            actions.clicked_by(quiet_button(gui, "Load scene", icon=icon.FOLDER_OPEN), self._load)
+            self._library = gui.add_dropdown("Library", actions.session.libraries())
             actions.clicked_by(
-                quiet_button(gui, "Load scene", icon=icon.FOLDER_OPEN), self._load_chosen
+                quiet_button(
+                    gui, "New scene", width=6, icon=icon.FILE_PLUS, hint="With this library"
+                ),
+                self._begin,
+            )
+            actions.clicked(
+                quiet_button(
+                    gui,
+                    "Use library",
+                    width=6,
+                    icon=icon.PACKAGE,
+                    hint="Take the objects of this scene, and new ones, from this library",
+                ),
+                lambda: actions.session.use_library(self._library.value),
             )
         with gui.add_folder("Print"):
             self._page = gui.add_dropdown("Page size", tuple(PAPERS), initial_value="A4")
@@ -54,6 +69,9 @@ class FilePanel:
         names = scene_names(self._actions.session.folder) or (NO_SCENES,)
         if names != self._scene.options:
             self._scene.options = names
+        libraries = self._actions.session.libraries()
+        if libraries != self._library.options:
+            self._library.options = libraries
 
     def save(self, client: Client) -> None:
         """Writes the scene to the file of the name that stands in the field."""
@@ -77,11 +95,10 @@ class FilePanel:
         assert view.path is not None
         self._actions.tell(client, str(view.path), "Saved")
 
-    def load(self, name: str, client: Client) -> None:
-        """Opens a scene of the folder, and asks first if something would be lost."""
-        session = self._actions.session
+    def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
+        """Goes over to another scene, and asks first if something would be lost."""
         try:
-            session.load(name)
+            open(name)
         except UnsavedChanges as error:
             if client is None:
                 raise
@@ -90,23 +107,26 @@ class FilePanel:
                 client,
                 "Discard changes?",
                 str(error),
-                "Discard and load",
-                lambda: session.load(name, discard=True),
+                "Discard them",
+                lambda: open(name, discard=True),
             )
 
     def print_out(self, client: Client) -> None:
         """Sends the printout of the board to a page."""
         session = self._actions.session
-        document = session.view.document
-        scene = session.view.state.scene(session.view.path or Path(f"{document.name}.yaml"))
-        printout = print_board(scene, PrintSettings(page=self._page.value))
+        printout = session.printout(PrintSettings(page=self._page.value))
         for warning in printout.warnings:
             self._actions.warn(client, warning, "On the printout")
         if client is not None:
             client.send_file_download(
-                f"{document.name}_{self._page.value}.pdf", printout.pdf, save_immediately=True
+                f"{session.view.document.name}_{self._page.value}.pdf",
+                printout.pdf,
+                save_immediately=True,
             )
 
-    def _load_chosen(self, client: Client) -> None:
+    def _load(self, client: Client) -> None:
         if self._scene.value != NO_SCENES:
-            self.load(self._scene.value, client)
+            self._open(self._actions.session.load, self._scene.value, client)
+
+    def _begin(self, client: Client) -> None:
+        self._open(self._actions.session.new, self._library.value, client)

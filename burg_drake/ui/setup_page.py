@@ -7,7 +7,7 @@ on to all of them; whatever is decided is decided by the session.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import viser
 
@@ -21,6 +21,7 @@ from burg_drake.ui.check_panel import CheckPanel
 from burg_drake.ui.display_panel import DisplayPanel
 from burg_drake.ui.file_panel import FilePanel
 from burg_drake.ui.fill_panel import FillPanel
+from burg_drake.ui.ghost_view import GhostView
 from burg_drake.ui.gizmo import Gizmo
 from burg_drake.ui.key_calls import selection_calls
 from burg_drake.ui.library_panel import LibraryPanel
@@ -33,6 +34,7 @@ from burg_drake.ui.panel_text import style
 from burg_drake.ui.picking import Picking
 from burg_drake.ui.pose_panel import PosePanel
 from burg_drake.ui.scene_view import SceneView, Shown
+from burg_drake.ui.settle_panel import SettlePanel
 from burg_drake.ui.shortcuts import Call, register, show_overlay
 from burg_drake.ui.summary_panel import SummaryPanel
 from burg_drake.ui.views import begin_with
@@ -40,6 +42,12 @@ from burg_drake.ui.views import begin_with
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
 BLUE = (34, 139, 230)
+
+
+class _Panel(Protocol):
+    """Shows a view of the session."""
+
+    def show(self, view: View) -> None: ...
 
 
 class SetupPage:
@@ -64,6 +72,7 @@ class SetupPage:
         self._drags = ObjectDrags(self.actions)
         self._picking = Picking(server.scene, self.actions)
         self._scene = SceneView(server.scene, self._shapes, self._attach)
+        self._ghosts = GhostView(server.scene)
         self._gizmo = Gizmo(server.scene, self.actions)
         self._build()
         self.actions.on_refused = self._refresh
@@ -108,10 +117,21 @@ class SetupPage:
             self._files = FilePanel(gui, actions)
         with tabs.add_tab("Check", viser.Icon.CHECKLIST):
             self._check = CheckPanel(gui)
+            self._settle = SettlePanel(gui, actions)
         with tabs.add_tab("View", viser.Icon.EYE):
             self._display = DisplayPanel(gui, actions, self._refresh)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(RIGHT_WIDTH)
+        self._panels: tuple[_Panel, ...] = (
+            self._summary,
+            self._object,
+            self._arrange,
+            self._board_panel,
+            self._fill,
+            self._files,
+            self._check,
+            self._settle,
+        )
         register(gui, actions, self._calls())
 
     def _calls(self) -> dict[str, Call]:
@@ -123,6 +143,7 @@ class SetupPage:
         calls = selection_calls(self._session)
         return {name: anywhere(action) for name, action in calls.items()} | {
             "save": self._files.save,
+            "settle": anywhere(self._session.settle),
             "snap": anywhere(self._arrange.snap),
             "top": self._display.look_from_above,
             "front": self._display.look_from_front,
@@ -159,11 +180,10 @@ class SetupPage:
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
             self._scene.show(_shown(view), self._display.coloring)
+            self._ghosts.show(view.proposal, self._shapes)
             self._gizmo.show(view)
-            for panel in (self._summary, self._object, self._arrange, self._check, self._fill):
+            for panel in self._panels:
                 panel.show(view)
-            self._board_panel.show(view)
-            self._files.show(view)
             self._library.show(view, self._pictures)
             self._poses.show(view, self._pictures)
         self._server.flush()

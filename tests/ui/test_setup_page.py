@@ -96,6 +96,11 @@ class Setup:
         """Presses a button, of which there is one of that name."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
+    def fill(self, label: str, text: str) -> None:
+        """Types into the field of a label, the last on the page that can be seen."""
+        row = f"//label[normalize-space()='{label}']/ancestor::div[.//input][1]//input"
+        self.tab.locator(f"xpath={row}").locator("visible=true").last.fill(text)
+
     def tab_of(self, name: str) -> None:
         """Brings a tab of the panel to the front."""
         self.tab.get_by_text(name, exact=True).first.click()
@@ -146,7 +151,7 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     until(lambda: np.allclose(setup.view.X_SO("can")[2, :3], up_O, atol=1e-4), "another pose")
 
     setup.tab_of("Scene")
-    setup.tab.get_by_label("Name").last.fill("breakfast")
+    setup.fill("Name", "breakfast")
     setup.click("Save scene")
     until(lambda: setup.view.saved, "saved")
     document = yaml.safe_load((tmp_path / "breakfast.yaml").read_text())

@@ -1,0 +1,70 @@
+"""Where objects would come to rest, as shades beside the objects themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+
+from burg_drake.compose.settling import Proposal
+from burg_drake.compose.state import name_of
+from burg_drake.core.errors import BurgError
+from burg_drake.core.frames import quaternion_from_rotation
+from burg_drake.ui.object_shapes import ObjectShapes
+from burg_drake.ui.settle_panel import moved_names
+from burg_drake.ui.status_colors import Rgb
+
+COLOR: Rgb = (245, 159, 0)
+OPACITY = 0.5
+
+
+class GhostView:
+    """Shows a proposal of the session.
+
+    Args:
+        scene: of viser.
+    """
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shown: Proposal | None = None
+        self._handles: list[Any] = []
+
+    def show(self, proposal: Proposal | None, shapes: ObjectShapes) -> None:
+        """Brings the browser to a proposal, or to none.
+
+        Args:
+            proposal: of the view.
+            shapes: of the library's objects.
+        """
+        if proposal is self._shown:
+            return
+        self._shown = proposal
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        if proposal is None:
+            return
+        moved = set(moved_names(proposal))
+        for instance in proposal.document.instances:
+            if name_of(instance) in moved:
+                self._add(name_of(instance), instance.object, instance.X_SO.matrix(), shapes)
+
+    def _add(self, name: str, object: str, X_SO: Any, shapes: ObjectShapes) -> None:
+        try:
+            shape = shapes[object]
+        except BurgError:  # what is wrong with it is told elsewhere
+            return
+        self._handles.append(
+            self._scene.add_mesh_simple(
+                f"/ghosts/{name}",
+                shape.vertices,
+                shape.faces,
+                color=COLOR,
+                opacity=OPACITY,
+                side="double",
+                cast_shadow=False,
+                position=X_SO[:3, 3],
+                wxyz=quaternion_from_rotation(X_SO[:3, :3]),
+            )
+        )
