@@ -41,6 +41,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.evaluation.sampled_set": ["sample_grasps"],
         "burg_drake.evaluation.sampling_settings": ["SamplingSettings"],
         "burg_drake.evaluation.scored_set": ["scored_set"],
+        "burg_drake.export.export": ["export_scene"],
         "burg_drake.formats.grasp_files": ["read_grasp_file", "write_grasp_file"],
         "burg_drake.grasping.approach": ["ApproachCone"],
         "burg_drake.grasping.antipodal": ["sample_antipodal"],

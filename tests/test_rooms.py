@@ -18,6 +18,7 @@ ROOMS = [
     "scene",
     "printout",
     "station",
+    "export",
     "cameras",
     "ros",
     "grasping",

@@ -1,4 +1,4 @@
-"""`burg-drake scene`: show, validate and settle scenes; `scene_import` has imports."""
+"""`burg-drake scene`: show, validate and settle; `scene_export`, `scene_import` have the rest."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps import scene_import
+from burg_drake.apps import scene_export, scene_import
 from burg_drake.apps.arguments import (
     DEFAULT_ENGINE,
     ENGINE_NAMES,
@@ -32,7 +32,7 @@ DEFAULT_TIME_LIMIT = 10.0
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "scene", "show, validate, settle and import scenes")
+    group = add_group(verbs, "scene", "show, validate, settle, export and import scenes")
     show = add_verb(
         group,
         "show",
@@ -56,6 +56,7 @@ def add_to(verbs: Any) -> None:
     add_scene(validate)
     add_station(validate)
     _add_settle(group)
+    scene_export.add_to(group)
     scene_import.add_to(group)
 
 

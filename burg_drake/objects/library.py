@@ -150,7 +150,10 @@ class ObjectLibrary:
     def save(self) -> None:
         """Writes `library.yaml`, and `package.xml`, by which Drake's Parser and ROS know the folder
         as a package: `package://NAME/mug/mug.sdf`."""
-        manifest, package = self.root / PACKAGE_FILE, _package_xml(self.name)
+        manifest, package = (
+            self.root / PACKAGE_FILE,
+            package_manifest(package_name(self.name), "Object library"),
+        )
         if not manifest.is_file() or manifest.read_text() != package:
             atomic_write(manifest, package)
         save_document(self.document, self.root / LIBRARY_FILE)
@@ -178,14 +181,18 @@ def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibra
     return ObjectLibrary(load_document(file, LibraryDocument), file.parent)
 
 
-def _package_xml(name: str) -> str:
+def package_name(name: str) -> str:
+    """A name as packages of ROS and Drake may have it, made of a document's name."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "library"
+
+
+def package_manifest(package: str, description: str) -> str:
     """A ROS package manifest (format 3, REP 149) with nothing but what it must have."""
-    package = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "library"
     return f"""<?xml version="1.0"?>
 <package format="3">
   <name>{package}</name>
   <version>1.0.0</version>
-  <description>Object library</description>
+  <description>{description}</description>
   <maintainer email="nobody@example.com">nobody</maintainer>
   <license>unknown</license>
 </package>

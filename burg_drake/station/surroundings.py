@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
@@ -18,7 +20,8 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
+from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.schema import Vector3
 from burg_drake.scene.scene import Board
 from burg_drake.station.board_visual import board_meshes
 from burg_drake.station.robot import ROBOT_MODELS
@@ -42,12 +45,42 @@ PAPER = 1e-4
 table's plane of contact; so that it shows, table and obstacles are drawn smaller on all sides."""
 
 
-def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
-    """Adds the table; its top face lies in the plane z = 0 of the world."""
+@dataclass(frozen=True, eq=False)
+class FixedBox:
+    """A box of the station that does not move.
+
+    Attributes:
+        X_WB: (4, 4) pose of its centre in the world.
+        size: extents [m].
+        friction: Coulomb coefficient.
+        color: red, green, blue, opacity in [0, 1].
+    """
+
+    X_WB: Array
+    size: Vector3
+    friction: float
+    color: tuple[float, float, float, float]
+
+
+def table_box(station: Station) -> FixedBox:
+    """The table; its top face lies in the plane z = 0 of the world."""
     table = station.document.table
-    X_WB = np.eye(4)
-    X_WB[:3, 3] = (*table.center, -table.size[2] / 2)
-    return _add_box(plant, "table", X_WB, np.array(table.size), table.friction, TABLE_COLOR)
+    X_WB = make_pose(p_AB=(*table.center, -table.size[2] / 2))
+    return FixedBox(X_WB, table.size, table.friction, TABLE_COLOR)
+
+
+def obstacle_boxes(station: Station) -> dict[str, FixedBox]:
+    """The station's obstacles by name; they have the table's friction."""
+    friction = station.document.table.friction
+    return {
+        name: FixedBox(box.X_WB.matrix(), box.size, friction, OBSTACLE_COLOR)
+        for name, box in station.document.background.items()
+    }
+
+
+def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
+    """Adds the table."""
+    return _add_box(plant, "table", table_box(station))
 
 
 def add_board(plant: MultibodyPlant, board: Board, station: Station, markers: bool) -> None:
@@ -82,13 +115,11 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
     Raises:
         InvalidInputError: a name is taken by the scene or the robot.
     """
-    friction = station.document.table.friction
     bodies = {}
-    for name, box in station.document.background.items():
+    for name, box in obstacle_boxes(station).items():
         if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
             raise taken_obstacle(station, name)
-        size = np.array(box.size)
-        bodies[name] = _add_box(plant, name, box.X_WB.matrix(), size, friction, OBSTACLE_COLOR)
+        bodies[name] = _add_box(plant, name, box)
     return bodies
 
 
@@ -100,20 +131,19 @@ def taken_obstacle(station: Station, name: str) -> InvalidInputError:
     )
 
 
-def _add_box(
-    plant: MultibodyPlant, name: str, X_WB: Array, size: Array, friction: float, color: tuple
-) -> RigidBody:
+def _add_box(plant: MultibodyPlant, name: str, fixed: FixedBox) -> RigidBody:
     """A box welded to the world as a body of its own: with collision geometry on the world body
     itself, locking a joint crashes (drake#24773)."""
+    size = np.array(fixed.size)
     instance = plant.AddModelInstance(name)
     body = plant.AddRigidBody(name, instance, SpatialInertia.SolidBoxWithMass(1.0, *size))
     box = Box(*size)
     plant.RegisterCollisionGeometry(
-        body, RigidTransform(), box, "collision", _compliant_box(size, friction)
+        body, RigidTransform(), box, "collision", _compliant_box(size, fixed.friction)
     )
     drawn = Box(*np.maximum(size - 2 * PAPER, size / 2))  # thin ones, too, remain
-    plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(color))
-    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WB))
+    plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(fixed.color))
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(fixed.X_WB))
     return body
 
 

@@ -1,0 +1,1 @@
+"""Scenes as documents of simulators: SDFormat, Drake's model directives, MJCF, USD."""
