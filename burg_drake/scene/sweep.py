@@ -38,7 +38,10 @@ PRICE = 1e6
 """How far ahead they are [m], so that they only remain where the line misses M."""
 LEFT = 1e-10
 """Share of such a point in the solution above which the line misses M."""
-ASIDE = np.array([3e-9, 7e-9])
+GRAZE = 1e-7
+"""What passes others with an overlap of less does not touch them [m]: M is that much smaller across
+the line, so that boxes side by side slide along each other."""
+ASIDE = np.array([3e-9, 7e-9, 0.0])
 """By this the line is moved to a side [m]: where it met an edge of a face, the simplex method could
 step without progress."""
 
@@ -109,8 +112,8 @@ def ways_to_contact(
         offsets: (K, 3) by which the first of each pair starts beside its place; nowhere if None.
 
     Returns:
-        Ways (K,) [m], at most `ACCURACY` too short. Infinite for what does not meet within the
-        limit, or only after others have met.
+        Ways (K,) [m], after which the gap between the two surfaces is at most some 1e-7 m, either
+        way. Infinite for what does not meet within the limit, or only after others have met.
     """
     R = _basis(direction)
     a, b = (ConvexShapes(s.points @ R.T, R @ s.spread) for s in (moving, still))
@@ -125,7 +128,8 @@ def ways_to_contact(
     for block in (order[i : i + BLOCK] for i in range(0, len(order), BLOCK)):
         if low[block[0], 2] > limit:
             break
-        ways[block] = _least(a, b, pairs[0][block], pairs[1][block], shift[block], limit)
+        across = low[block, :2], high[block, :2]
+        ways[block] = _least(a, b, pairs[0][block], pairs[1][block], shift[block], across, limit)
         limit = min(limit, float(ways[block].min()))
     return ways
 
@@ -139,10 +143,20 @@ def _basis(direction: Array) -> Array:
 
 
 def _least(
-    a: ConvexShapes, b: ConvexShapes, i: Indices, j: Indices, shift: Array, limit: float
+    a: ConvexShapes,
+    b: ConvexShapes,
+    i: Indices,
+    j: Indices,
+    shift: Array,
+    across: tuple[Array, Array],
+    limit: float,
 ) -> Array:
-    """Ways (K,) of a few pairs along z; infinite above the limit."""
+    """Ways (K,) of a few pairs along z; infinite above the limit. M reaches from the first to the
+    second of `across` (K, 2)."""
     ways = np.full(len(i), np.inf)
+    middle = np.column_stack([(across[0] + across[1]) / 2.0, np.zeros(len(i))])
+    half = np.maximum((across[1] - across[0]) / 2.0, GRAZE)
+    scale = np.column_stack([1.0 - GRAZE / half, np.ones(len(i))])
     turn = 2.0 * np.pi * np.arange(3) / 3.0
     first = np.stack([OUTER * np.cos(turn), OUTER * np.sin(turn), np.full(3, PRICE)], axis=1)
     basis = np.repeat(first[None], len(i), axis=0)  # (K, 3 points, 3)
@@ -151,8 +165,9 @@ def _least(
         flat = np.concatenate([basis[..., :2], np.ones((*basis.shape[:2], 1))], axis=2)
         y = np.linalg.solve(flat, basis[..., 2:])[..., 0]
         n = np.column_stack([-y[:, :2], np.ones(len(y))])
-        w = b.support(j[left], -n) - a.support(i[left], n) - shift[left]
-        w[:, :2] += ASIDE
+        m = scale[left] * n
+        w = b.support(j[left], -m) - a.support(i[left], m) - shift[left] - middle[left]
+        w = middle[left] + scale[left] * w + ASIDE
         lower = (n * w).sum(axis=1)
         share = np.linalg.solve(flat.transpose(0, 2, 1), np.array([0.0, 0.0, 1.0])[:, None])[..., 0]
         ends = y[:, 2] - lower <= ACCURACY
@@ -176,5 +191,5 @@ def _leaving(flat: Array, share: Array, w: Array) -> Indices:
     falls to 0 while that of the new one rises."""
     entering = np.concatenate([w[:, :2], np.ones((len(w), 1))], axis=1)[..., None]
     fall = np.linalg.solve(flat.transpose(0, 2, 1), entering)[..., 0]
-    ratio = np.where(fall > 1e-12, share / np.where(fall > 1e-12, fall, 1.0), np.inf)
+    ratio = np.where(fall > 1e-9, share / np.where(fall > 1e-9, fall, 1.0), np.inf)
     return np.asarray(ratio.argmin(axis=1))

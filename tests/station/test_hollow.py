@@ -18,7 +18,7 @@ from burg_drake.objects.contact import contact_geometry
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.objects.sdf import model_sdf
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.check import overlaps
+from burg_drake.station.check import check_scene, overlaps
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.station import load_station
 
@@ -63,6 +63,7 @@ def test_an_object_may_stand_in_another(scene: Scene) -> None:
     diagram = build_station_diagram(scene, load_station("panda_tabletop"), robot="none")
     found = overlaps(diagram)
     assert not any(depth > 1e-4 for depth in found.values()), found
+    assert check_scene(scene, load_station("panda_tabletop")) == ()
 
 
 def test_a_finger_may_reach_in_but_not_into_the_wall(scene: Scene) -> None:
