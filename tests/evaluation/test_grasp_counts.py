@@ -12,7 +12,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.feasibility import ReachJudgeFactory
-from burg_drake.evaluation.grasp_counts import THE_ARM, GraspCount, count_grasps
+from burg_drake.evaluation.grasp_counts import THE_ARM, GraspCount, count_grasps, grasp_counts
 from burg_drake.evaluation.object_grasps import object_grasps
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.scene.scene import Scene
@@ -32,8 +32,14 @@ def panda() -> Station:
 
 
 @pytest.fixture(scope="module")
-def between(panda: Station) -> dict[str, GraspCount]:
-    return count_grasps(BETWEEN, panda, only=["mug", "left"], grasps_per_object=N)
+def told(panda: Station) -> list[tuple[str, GraspCount]]:
+    """Of the mug and the left box, as they come."""
+    return list(grasp_counts(BETWEEN, panda, ["left", "mug"], grasps_per_object=N))
+
+
+@pytest.fixture(scope="module")
+def between(told: list[tuple[str, GraspCount]]) -> dict[str, GraspCount]:
+    return dict(told)
 
 
 def X_WO(scene: Scene, station: Station, name: str) -> np.ndarray:
@@ -54,13 +60,21 @@ def test_a_mug_between_two_boxes(between: dict[str, GraspCount], panda: Station)
 
 
 def test_every_grasp_counts_once(between: dict[str, GraspCount]) -> None:
-    assert list(between) == ["mug", "left"]
+    assert list(between) == ["left", "mug"]
     for count in between.values():
         assert count.reachable is not None
         assert 0 <= count.reachable <= count.clear <= count.sampled == N
         assert sum(count.in_the_way.values()) == count.sampled - count.reachable
         assert count.good == count.reachable
         assert not count.note
+
+
+def test_the_hand_is_told_first(told: list[tuple[str, GraspCount]]) -> None:
+    """In the order that was asked for, then all again with what the arm says."""
+    assert [name for name, _ in told] == ["left", "mug", "left", "mug"]
+    for (_, hand), (_, arm) in zip(told[:2], told[2:], strict=True):
+        assert (hand.sampled, hand.clear, hand.reachable) == (arm.sampled, arm.clear, None)
+        assert sum(hand.in_the_way.values()) == hand.sampled - hand.clear
 
 
 def test_clear_grasps_by_drakes_own_query(between: dict[str, GraspCount], panda: Station) -> None:
