@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.compose.state import State
 from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.object_shapes import ObjectShapes
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import SceneIssue
 from burg_drake.station.station import Station
@@ -27,6 +28,7 @@ class SceneChecker:
         self._station = station
         self._check: SceneCheck | None = None
         self._library: ObjectLibrary | None = None
+        self._shapes: ObjectShapes | None = None
         self._state: State | None = None
         self._issues: tuple[SceneIssue, ...] = ()
 
@@ -54,6 +56,12 @@ class SceneChecker:
         if self._check is None or self._library is not state.library:
             self._check, self._library = SceneCheck(self._station, state.library), state.library
         return self._check
+
+    def shapes(self, state: State) -> ObjectShapes:
+        """The shapes of a state's library."""
+        if self._shapes is None or self._shapes.library is not state.library:
+            self._shapes = ObjectShapes(state.library)
+        return self._shapes
 
 
 def lost(state: State) -> tuple[str, ...]:

@@ -15,13 +15,13 @@ from burg_drake.compose.state import (
     State,
     name_of,
     named,
-    readable_pose,
     require_some,
     unused_name,
 )
 from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance
 
 GAP = 0.01
@@ -63,7 +63,7 @@ class AddObject:
         instance = Instance(
             name="" if name == self.object else name,
             object=self.object,
-            X_SO=readable_pose(standing(X_SO, (x, y), yaw)),
+            X_SO=Pose.readable(standing(X_SO, (x, y), yaw)),
         )
         return state.added([instance], fixed=_without_mass(state, [instance]))
 
@@ -113,7 +113,7 @@ class Duplicate:
         for name in names:
             copy_name = unused_name(name, taken)
             taken.add(copy_name)
-            copy = replace(state.instance(name), X_SO=readable_pose(X @ state.X_SO(name)))
+            copy = replace(state.instance(name), X_SO=Pose.readable(X @ state.X_SO(name)))
             copies.append(named(copy, copy_name))
             if state.instance(name) in state.document.background:
                 fixed.add(copy_name)

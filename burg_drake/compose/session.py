@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.compose.checker import known_scene
 from burg_drake.compose.editor import Editor
+from burg_drake.compose.grasp_watch import GraspWatch
 from burg_drake.compose.history import Step
 from burg_drake.compose.library_watch import LibraryWatch, changes_notice, require_objects
 from burg_drake.compose.opening import Opened, new_scene, open_reference, open_scene_file
@@ -25,6 +27,7 @@ from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.grasp_counts import GraspCount
     from burg_drake.printout.board_printout import Printout, PrintSettings
 
 SETTLE_TIME = 10.0
@@ -50,6 +53,8 @@ class ComposeSession(Editor):
         self._settler = Worker()
         self._settling: Job[Proposal] | None = None
         self._proposal: Proposal | None = None
+        self._grasp_watch: GraspWatch | None = None
+        self._grasps: tuple[Mapping[str, GraspCount], int] = ({}, 0)
         super().__init__(opened, station)
 
     @classmethod
@@ -101,6 +106,7 @@ class ComposeSession(Editor):
     def close(self) -> None:
         """Lets others open the scene. Changes that are in no file stay in the journal, and are
         there when the scene is opened again."""
+        self.watch_grasps(None)
         self._settler.close()
         with self._alone():
             self._callbacks.clear()
@@ -252,8 +258,9 @@ class ComposeSession(Editor):
                 )
             self._proposal = None
             self._drag = None
-            state = replace(self._history.state, document=proposal.document)
-            moved = [n for n in proposal.displacements if n in state.instances]
+            before = self._history.state
+            state = replace(before, document=proposal.document)
+            moved = [n for n, i in state.instances.items() if i != before.instance(n)]
             return self._take(Step(proposal.label, state.select(moved)))
 
     def revert(self) -> View:
@@ -261,6 +268,34 @@ class ComposeSession(Editor):
         with self._alone():
             self._drop_settling()
             return self._publish()
+
+    def watch_grasps(self, grasps_per_object: int | None = 50) -> View:
+        """Counts grasps from now on, in a worker process, a while after each change: how many of
+        each object are clear and reachable, and what is in the way of the others. They are in
+        `View.grasps`.
+
+        Args:
+            grasps_per_object: grasps that are sampled for each object; no more counting if None.
+        """
+        with self._alone():
+            watch, self._grasp_watch = self._grasp_watch, None
+            if grasps_per_object is not None:
+                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
+            view = self._publish()
+        if watch is not None:
+            watch.close()
+        return view
+
+    def _counted(self, counts: Mapping[str, GraspCount] | BurgError, revision: int) -> None:
+        """Called by the worker's thread."""
+        with self._alone():
+            if self._grasp_watch is None:
+                return
+            if isinstance(counts, BurgError):
+                self.notify(f"grasps cannot be counted: {counts}")
+                return
+            self._grasps = (counts, revision)
+            self._publish()
 
     def _change(self, opened: Opened) -> View:
         """Goes over to another scene."""
@@ -300,7 +335,7 @@ class ComposeSession(Editor):
             if job.done:
                 self._settling = None
                 if job.error is None:
-                    self._proposal = job.wait()
+                    self._proposal = job.result
                 elif not isinstance(job.error, Cancelled):
                     self.notify(f"cannot settle the scene: {job.error}")
             self._publish()
@@ -312,11 +347,21 @@ class ComposeSession(Editor):
             job.cancel()
 
     def _dressed(self, view: View) -> View:
+        if self._grasp_watch is not None:
+            scene = known_scene(self._history.state, self._storage.place)
+            self._grasp_watch.tell(scene, self._revision)
         working = None
         if self._settling is not None:
             share, word = self._settling.progress
             working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
-        return replace(view, working=working, proposal=self._proposal)
+        grasps, revision = self._grasps
+        return replace(
+            view,
+            working=working,
+            proposal=self._proposal,
+            grasps=grasps,
+            grasps_revision=revision,
+        )
 
 
 @dataclass(frozen=True)

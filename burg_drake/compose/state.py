@@ -83,7 +83,7 @@ class State:
         )
 
     def moved(self, X_SO: Mapping[str, Array]) -> State:
-        """The same with instances at other poses (4, 4); see `readable_pose`.
+        """The same with instances at other poses (4, 4); rounded as `Pose.readable` has it.
 
         Raises:
             UnknownNameError: one of them is not there.
@@ -95,7 +95,7 @@ class State:
             X = X_SO.get(name_of(instance))
             if X is None:
                 return instance
-            X_new = readable_pose(X)
+            X_new = Pose.readable(X)
             return instance if X_new == instance.X_SO else replace(instance, X_SO=X_new)
 
         return self.changed(place)
@@ -130,14 +130,6 @@ def unused_name(wanted: str, taken: Collection[str]) -> str:
     while f"{wanted}_{number}" in taken:
         number += 1
     return f"{wanted}_{number}"
-
-
-def readable_pose(X_SO: Array) -> Pose:
-    """A pose to the micrometre and a ten thousandth of a degree, as people can read it."""
-    exact = Pose.from_matrix(X_SO)
-    x, y, z = (round(value, 6) + 0.0 for value in exact.translation)
-    roll, pitch, yaw = (round(value, 4) + 0.0 for value in exact.rpy_deg or (0.0, 0.0, 0.0))
-    return Pose((x, y, z), rpy_deg=(roll, pitch, yaw))
 
 
 def require_some(names: Iterable[str], state: State, least: int = 1) -> tuple[str, ...]:

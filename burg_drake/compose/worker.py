@@ -38,6 +38,7 @@ class Job(Generic[T]):
     Attributes:
         progress: share that is done, in [0, 1], and a word.
         cancelled: nobody waits for it any more.
+        done: it has a result or an error, or was cancelled.
         error: why it has no result; None if it has, or is not done.
     """
 
@@ -45,18 +46,25 @@ class Job(Generic[T]):
         self.progress: tuple[float, str] = (0.0, "waiting")
         self.cancelled = False
         self.error: BurgError | None = None
+        self.done = False
         self.task = task
         self._worker, self._on_change = worker, on_change
         self._result: list[T] = []
-        self._over = threading.Event()
+        self._told = threading.Event()
 
     @property
-    def done(self) -> bool:
-        """It has a result or an error, or was cancelled."""
-        return self._over.is_set()
+    def result(self) -> T:
+        """What came of it, once it is done.
+
+        Raises:
+            BurgError: it cannot be done, or was cancelled.
+        """
+        if self.error is not None:
+            raise self.error
+        return self._result[0]
 
     def wait(self, timeout: float | None = None) -> T:
-        """The result, when it is there.
+        """The result, when it is there and who listens has been told.
 
         Args:
             timeout: [s].
@@ -65,11 +73,9 @@ class Job(Generic[T]):
             TimeoutError: it is not there by then.
             BurgError: it cannot be done, or was cancelled.
         """
-        if not self._over.wait(timeout):
+        if not self._told.wait(timeout):
             raise TimeoutError(f"nothing after {timeout:g} s")
-        if self.error is not None:
-            raise self.error
-        return self._result[0]
+        return self.result
 
     def cancel(self) -> None:
         """Ends it; nothing if it is done."""
@@ -86,8 +92,9 @@ class Job(Generic[T]):
             self.error = result
         else:
             self._result.append(result)
-        self._over.set()
+        self.done = True
         self._on_change(self)
+        self._told.set()
 
 
 class Cancelled(BurgError):
