@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import viser
 
 from burg_drake.compose.arranging import Align, Distribute
+from burg_drake.compose.contact import Direction, PutDown, SnapToContact
 from burg_drake.compose.moving import SnapToGrid
 from burg_drake.compose.view import View
 from burg_drake.ui.buttons import quiet_button
@@ -29,6 +31,7 @@ class ArrangePanel:
         self._gui, self._actions = gui, actions
         self._folder = gui.add_folder("Arrange")
         with self._folder:
+            self._contact()
             self._grid = gui.add_number(
                 "Grid [mm]", GRID_MM, min=FINEST_MM, max=COARSEST_MM, step=0.1
             )
@@ -55,6 +58,18 @@ class ArrangePanel:
         self._folder.visible = bool(view.selection)
         self._several.visible = len(view.selection) > 1
 
+    def _contact(self) -> None:
+        self._gui.add_html(all_of(box(head("Move until it touches"))))
+        ways: tuple[tuple[str, Direction, str], ...] = (
+            ("←", "-x", "to the left"),
+            ("→", "x", "to the right"),
+            ("↓", "-y", "to the front"),
+            ("↑", "y", "to the back"),
+        )
+        for label, way, where in ways:
+            self._button(label, 2, f"Move {where} until it touches something", partial(_snap, way))
+        self._button("Put down", 4, "Lower it until it stands (B)", PutDown)
+
     def _alignment(self) -> None:
         self._gui.add_html(all_of(box(head("Align"))))
         icon = viser.Icon
@@ -73,3 +88,7 @@ class ArrangePanel:
     def _button(self, label: str, width: int, hint: str, command: Any, **options: Any) -> None:
         button = quiet_button(self._gui, label, width=width, hint=hint, **options)
         self._actions.clicked(button, self._actions.with_selection(command))
+
+
+def _snap(direction: Direction, names: tuple[str, ...]) -> SnapToContact:
+    return SnapToContact(names, direction)

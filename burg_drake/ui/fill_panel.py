@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import viser
 
 from burg_drake.compose.placing import Clear
+from burg_drake.compose.random_configuration import MOST, RandomConfiguration
 from burg_drake.compose.view import View
+from burg_drake.scene.arrangement import LAYOUTS
 from burg_drake.ui.buttons import quiet_button
 from burg_drake.ui.page_actions import PageActions
+
+LARGEST_SEED = 2**31 - 1
 
 
 class FillPanel:
@@ -19,12 +25,31 @@ class FillPanel:
     """
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
-        with gui.add_folder("Objects"):
+        self._actions = actions
+        icon = viser.Icon
+        with gui.add_folder("Random configuration"):
+            self._count = gui.add_number(
+                "Objects", 0, min=0, max=MOST, step=1, hint="0: those that are on the board"
+            )
+            self._layout = gui.add_dropdown("Layout", LAYOUTS)
+            self._seed: Any = gui.add_number(
+                "Seed", 1, min=0, max=LARGEST_SEED, step=1, hint="Of the next configuration"
+            )
+            actions.clicked(
+                quiet_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
+            )
             self._clear = actions.clicked(
-                quiet_button(gui, "Clear scene", icon=viser.Icon.TRASH),
+                quiet_button(gui, "Clear scene", width=6, icon=icon.TRASH),
                 lambda: actions.session.do(Clear()),
             )
 
     def show(self, view: View) -> None:
         """Brings the panel to a view."""
         self._clear.disabled = not view.instances
+
+    def _shuffle(self) -> None:
+        seed = int(self._seed.value)
+        self._actions.session.do(
+            RandomConfiguration(seed, int(self._count.value) or None, self._layout.value)
+        )
+        self._seed.value = min(seed + 1, LARGEST_SEED)

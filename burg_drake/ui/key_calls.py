@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from burg_drake.compose.contact import PutDown
 from burg_drake.compose.footprint import nearest_stable_pose
 from burg_drake.compose.moving import Move, SetPose, Turn
 from burg_drake.compose.placing import Delete, Duplicate
@@ -39,6 +40,7 @@ def selection_calls(session: ComposeSession) -> dict[str, Callable[[], Any]]:
         "none": lambda: session.select(()),
         "delete": lambda: session.do(Delete(selected())),
         "duplicate": lambda: session.do(Duplicate(selected())),
+        "put_down": lambda: session.do(PutDown(selected())),
         "turn_left": lambda: session.do(Turn(selected(), TURN_DEG)),
         "turn_right": lambda: session.do(Turn(selected(), -TURN_DEG)),
         "next_pose": lambda: next_pose(session),

@@ -15,6 +15,8 @@ from burg_drake.compose.session import ComposeSession
 from burg_drake.compose.view import View
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.ui.arrange_panel import ArrangePanel
+from burg_drake.ui.backdrop_panel import BackdropPanel
+from burg_drake.ui.board_layers import BoardLayers
 from burg_drake.ui.board_panel import BoardPanel
 from burg_drake.ui.board_view import BoardView
 from burg_drake.ui.check_panel import CheckPanel
@@ -23,6 +25,7 @@ from burg_drake.ui.file_panel import FilePanel
 from burg_drake.ui.fill_panel import FillPanel
 from burg_drake.ui.ghost_view import GhostView
 from burg_drake.ui.gizmo import Gizmo
+from burg_drake.ui.grasp_panel import GraspPanel
 from burg_drake.ui.key_calls import selection_calls
 from burg_drake.ui.library_panel import LibraryPanel
 from burg_drake.ui.object_drags import ObjectDrags
@@ -33,6 +36,7 @@ from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import style
 from burg_drake.ui.picking import Picking
 from burg_drake.ui.pose_panel import PosePanel
+from burg_drake.ui.reach_panel import ReachPanel
 from burg_drake.ui.scene_view import SceneView, Shown
 from burg_drake.ui.settle_panel import SettlePanel
 from burg_drake.ui.shortcuts import Call, register, show_overlay
@@ -69,6 +73,7 @@ class SetupPage:
         self._shapes = ObjectShapes(view.library)
         self._set_stage(view)
         self._board = BoardView(server.scene, session.station)
+        self._layers = BoardLayers(server.scene)
         self._drags = ObjectDrags(self.actions)
         self._picking = Picking(server.scene, self.actions)
         self._scene = SceneView(server.scene, self._shapes, self._attach)
@@ -84,6 +89,7 @@ class SetupPage:
         """Finishes what was asked for, and lets go of the session."""
         self._unsubscribe()
         self.actions.queue.close()
+        self._reach.close()
         self._pictures.close()
 
     def _set_stage(self, view: View) -> None:
@@ -118,8 +124,11 @@ class SetupPage:
         with tabs.add_tab("Check", viser.Icon.CHECKLIST):
             self._check = CheckPanel(gui)
             self._settle = SettlePanel(gui, actions)
+            self._grasps = GraspPanel(gui, actions)
         with tabs.add_tab("View", viser.Icon.EYE):
             self._display = DisplayPanel(gui, actions, self._refresh)
+            self._reach = ReachPanel(gui, actions, self._layers)
+            self._backdrop = BackdropPanel(gui, actions, self._layers)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(RIGHT_WIDTH)
         self._panels: tuple[_Panel, ...] = (
@@ -131,6 +140,9 @@ class SetupPage:
             self._files,
             self._check,
             self._settle,
+            self._grasps,
+            self._reach,
+            self._backdrop,
         )
         register(gui, actions, self._calls())
 

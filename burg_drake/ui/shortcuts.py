@@ -101,8 +101,6 @@ def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, Call]) ->
         calls: by the names of `SHORTCUTS`; each gets the page that the key was pressed on.
     """
     for shortcut in SHORTCUTS:
-        if shortcut.name not in calls:
-            continue
         call = calls[shortcut.name]
         command = gui.add_command(
             shortcut.label,

@@ -1,0 +1,96 @@
+"""The panel of the backdrop: the real board, by a photo or a camera, under the objects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import viser
+
+from burg_drake.cameras.board_picture import board_picture
+from burg_drake.cameras.frame_source import Image
+from burg_drake.cameras.image_file import decode_image
+from burg_drake.cameras.sources import open_source
+from burg_drake.compose.view import View
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.ui.board_layers import BoardLayers, Sheet
+from burg_drake.ui.buttons import quiet_button
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_text import all_of, box, quiet
+
+CAMERAS = ("0", "1", "2", "3")
+"""Numbers of cameras of this machine that the page may open; it can name nothing else."""
+OPACITY = 0.8
+
+
+class BackdropPanel:
+    """Lays a picture of the real board under the objects.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+        layers: of the board.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
+        self._actions, self._layers = actions, layers
+        self._sheet: Sheet | None = None
+        icon = viser.Icon
+        with gui.add_folder("Real board"):
+            self._text = gui.add_html("")
+            upload = gui.add_upload_button(
+                "Photo of the board", icon=icon.PHOTO, mime_type="image/*", color="gray"
+            )
+            upload.on_upload(self._uploaded)
+            self._camera = gui.add_dropdown("Camera", CAMERAS)
+            actions.clicked(quiet_button(gui, "Take a picture", icon=icon.CAMERA), self._take)
+            self._opacity = actions.chosen(
+                gui.add_slider("Opacity", 0.0, 1.0, 0.05, OPACITY), self._fade, key="backdrop"
+            )
+            self._remove = actions.clicked(
+                quiet_button(gui, "Remove the picture", icon=icon.X), lambda: self._lay(None, "")
+            )
+            self._lay(None, "")
+
+    def show(self, view: View) -> None:
+        """Brings the panel to a view; a picture stays as it is."""
+        self._remove.visible = self._opacity.visible = self._sheet is not None
+
+    async def _uploaded(self, event: Any) -> None:
+        file = event.target.value
+        self._actions.ask(lambda: self._use(decode_image(file.content), file.name), event.client)
+
+    def _take(self) -> None:
+        """Takes a picture with a camera of this machine.
+
+        Raises:
+            InvalidInputError: it is not one of `CAMERAS`, or does not show the board.
+            CameraLost: it gives no picture.
+        """
+        number = self._camera.value
+        if number not in CAMERAS:
+            raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
+        with open_source(number) as source:
+            frame = source.read()
+        self._use(None if frame is None else frame.image, f"camera {number}")
+
+    def _use(self, image: Image | None, name: str) -> None:
+        if image is None:
+            raise InvalidInputError(f"{name} is not an image that can be read; give PNG or JPEG")
+        found = board_picture(image, self._actions.session.view.document.board)
+        words = f"{name}: {len(found.ids)} markers, off by {1e3 * found.error:.1f} mm"
+        sheet = Sheet(found.image, found.lower, found.upper, float(self._opacity.value))
+        self._lay(sheet, f"{words}. {found.note}" if found.note else words)
+
+    def _fade(self, opacity: float) -> None:
+        if self._sheet is not None:
+            self._sheet = replace(self._sheet, opacity=min(max(float(opacity), 0.0), 1.0))
+            self._layers.show("backdrop", self._sheet)
+
+    def _lay(self, sheet: Sheet | None, words: str) -> None:
+        self._sheet = sheet
+        self._layers.show("backdrop", sheet)
+        self._text.content = all_of(
+            box(quiet(words or "Lay a picture of the printed board under the objects."))
+        )
+        self.show(self._actions.session.view)
