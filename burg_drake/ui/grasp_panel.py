@@ -35,7 +35,7 @@ class GraspPanel:
                 gui.add_checkbox(
                     "Count grasps",
                     False,
-                    hint=f"Of {GRASPS} sampled on each object, after each change, in the background",
+                    hint=f"Of {GRASPS} sampled on each object; again after each change",
                 ),
                 lambda on: self._session.watch_grasps(GRASPS if on else None),
             )

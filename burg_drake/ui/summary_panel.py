@@ -27,6 +27,7 @@ class SummaryPanel:
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         icon, session = viser.Icon, actions.session
         self._text = gui.add_html("")
+        self._dismiss = actions.clicked(quiet_button(gui, "I have read this"), self._read)
         self._undo = actions.clicked(
             quiet_button(gui, "Undo", width=4, icon=icon.ARROW_BACK_UP), session.undo
         )
@@ -37,7 +38,6 @@ class SummaryPanel:
             quiet_button(gui, "Keys", width=4, icon=icon.KEYBOARD, hint="Mouse and keys (H)"),
             show_overlay,
         )
-        self._dismiss = actions.clicked(quiet_button(gui, "I have read this"), self._read)
         self._session = session
 
     def show(self, view: View) -> None:
