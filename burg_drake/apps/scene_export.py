@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import Any
 
 from burg_drake.apps.arguments import add_scene, add_verb
@@ -47,13 +48,17 @@ def add_to(group: Any) -> None:
 
 
 def run_export(arguments: argparse.Namespace) -> int:
-    """Writes the folder of an export."""
+    """Writes the folder of an export, however faulty the scene; what is wrong goes to stderr."""
     from burg_drake.export.export import export_scene
     from burg_drake.scene.scene import load_scene
+    from burg_drake.scene.validate import validate_scene
+    from burg_drake.station.check import check_scene
     from burg_drake.station.station import load_station
 
     scene = load_scene(arguments.scene)
     station = load_station(arguments.station) if arguments.station is not None else None
+    for issue in validate_scene(scene) if station is None else check_scene(scene, station):
+        print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
     exported = export_scene(scene, arguments.output, arguments.to, station)
     for note in exported.notes:
         print(note)

@@ -55,7 +55,10 @@ class MeshCopies:
                     f"{source} names {name}, which is not in its folder; export needs it there"
                 )
             if not (source.parent / name).is_file():
-                raise InvalidInputError(f"{source} names {name}, which is missing")
+                raise InvalidInputError(
+                    f"{source} names {name}, which is missing; put it there, or build the library"
+                    " again"
+                )
         place, number = Path(), 1
         while any(self._differs(place / name, source.parent / name) for name in named):
             number += 1

@@ -7,12 +7,13 @@ look for it; Drake takes it from there, too.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from burg_drake.core.document_text import DOCUMENT, read_bytes
-from burg_drake.core.errors import DocumentError, InvalidInputError
+from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.packages import Packages
 from burg_drake.core.resources import resolve
 from burg_drake.export.mesh_copy import MeshCopies
@@ -20,6 +21,8 @@ from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary
 
 DRAKE = "http://drake.mit.edu"
+SAME_MASS = 1e-6
+"""Share by which masses may differ."""
 SDF_VERSION = "1.9"
 """Of Gazebo Garden and later; the first that has poses with quaternions."""
 
@@ -40,7 +43,8 @@ def object_model(
         The element `model`, whose URIs are relative to `folder`.
 
     Raises:
-        InvalidInputError: the SDF includes other models, or a mesh names files elsewhere.
+        InvalidInputError: the SDF includes other models or has another mass than the library says;
+            or a mesh names files elsewhere.
         UnknownNameError: a file is missing.
     """
     path = library.path(entry.sdf)
@@ -48,11 +52,10 @@ def object_model(
     if model is None or next(model.iter("include"), None) is not None:
         what = "has no model" if model is None else "includes other models"
         raise InvalidInputError(f"{path} {what}, and cannot be exported; write one whole model")
+    _require_mass(model, entry, path)
     copies = MeshCopies(folder)
     for uri in model.iter("uri"):
-        uri.text = copies.add(
-            resolve((uri.text or "").strip(), base=path.parent, packages=packages)
-        )
+        uri.text = copies.add(_file((uri.text or "").strip(), path, packages))
     for collision in model.iter("collision"):
         _share_friction(collision)
     model.set("name", name)
@@ -73,6 +76,28 @@ def add_friction(collision: Element, static: str, dynamic: str) -> None:
     surface = SubElement(collision, "surface")
     ode = SubElement(SubElement(surface, "friction"), "ode")
     SubElement(ode, "mu").text, SubElement(ode, "mu2").text = static, dynamic
+
+
+def _file(uri: str, model: Path, packages: Packages) -> Path:
+    """The file that a model names."""
+    try:
+        return resolve(uri, base=model.parent, packages=packages)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{model}: {error}; build the library again") from error
+
+
+def _require_mass(model: Element, entry: ObjectEntry, path: Path) -> None:
+    """Refuses a model that weighs something else than the library says, as Drake would have it."""
+    text = (model.findtext("link/inertial/mass") or "nan").strip()
+    try:
+        mass = float(text)
+    except ValueError:
+        mass = math.nan
+    if not math.isclose(mass, entry.mass, rel_tol=SAME_MASS):
+        raise InvalidInputError(
+            f"{path} has a mass of {text} kg, and library.yaml says {entry.mass:g} kg; build the"
+            " library again"
+        )
 
 
 def _share_friction(collision: Element) -> None:

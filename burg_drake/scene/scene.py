@@ -53,7 +53,8 @@ class Board:
     def __post_init__(self) -> None:
         if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
             raise InvalidInputError(
-                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m"
+                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m;"
+                " A2 is [0.594, 0.42]"
             )
 
     @cached_property
@@ -181,7 +182,7 @@ def load_scene(reference: str | Path) -> Scene:
         library = load_library(document.library, path.parent)
     except UnknownNameError as error:
         raise UnknownNameError(f"{path}: library: {error}") from error
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     for key, instances in (("instances", document.instances), ("background", document.background)):
         for i, instance in enumerate(instances):
             where = f"{path}: {key}[{i}]"
@@ -196,8 +197,11 @@ def load_scene(reference: str | Path) -> Scene:
                 )
             name = instance.name or instance.object
             if name in seen:
-                raise DocumentError(f"{where}: name {name!r} is used twice; give unique names")
-            seen.add(name)
+                raise DocumentError(
+                    f"{where}: name {name!r} is used twice, first by {seen[name]}; give this one"
+                    f" another, such as name: {name}_2"
+                )
+            seen[name] = f"{key}[{i}]"
     return Scene(document, library, path)
 
 

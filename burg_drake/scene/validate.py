@@ -161,7 +161,7 @@ def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
     sides = sorted((s for s in beyond if beyond[s] > IN_BOUNDS_TOLERANCE), key=lambda s: -beyond[s])
     if not sides:
         return None
-    where = " and ".join(f"{_mm(beyond[s])} over the {s} edge" for s in sides)
+    where = " and ".join(f"{length_text(beyond[s])} over the {s} edge" for s in sides)
     board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
     hint = ""
     if np.abs(scene.instance(name).X_SO.translation).max() >= MILLIMETRES_SUSPECTED:
@@ -184,7 +184,7 @@ def _ground_issue(
             instance=name,
             kind="in_ground",
             amount=-lowest,
-            message=f"{name!r} is in the ground: it reaches {_mm(-lowest)} below the board;"
+            message=f"{name!r} is in the ground: it reaches {length_text(-lowest)} below the board;"
             f" z = {height:.4f} would put it on top",
         )
     if lowest > HOVER_TOLERANCE and not any(_may_support(other, extent) for other in others):
@@ -192,7 +192,8 @@ def _ground_issue(
             instance=name,
             kind="hovering",
             amount=lowest,
-            message=f"{name!r} hovers {_mm(lowest)} above the board; it will fall when simulated",
+            message=f"{name!r} hovers {length_text(lowest)} above the board;"
+            " it will fall when simulated",
         )
     return None
 
@@ -205,6 +206,6 @@ def _may_support(below: Extent, above: Extent) -> bool:
     return bool(overlap[:2].all() and reach)
 
 
-def _mm(length: float) -> str:
+def length_text(length: float) -> str:
     """A length [m] for people."""
     return f"{length * 1e3:.1f} mm" if length < 0.1 else f"{length:.3g} m"

@@ -25,6 +25,7 @@ from burg_drake.scene.validate import (
     TOUCH_TOLERANCE,
     Extent,
     SceneIssue,
+    length_text,
     surface_vertices,
     validate_scene,
 )
@@ -220,7 +221,7 @@ class SceneCheck:
             kind="out_of_bounds",
             amount=beyond,
             message=(
-                f"{name!r} stands {beyond * 1e3:.0f} mm beside the table of station"
+                f"{name!r} stands {length_text(beyond)} beside the table of station"
                 f" {self._station.name!r}"
             ),
         )

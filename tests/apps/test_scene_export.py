@@ -21,7 +21,8 @@ def test_export_says_what_it_wrote(
     out = tmp_path / "out"
     arguments = ["scene", "export", str(scene_file), "--to", "dmd", "-o", str(out)]
     assert main([*arguments, "--station", "panda_bin"]) == 0
-    wrote = capsys.readouterr().out
+    wrote, told = capsys.readouterr()
+    assert told == ""
     assert wrote.startswith(f"wrote {out / 'scene.dmd.yaml'}: 2 objects, table, ")
     assert main(arguments) == 0  # over itself
     assert capsys.readouterr().out == f"wrote {out / 'scene.dmd.yaml'}: 2 objects\n"
@@ -34,3 +35,13 @@ def test_the_folder_of_the_scene_is_refused(
     assert main(arguments) == 2
     assert "has files in it and is no earlier export" in capsys.readouterr().err
     assert scene_file.exists()
+
+
+def test_a_faulty_scene_is_exported_and_what_is_wrong_is_told(
+    scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene_file.write_text(scene_file.read_text().replace("0.12,", "1.2,"))
+    arguments = ["scene", "export", str(scene_file), "--to", "dmd", "-o", str(tmp_path / "out")]
+    assert main(arguments) == 0
+    warning = f"burg-drake: warning: {scene_file}: 'mug' is out of bounds: "
+    assert capsys.readouterr().err.startswith(warning)
