@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import socket
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -13,6 +14,7 @@ import pytest
 import viser
 
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
+from burg_drake.ui import admission
 from burg_drake.ui.door import Door, serve
 from burg_drake.ui.door_trial import require_guarded
 
@@ -71,8 +73,9 @@ def answer(
 
 
 def test_the_page_opens_in_a_browser(door: Door, page) -> None:
-    page.goto(door.url)
+    page.goto(f"{door.url}?websocket=ws://127.0.0.1:9/&darkMode")  # a trap, and an option of viser
     page.get_by_text("Nothing here yet.").wait_for()
+    assert page.url == f"{door.url}?darkMode="
     assert page.title() == "burg_drake"
     assert page.get_by_role("alert").get_by_text("WebGL 2 is missing").count() == 0
 
@@ -163,6 +166,16 @@ def test_a_page_of_another_site_can_connect_to_viser_itself(page, elsewhere: str
             require_guarded("127.0.0.1", server.get_port())
     finally:
         server.stop()
+
+
+def test_a_door_that_lets_others_in_does_not_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(admission, "require_own_host", lambda *headers, **served: None)
+    threads = threading.active_count()
+    with pytest.raises(MissingDependencyError, match="was not opened, because other web sites"):
+        serve(port=7449)
+    assert threading.active_count() == threads
+    with socket.create_server(("127.0.0.1", 7449)):
+        pass
 
 
 def test_a_token_opens_the_page_in_one_browser(open_to_all: Door, page, browser) -> None:

@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from burg_drake.ui.door import Door, serve
-from burg_drake.ui.incoming import LARGEST_MESSAGE
+from burg_drake.ui.incoming import BURST, LARGEST_MESSAGE, RATE
 from burg_drake.ui.uploads import ALL_UPLOADS, LARGEST_UPLOAD
 
 TIMEOUT = 60.0
@@ -178,6 +178,21 @@ def unpacked(raw: str | bytes) -> bytes:
     assert isinstance(raw, bytes)
     size = int.from_bytes(raw[8:16], "little")
     return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
+
+
+def test_a_flood_is_paced(door: Door, button, client: ClientConnection) -> None:
+    begun = time.monotonic()
+    for _ in range(int(BURST + RATE)):
+        send(client, "ShareUrlRequest")
+    with coming_in(door) as other:  # meanwhile others get on
+        send(other, "ViewerCameraMessage", **CAMERA)
+        announce(other, button, transfer_uuid="quick")
+        part(other, button, bytes(10), transfer_uuid="quick")
+        wait_for(other, "quick")
+    announce(client, button, transfer_uuid="late")
+    part(client, button, bytes(10), transfer_uuid="late")
+    wait_for(client, "late")
+    assert time.monotonic() - begun > 0.9  # a second's worth more than what may come at once
 
 
 def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnection) -> None:
