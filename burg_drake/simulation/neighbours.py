@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable
 
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.station.diagram import StationDiagram
-
-GAP = 0.001
-"""Objects that are closer than this may lean on each other [m]; a scene's poses are rounded."""
+from burg_drake.station.touching import touching
 
 
 class Neighbours:
@@ -21,21 +18,7 @@ class Neighbours:
     """
 
     def __init__(self, station_diagram: StationDiagram) -> None:
-        plant, graph = station_diagram.plant, station_diagram.scene_graph
-        context = station_diagram.diagram.CreateDefaultContext()
-        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(context))
-        free = set(station_diagram.free.values())
-        body_of = {
-            geometry: index
-            for index in free
-            for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
-        }
-        self._beside: dict[BodyIndex, set[BodyIndex]] = defaultdict(set)
-        for pair in query.ComputeSignedDistancePairwiseClosestPoints(GAP):
-            one, other = body_of.get(pair.id_A), body_of.get(pair.id_B)
-            if one is not None and other is not None:
-                self._beside[one].add(other)
-                self._beside[other].add(one)
+        self._beside = touching(station_diagram, station_diagram.free.values())
 
     def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
         """The bodies, their neighbours, the neighbours of these, and so on."""

@@ -94,15 +94,15 @@ def settle(
     steps = max(1, round(time_limit / criterion.poll))
     needed = max(1, round(criterion.duration / criterion.poll))
     recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
-    before = [_pose(body, context) for body in watched]
+    before = [body_place(body, context) for body in watched]
     for step in range(1, steps + 1):
         if before_poll is not None:
             before_poll()
         simulator.AdvanceTo(start + step * criterion.poll)
-        after = [_pose(body, context) for body in watched]
+        after = [body_place(body, context) for body in watched]
         moving = {}
         for body, old, new in zip(watched, before, after, strict=True):
-            speed = _speed(old, new, criterion.poll)
+            speed = mean_speed(old, new, criterion.poll)
             # not the other way round: a comparison with NaN is false
             if not (speed.speed < criterion.speed and speed.turning < criterion.turning):
                 moving[body.index()] = speed
@@ -114,14 +114,17 @@ def settle(
     return Settled(simulator.get_context().get_time() - start, moved)
 
 
-def _pose(body: RigidBody, context: Context) -> tuple[Array, Array]:
+def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
     """Rotation (3, 3) and centre of mass (3,) in the world."""
     X_WO = body.EvalPoseInWorld(context)
     p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
     return X_WO.rotation().matrix(), p_WOcm
 
 
-def _speed(before: tuple[Array, Array], after: tuple[Array, Array], interval: float) -> BodySpeed:
+def mean_speed(
+    before: tuple[Array, Array], after: tuple[Array, Array], interval: float
+) -> BodySpeed:
+    """Between two places of a body an interval [s] apart."""
     turn = before[0].T @ after[0]
     # chordal distance; exact for small turns, where the cosine is not
     angle = 2.0 * np.arcsin(min(1.0, np.linalg.norm(turn - np.eye(3)) / np.sqrt(8.0)))

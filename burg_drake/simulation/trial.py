@@ -29,6 +29,7 @@ from burg_drake.simulation.trial_settings import TrialSettings
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.hand_handle import HandHandle
+from burg_drake.station.rolling import part_rolling
 
 
 class Trial:
@@ -128,6 +129,7 @@ class Trial:
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
         declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
         self._filter(declaration)
+        part_rolling(self.diagram, self.context)
         self.simulator.Initialize()
 
     def isolate(self, target: BodyIndex) -> None:

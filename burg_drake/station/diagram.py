@@ -62,8 +62,10 @@ from burg_drake.station.robot import (
     joint_actuators,
     set_default_posture,
 )
+from burg_drake.station.rolling import part_rolling
 from burg_drake.station.station import Station
 from burg_drake.station.surroundings import add_board, add_obstacles, add_table
+from burg_drake.station.touching import soften_touching
 
 if TYPE_CHECKING:
     from pydrake.geometry import Meshcat, SceneGraph
@@ -140,6 +142,8 @@ def build_station_diagram(
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
+    Objects are rigid, but those that touch other objects are compliant (see `station.touching`).
+
     Args:
         scene: what stands on the board.
         station: robot, table, board pose and cameras.
@@ -207,7 +211,7 @@ def build_station_diagram(
         add_cameras(builder, station, None if named is True else named)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder.builder(), builder.scene_graph(), meshcat)
-    return StationDiagram(
+    built = StationDiagram(
         diagram=builder.Build(),
         scene=scene,
         station=station,
@@ -218,6 +222,10 @@ def build_station_diagram(
         table=table.index(),
         robot_bodies=tuple(i for m in models.values() for i in plant.GetBodyIndices(m)),
     )
+    if not weld_objects:
+        part_rolling(built)
+        soften_touching(built)
+    return built
 
 
 def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:

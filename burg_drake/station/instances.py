@@ -18,6 +18,7 @@ from burg_drake.scene.scene import Scene
 from burg_drake.station.hollow import is_mesh, sdf_by_pieces
 from burg_drake.station.model_file import add_models, held_remarks
 from burg_drake.station.robot import ROBOT_MODELS
+from burg_drake.station.rolling import add_rolling, is_ball
 
 SAME_INERTIA = 1e-6
 """Masses and moments may differ by this share: Drake shifts moments to the origin and back."""
@@ -43,6 +44,8 @@ def add_instance(
                 (model,) = add_models(parser, path, packages)
             body = plant.GetBodyByName(LINK, model)
             _require_inertia(body, scene.entry(name).mass_properties)
+            if is_ball(scene, name) and not by_pieces:
+                add_rolling(builder, scene, name, body)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{path} cannot be loaded ({' '.join(str(error).split())}); build the library"

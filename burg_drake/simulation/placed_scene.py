@@ -1,0 +1,39 @@
+"""The scene that a simulation has led to, as a document."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from burg_drake.core.frames import Array, inverse
+from burg_drake.core.schema import Pose
+from burg_drake.scene.scene import Scene
+from burg_drake.simulation.displacement import displacement
+from burg_drake.station.diagram import StationDiagram
+
+STILL = (5e-5, float(np.deg2rad(0.02)))
+"""An object that moves [m] and turns [rad] by less keeps the pose that it had in the document."""
+
+
+def placed_scene(built: StationDiagram, X_WO: Mapping[str, Array]) -> Scene:
+    """The scene with free objects at these poses (4, 4), and without those that have none."""
+    scene = built.scene
+    X_SW = inverse(built.station.document.X_WS.matrix())
+    instances = []
+    for name, X in X_WO.items():
+        instance, moved = scene.instances[name], displacement(built, name, X)
+        if moved.distance > STILL[0] or moved.angle > STILL[1]:
+            instance = dataclasses.replace(instance, X_SO=_readable(X_SW @ X))
+        instances.append(instance)
+    document = dataclasses.replace(scene.document, instances=tuple(instances))
+    return Scene(document, scene.library, scene.path)
+
+
+def _readable(X_SO: Array) -> Pose:
+    """A pose to the micrometre and a ten thousandth of a degree, as people can read it."""
+    exact = Pose.from_matrix(X_SO)
+    x, y, z = (round(value, 6) + 0.0 for value in exact.translation)
+    roll, pitch, yaw = (round(value, 4) + 0.0 for value in exact.rpy_deg or (0.0, 0.0, 0.0))
+    return Pose((x, y, z), rpy_deg=(roll, pitch, yaw))

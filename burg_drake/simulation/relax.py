@@ -1,0 +1,176 @@
+"""Brings what is nearly at rest to rest, so that it stays there.
+
+Something slow may still have far to go: a banana rocks for seconds, and what leans creeps. Kinetic
+damping takes a body to its equilibrium on the shortest way: whenever it has got slower, which means
+that it has passed the equilibrium, it is stopped (dynamic relaxation, P. Cundall 1976, as used for
+form finding of nets and membranes). Steps are long. Drake's friction creeps in proportion to the
+step, so that a second at 10 ms foretells ten seconds at 1 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.analysis import Simulator
+
+from burg_drake.core.frames import Array
+from burg_drake.simulation.fall import is_below
+from burg_drake.simulation.neighbours import Neighbours
+from burg_drake.simulation.settle import BodySpeed, body_place, mean_speed
+from burg_drake.station.diagram import StationDiagram
+from burg_drake.station.engine import Engine
+
+RELAXING = Engine(name="relaxing", time_step=0.01)
+"""How time is stepped."""
+WINDOW = 10
+"""Steps between two looks."""
+WINDOW_TIME = WINDOW * RELAXING.time_step
+"""The same in seconds."""
+CALM = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
+"""What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
+CALM_WINDOWS = 2
+"""So many windows in succession."""
+STOPPED = SpatialVelocity(np.zeros(3), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Relaxed:
+    """Where relaxing ended.
+
+    Attributes:
+        X_WO: (4, 4) poses of what is still on the table, by name.
+        speed: of each of these over the last window in which it was free to move.
+        moving: those among them that still move.
+    """
+
+    X_WO: Mapping[str, Array]
+    speed: Mapping[str, BodySpeed]
+    moving: tuple[str, ...]
+
+
+def relax(built: StationDiagram, time_limit: float) -> Relaxed:
+    """Steps a scene, from where the documents place everything, until it is calm.
+
+    Objects that touch each other come to rest together; once they are, they are left alone.
+
+    Args:
+        built: the scene without a robot, with `RELAXING` steps.
+        time_limit: time that may be stepped [s].
+
+    Raises:
+        RuntimeError, SystemExit: from Drake.
+    """
+    relaxation = _Relaxation(built)
+    windows = max(1, round(time_limit / WINDOW_TIME))
+    for _ in range(windows):
+        if not relaxation.window():
+            break
+    return relaxation.result()
+
+
+@dataclass
+class _Island:
+    """Objects that touch each other, and for how many windows all of them have been calm."""
+
+    bodies: list[BodyIndex]
+    calm: int = 0
+
+
+class _Relaxation:
+    def __init__(self, built: StationDiagram) -> None:
+        self._built, self._plant = built, built.plant
+        self._simulator = Simulator(built.diagram)
+        self._root = self._simulator.get_mutable_context()
+        self._context = self._plant.GetMyMutableContextFromRoot(self._root)
+        neighbours = Neighbours(built)
+        left = list(built.free.values())
+        self._islands: list[_Island] = []
+        while left:
+            island = neighbours.close_to([left[0]])
+            self._islands.append(_Island([index for index in left if index in island]))
+            left = [index for index in left if index not in island]
+        self._energy = dict.fromkeys(built.free.values(), 0.0)
+        self._speed: dict[BodyIndex, BodySpeed] = {}
+        self._fallen: set[BodyIndex] = set()
+        self._steps = 0
+
+    def window(self) -> int:
+        """Steps on; returns how many islands are not calm yet."""
+        awake = [self._plant.get_body(index) for island in self._islands for index in island.bodies]
+        before = {body.index(): body_place(body, self._context) for body in awake}
+        for _ in range(WINDOW):
+            self._steps += 1
+            self._simulator.AdvanceTo(self._steps * RELAXING.time_step)
+            for body in awake:
+                self._damp(body)
+        for body in awake:
+            place = body_place(body, self._context)
+            self._speed[body.index()] = mean_speed(before[body.index()], place, WINDOW_TIME)
+        for island in list(self._islands):
+            self._look(island)
+        return len(self._islands)
+
+    def result(self) -> Relaxed:
+        """Where everything is now."""
+        names = {n: i for n, i in self._built.free.items() if i not in self._fallen}
+        awake = {index for island in self._islands for index in island.bodies}
+        return Relaxed(
+            X_WO={
+                name: self._plant.EvalBodyPoseInWorld(
+                    self._context, self._plant.get_body(index)
+                ).GetAsMatrix4()
+                for name, index in names.items()
+            },
+            speed={name: self._speed[index] for name, index in names.items()},
+            moving=tuple(n for n, i in names.items() if i in awake and not self._is_calm(i)),
+        )
+
+    def _look(self, island: _Island) -> None:
+        """Takes what has fallen out of an island, and freezes it once it is calm."""
+        for index in [i for i in island.bodies if is_below(self._built, self._context, i)]:
+            island.bodies.remove(index)
+            self._fallen.add(index)
+            self._plant.get_body(index).Lock(self._context)
+        calm = all(self._is_calm(index) for index in island.bodies)
+        island.calm = island.calm + 1 if calm else 0
+        if island.calm == CALM_WINDOWS:
+            self._islands.remove(island)
+            self._freeze(island.bodies)
+
+    def _is_calm(self, index: BodyIndex) -> bool:
+        speed = self._speed[index]
+        return speed.speed < CALM.speed and speed.turning < CALM.turning
+
+    def _damp(self, body: RigidBody) -> None:
+        """Stops a body that has got slower."""
+        V_WO = self._plant.EvalBodySpatialVelocityInWorld(self._context, body)
+        R_WO = self._plant.EvalBodyPoseInWorld(self._context, body).rotation()
+        M_OO_W = body.default_spatial_inertia().ReExpress(R_WO)
+        energy = 0.5 * float((M_OO_W * V_WO).dot(V_WO))
+        if energy < self._energy[body.index()]:
+            self._plant.SetFreeBodySpatialVelocity(self._context, body, STOPPED)
+            energy = 0.0
+        self._energy[body.index()] = energy
+
+    def _freeze(self, island: list[BodyIndex]) -> None:
+        """Locks bodies, and takes their contacts with each other and with what is fixed out."""
+        bodies = [self._plant.get_body(index) for index in island]
+        for body in bodies:
+            body.Lock(self._context)
+        fixed = [self._built.table, *self._built.fixed.values()]
+        geometries = GeometrySet(
+            [
+                geometry
+                for body in (*bodies, *map(self._plant.get_body, fixed))
+                for geometry in self._plant.GetCollisionGeometriesForBody(body)
+            ]
+        )
+        graph = self._built.scene_graph
+        graph_context = graph.GetMyMutableContextFromRoot(self._root)
+        declaration = CollisionFilterDeclaration().ExcludeWithin(geometries)
+        graph.collision_filter_manager(graph_context).Apply(declaration)
