@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps import scene_export, scene_import
 from burg_drake.apps.arguments import (
-    DEFAULT_ENGINE,
     ENGINE_NAMES,
     add_group,
     add_quiet,
@@ -24,10 +23,13 @@ from burg_drake.core.figures import figure
 from burg_drake.core.text_table import TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.settle_scene import Displacement, SettledScene
+    from burg_drake.simulation.displacement import Displacement
+    from burg_drake.simulation.settle_scene import SettledScene
 
 DEFAULT_TIME_LIMIT = 10.0
 """In step with simulation.settle_scene, which imports too much for a help text."""
+SETTLING_ENGINE = "screening"
+"""Likewise."""
 
 
 def add_to(verbs: Any) -> None:
@@ -92,8 +94,8 @@ def _add_settle(group: Any) -> None:
     settle.add_argument(
         "--engine",
         choices=ENGINE_NAMES,
-        default=DEFAULT_ENGINE,
-        help="how time is stepped (default: %(default)s)",
+        default=SETTLING_ENGINE,
+        help="how time is stepped while objects fall (default: %(default)s)",
     )
     add_quiet(settle)
 

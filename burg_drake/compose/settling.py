@@ -11,7 +11,7 @@ from burg_drake.scene.scene import Scene, SceneDocument
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.settle_scene import Displacement
+    from burg_drake.simulation.displacement import Displacement
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ STRETCH = 0.5
 BRAKING_TIME = 0.2
 """Turning is braked with this time constant [s], as by air and rolling resistance, which Drake does
 not have: a marble would roll, and a banana that hangs on its tips would swing, for ever."""
-SLOW = RestCriterion(speed=0.01, turning=0.1)
+SLOW = RestCriterion(speed=0.01, turning=0.1, dying=6.0)
 """Below this an object may come to rest in `relax`."""
 
 

@@ -31,7 +31,7 @@ WINDOW = 10
 """Steps between two looks."""
 WINDOW_TIME = WINDOW * RELAXING.time_step
 """The same in seconds."""
-CALM = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
+CALM = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
 CALM_WINDOWS = 2
 """So many windows in succession."""

@@ -27,12 +27,20 @@ class RestCriterion:
         turning: ... and of its rotation, below this [rad/s] ...
         duration: ... for this long [s]: something that rocks stands still twice a period.
         poll: interval at which poses are looked at [s].
+        dying: what gets slower from poll to poll rests below so many times these speeds.
     """
 
     speed: float = 0.005
     turning: float = 0.02
     duration: float = 0.12
     poll: float = 0.04
+    dying: float = 1.0
+
+    def is_rest(self, now: BodySpeed, before: BodySpeed | None) -> bool:
+        """Whether a body is at rest that has this speed, and had another one a poll before."""
+        slower = before is not None and now.speed < before.speed and now.turning < before.turning
+        factor = self.dying if slower else 1.0
+        return now.speed < factor * self.speed and now.turning < factor * self.turning
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,7 @@ def settle(
     needed = max(1, round(criterion.duration / criterion.poll))
     recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
     before = [body_place(body, context) for body in watched]
+    speeds: dict[BodyIndex, BodySpeed] = {}
     for step in range(1, steps + 1):
         if before_poll is not None:
             before_poll()
@@ -103,9 +112,9 @@ def settle(
         moving = {}
         for body, old, new in zip(watched, before, after, strict=True):
             speed = mean_speed(old, new, criterion.poll)
-            # not the other way round: a comparison with NaN is false
-            if not (speed.speed < criterion.speed and speed.turning < criterion.turning):
+            if not criterion.is_rest(speed, speeds.get(body.index())):  # nor is NaN
                 moving[body.index()] = speed
+            speeds[body.index()] = speed
         before = after
         recent.append(moving)
         if len(recent) == needed and not any(recent):

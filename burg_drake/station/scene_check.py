@@ -22,6 +22,7 @@ from burg_drake.core.frames import Array, check_pose, transform_points
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.scene.validate import (
+    SINK_TOLERANCE,
     TOUCH_TOLERANCE,
     Extent,
     SceneIssue,
@@ -164,7 +165,8 @@ class SceneCheck:
         return [
             (a, b, depth)
             for _, _, a, b, depth in sorted(found)
-            if depth > TOUCH_TOLERANCE and a in scene.instances
+            if depth > (SINK_TOLERANCE if b == "table" else TOUCH_TOLERANCE)
+            and a in scene.instances
         ]
 
     def _place(self, scene: Scene) -> None:

@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 
 GAP = 0.001
 """Objects that are closer than this may lean on each other [m]; a scene's poses are rounded."""
-MODULUS = 1e7
-"""Hydroelastic modulus of objects that touch others [Pa], that of the pads."""
+MODULUS = 5e7
+"""Hydroelastic modulus of objects that touch others [Pa]. At 1e7, that of the pads, the edge of one
+sinks into another by more than a millimetre."""
 
 
 def touching(

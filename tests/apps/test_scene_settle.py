@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.scene import DEFAULT_TIME_LIMIT
+from burg_drake.apps.scene import DEFAULT_TIME_LIMIT, SETTLING_ENGINE
 from burg_drake.core.resources import resolve
 from burg_drake.scene.scene import load_scene
 from burg_drake.simulation import settle_scene
@@ -150,5 +150,6 @@ def test_overlapping_objects(scene_file: Path, capsys: Capture) -> None:
     assert "'mug' and 'bottle' overlap by " in capsys.readouterr().err
 
 
-def test_the_parser_knows_the_default() -> None:
+def test_the_parser_knows_the_defaults() -> None:
+    assert SETTLING_ENGINE == settle_scene.DEFAULT_ENGINE
     assert DEFAULT_TIME_LIMIT == settle_scene.DEFAULT_TIME_LIMIT

@@ -33,9 +33,9 @@ from burg_drake.grasping.comparison import compare, summarize
 from burg_drake.grasping.pose_search import Tolerance
 from burg_drake.grasping.ranking import rank_by
 from burg_drake.objects.library import load_library
+from burg_drake.simulation.displacement import Displacement
 from burg_drake.simulation.hold_force import AXES, DIRECTIONS, HoldForces
 from burg_drake.simulation.perturbation import SuccessRate
-from burg_drake.simulation.settle_scene import Displacement
 from burg_drake.station.grasp_motion import GraspMotion
 
 NAME = "a_scanned_thing_with_a_name_of_sixty_characters_from_a_robot"
