@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from pydrake.geometry import (
     AddContactMaterial,
     CollisionFilterDeclaration,
+    GeometryId,
     GeometrySet,
     ProximityProperties,
     Sphere,
@@ -69,7 +70,10 @@ def part_rolling(station_diagram: StationDiagram, context: Context | None = None
     """
     plant, graph = station_diagram.plant, station_diagram.diagram.mutable_scene_graph()
     inspector = graph.model_inspector()
-    patches, rolling, robot, others = [], [], [], []
+    patches: list[GeometryId] = []
+    rolling: list[GeometryId] = []
+    robot: list[GeometryId] = []
+    others: list[GeometryId] = []
     objects = {**station_diagram.free, **station_diagram.fixed}
     for name, index in objects.items():
         geometries = plant.GetCollisionGeometriesForBody(plant.get_body(index))
