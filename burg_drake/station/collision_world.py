@@ -24,8 +24,8 @@ from pydrake.math import RigidTransform
 
 from burg_drake.station.body_shapes import PosedShapes
 
-PLACES = 64
-"""Bodies that there is room for at first; twice as many whenever there is none left."""
+PLACES = 256
+"""Bodies that there is room for at first, those that wait included."""
 AWAY = 1e4
 """How far below the world, and below each other, bodies wait that are not there [m]."""
 
@@ -54,6 +54,7 @@ class CollisionWorld:
     Args:
         fixed: shapes of fixed bodies in the world, by name.
         shapes: gives those of a kind of body in the body's frame; asked once a kind.
+        places: bodies that there is room for before the scene graph is made anew.
 
     Attributes:
         fixed: those shapes.
@@ -61,11 +62,14 @@ class CollisionWorld:
     """
 
     def __init__(
-        self, fixed: Mapping[str, PosedShapes], shapes: Callable[[str], PosedShapes]
+        self,
+        fixed: Mapping[str, PosedShapes],
+        shapes: Callable[[str], PosedShapes],
+        places: int = PLACES,
     ) -> None:
         self.fixed, self._shapes = fixed, shapes
         self._known: dict[str, PosedShapes] = {}
-        self._start(PLACES)
+        self._start(places)
 
     def place(self, bodies: Mapping[str, tuple[str, RigidTransform]]) -> None:
         """Puts bodies in the place of those that were there before.
@@ -78,7 +82,7 @@ class CollisionWorld:
                 self._waiting.setdefault(body.kind, []).append(self._used.pop(name))
                 self._frame_poses.set_value(self._frames[body.index], _away(body.index))
         if self._taken + len(bodies) - len(self._used) > len(self._frames):
-            self._start(2 * max(len(self._frames), len(bodies)))
+            self._start(max(len(self._frames), 2 * len(bodies)))
         for name, (kind, X_WB) in bodies.items():
             if name not in self._used:
                 waiting = self._waiting.get(kind)

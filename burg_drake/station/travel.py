@@ -68,18 +68,17 @@ class Travel:
         others = [name for name in self._world.bodies if name not in names]
         moving = ConvexShapes.joined([self._shapes(name) for name in names])
         still = ConvexShapes.joined([*map(self._shapes, others), *self._fixed])
-        near = _near(moving, still)
-        i, j = np.nonzero(near)
-        normals = self._normals(names, others, (i, j))
-        gap = (still.support(j, normals) - moving.support(i, -normals)) * -normals
-        offsets = np.maximum(CLEAR - gap.sum(axis=1), 0.0)[:, None] * normals
+        i, j = (index.ravel() for index in np.indices((len(moving), len(still))))
+        offsets, against = np.zeros((len(i), 3)), np.zeros(len(i))
+        near = np.flatnonzero(_near(moving, still))
+        normals = self._normals(names, others, (i[near], j[near]))
+        gap = (moving.support(i[near], -normals) - still.support(j[near], normals)) * normals
+        lacking = np.maximum(CLEAR - gap.sum(axis=1), 0.0)
+        offsets[near] = lacking[:, None] * normals
+        against[near] = np.where(lacking > 0.0, -(normals @ direction), 0.0)
         found = ways_to_contact(moving, still, (i, j), direction, limit, offsets)
-        against = -(normals @ direction)
-        blocked = (offsets != 0.0).any(axis=1) & (against > ALONG)
-        found[blocked & (found <= 2.0 * CLEAR / np.maximum(against, ALONG))] = 0.0
-        limit = float(found.min(initial=limit))
-        i, j = np.nonzero(~near)
-        found = ways_to_contact(moving, still, (i, j), direction, limit)
+        pressing = against > ALONG
+        found[pressing & (found <= 2.0 * CLEAR / np.maximum(against, ALONG))] = 0.0
         return float(found.min(initial=limit))
 
     def _shapes(self, name: str) -> ConvexShapes:

@@ -20,7 +20,6 @@ from burg_drake.core.schema import Pose
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.scene.validate import SceneIssue
-from burg_drake.station.collision_world import PLACES
 from burg_drake.station.scene_check import SceneCheck
 from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
 
@@ -160,17 +159,6 @@ def test_the_order_of_instances_does_not_matter(check: SceneCheck, scene: MakeSc
         names = [one.name for one in order]
         overlapping = [i for i in found if i.kind == "overlap" and i.other in names]
         assert all(names.index(i.instance) < names.index(i.other) for i in overlapping)
-
-
-def test_more_instances_than_there_was_room_for(check: SceneCheck, scene: MakeScene) -> None:
-    marbles = [
-        instance(f"m{i}", "marble", 0.04 + 0.05 * (i % 10), 0.04 + 0.05 * (i // 10))
-        for i in range(PLACES + 10)
-    ]
-    assert check.issues(scene(*marbles)) == ()
-    pushed = dataclasses.replace(marbles[-1], X_SO=marbles[0].X_SO)
-    (issue,) = check.issues(scene(*marbles[:-1], pushed))
-    assert (issue.instance, issue.other, issue.kind) == ("m0", f"m{PLACES + 9}", "overlap")
 
 
 def test_background_that_overlaps(check: SceneCheck, scene: MakeScene) -> None:
