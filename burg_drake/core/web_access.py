@@ -19,6 +19,7 @@ LOCALHOST = "127.0.0.1"
 EVERYWHERE = ("0.0.0.0", "::", "")
 HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",

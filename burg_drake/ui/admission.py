@@ -12,7 +12,6 @@ import secrets
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from websockets.asyncio.server import ServerConnection
@@ -115,13 +114,12 @@ class Admission:
         """Whether this browser was admitted; without a token all are."""
         if self._token is None:
             return True
-        try:
-            cookies = SimpleCookie(request.headers.get("Cookie", ""))
-        except CookieError:
-            return False
-        given = cookies.get(self._cookie)
-        return given is not None and hmac.compare_digest(
-            given.value.encode(), self._secret.encode()
+        secret = self._secret.encode()
+        cookies = request.headers.get("Cookie", "").split(";")
+        given = (cookie.strip().partition("=") for cookie in cookies)
+        return any(
+            name == self._cookie and hmac.compare_digest(value.encode(), secret)
+            for name, _, value in given
         )
 
     def _response(

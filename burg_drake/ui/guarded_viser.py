@@ -27,7 +27,7 @@ from burg_drake.ui.admission import Admission
 from burg_drake.ui.incoming import LARGEST_MESSAGE, BoundedConnection
 from burg_drake.ui.uploads import Uploads
 
-_CONSTRUCTION = threading.Lock()
+_PATCHED = threading.Lock()
 _LOG = logging.getLogger(__name__)
 _LOG.addHandler(logging.NullHandler())  # what clients do wrong is not worth a line in the terminal
 
@@ -43,7 +43,7 @@ def guarded_server(listener: socket.socket, admission: Admission) -> viser.Viser
         MissingDependencyError: this viser does not open its port as the guard expects.
     """
     host, port = listener.getsockname()[:2]
-    with _CONSTRUCTION, _quiet(), _guarded_serve(listener, admission) as calls:
+    with _quiet(), _guarded_serve(listener, admission) as calls:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if calls:
         return server
@@ -103,15 +103,16 @@ def _of_one_version(handler: Callable[[ServerConnection], Any]) -> Callable[...,
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """While it lasts, viser prints nothing; others do."""
-    original = rich.print
+    """While it lasts, viser prints nothing; others do. One thread at a time."""
+    with _PATCHED:
+        original = rich.print
 
-    def printed(*objects: Any, **options: Any) -> None:
-        if not sys._getframe(1).f_globals.get("__name__", "").startswith("viser."):
-            original(*objects, **options)
+        def printed(*objects: Any, **options: Any) -> None:
+            if not sys._getframe(1).f_globals.get("__name__", "").startswith("viser."):
+                original(*objects, **options)
 
-    rich.print = printed
-    try:
-        yield
-    finally:
-        rich.print = original
+        rich.print = printed
+        try:
+            yield
+        finally:
+            rich.print = original

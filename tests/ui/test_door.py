@@ -198,7 +198,8 @@ def test_a_token_opens_the_page_in_one_browser(open_to_all: Door, page, browser)
     assert code == 200 and len(admitted) == 2
     assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
     own = ("Origin", "http://127.0.0.1")
-    cookie = ("Cookie", headers["Set-Cookie"].partition(";")[0])
+    others = 'theme="dark; mode"; a={"b": 1, "c"}'  # those of other programs on this machine
+    cookie = ("Cookie", f"{others}; {headers['Set-Cookie'].partition(';')[0]}")
     assert answer(door, "/", own, cookie, *HANDSHAKE.items())[0] == 101
 
 
@@ -211,6 +212,13 @@ def test_without_a_token_nothing_opens(open_to_all: Door) -> None:
         assert answer(open_to_all, "/", own, *given, *HANDSHAKE.items())[0] == 403
     for query in ("?token=", "?token=x", "?token=%C3%A4", "?token"):
         assert answer(open_to_all, f"/{query}")[0] == 403
+
+
+def test_browsers_are_counted(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(admission, "MOST_CONNECTIONS", 0)
+    own = ("Origin", "http://127.0.0.1")
+    code, _, text = answer(door, "/", own, *HANDSHAKE.items())
+    assert code == 503 and "too many browsers" in text
 
 
 def test_a_port_that_is_taken_is_named(door: Door) -> None:
