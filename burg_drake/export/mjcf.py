@@ -52,7 +52,7 @@ def write_mjcf(layout: Layout, folder: Path) -> tuple[str, ...]:
     _add_classes(root)
     assets = MjcfAssets(SubElement(root, "asset"), layout.library, folder)
     world = SubElement(root, "worldbody")
-    light = {"type": "directional", "pos": "0 0 2", "dir": "0.2 0.3 -1", "diffuse": "0.5 0.5 0.5"}
+    light = {"directional": "true", "pos": "0 0 2", "dir": "0.2 0.3 -1", "diffuse": "0.5 0.5 0.5"}
     SubElement(world, "light", light)
     for name, box in layout.boxes.items():
         _add_box(_add_body(world, names[name], box.X_WB), box)
