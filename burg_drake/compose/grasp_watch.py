@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.compose.worker import Job, Worker
+from burg_drake.compose.worker import Job, Reporting, Worker
 from burg_drake.core.errors import BurgError
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
@@ -26,18 +26,44 @@ class CountGrasps:
     Attributes:
         scene: whose grasps are counted.
         station: where it stands.
+        names: of instances, those first whose counts are wanted first.
         grasps_per_object: grasps that are sampled for each object.
     """
 
     scene: Scene
     station: Station
+    names: tuple[str, ...]
     grasps_per_object: int
 
-    def __call__(self, report: Callable[[float, str], None]) -> Mapping[str, GraspCount]:
-        from burg_drake.evaluation.grasp_counts import count_grasps
+    def __call__(self, report: Reporting) -> Mapping[str, GraspCount]:
+        """Counts by instance; each is reported as soon as it is known."""
+        from burg_drake.evaluation.grasp_counts import grasp_counts
 
+        found: dict[str, GraspCount] = {}
         report(0.0, "counting grasps")
-        return count_grasps(self.scene, self.station, grasps_per_object=self.grasps_per_object)
+        for name, count in grasp_counts(
+            self.scene, self.station, self.names, grasps_per_object=self.grasps_per_object
+        ):
+            found[name] = count
+            report(0.0, f"counting grasps of {name}", {name: count})
+        return {name: found[name] for name in self.scene.instances if name in found}
+
+
+@dataclass(frozen=True)
+class Counted:
+    """What a watch has found.
+
+    Attributes:
+        revision: of the scene.
+        counts: by instance, of some or all.
+        complete: whether these are all.
+        error: why there are no more.
+    """
+
+    revision: int
+    counts: Mapping[str, GraspCount]
+    complete: bool = False
+    error: BurgError | None = None
 
 
 class GraspWatch:
@@ -46,15 +72,11 @@ class GraspWatch:
     Args:
         station: where the scenes stand.
         grasps_per_object: grasps that are sampled for each object.
-        on_counts: called with the counts or what is in their way, and the revision, in a thread of
-            the worker.
+        on_counts: called with what is found, as it comes, in a thread of the worker.
     """
 
     def __init__(
-        self,
-        station: Station,
-        grasps_per_object: int,
-        on_counts: Callable[[Mapping[str, GraspCount] | BurgError, int], None],
+        self, station: Station, grasps_per_object: int, on_counts: Callable[[Counted], None]
     ) -> None:
         self._station, self._grasps_per_object = station, grasps_per_object
         self._on_counts = on_counts
@@ -62,14 +84,22 @@ class GraspWatch:
         self._timer: threading.Timer | None = None
         self._newest = -1
 
-    def tell(self, scene: Scene, revision: int) -> None:
-        """The scene has changed; nothing if this revision is known."""
+    def tell(self, scene: Scene, revision: int, first: tuple[str, ...]) -> None:
+        """The scene has changed; nothing if this revision is known.
+
+        Args:
+            scene: as it is now.
+            revision: its number.
+            first: instances whose counts are wanted first.
+        """
         if revision == self._newest:
             return
         self._newest = revision
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = threading.Timer(PAUSE, self._count, (scene, revision))
+        names = tuple(sorted(scene.instances, key=lambda name: name not in first))
+        task = CountGrasps(scene, self._station, names, self._grasps_per_object)
+        self._timer = threading.Timer(PAUSE, self._count, (task, revision))
         self._timer.daemon = True
         self._timer.start()
 
@@ -80,12 +110,18 @@ class GraspWatch:
             self._timer.cancel()
         self._worker.close()
 
-    def _count(self, scene: Scene, revision: int) -> None:
+    def _count(self, task: CountGrasps, revision: int) -> None:
         if revision != self._newest:
             return
 
-        def done(job: Job[Mapping[str, GraspCount]]) -> None:
-            if job.done and not job.cancelled:
-                self._on_counts(job.error or job.result, revision)
+        def changed(job: Job[Mapping[str, GraspCount]]) -> None:
+            if job.cancelled:
+                return
+            if job.error is not None:
+                self._on_counts(Counted(revision, {}, error=job.error))
+            elif job.done:
+                self._on_counts(Counted(revision, job.result, complete=True))
+            elif job.partial is not None:
+                self._on_counts(Counted(revision, job.partial))
 
-        self._worker.ask(CountGrasps(scene, self._station, self._grasps_per_object), done)
+        self._worker.ask(task, changed)

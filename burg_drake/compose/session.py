@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.compose.checker import known_scene
 from burg_drake.compose.editor import Editor
-from burg_drake.compose.grasp_watch import GraspWatch
+from burg_drake.compose.grasp_watch import Counted, GraspWatch
 from burg_drake.compose.history import Step
 from burg_drake.compose.library_watch import LibraryWatch, changes_notice, require_objects
 from burg_drake.compose.opening import Opened, new_scene, open_reference, open_scene_file
@@ -286,15 +286,17 @@ class ComposeSession(Editor):
             watch.close()
         return view
 
-    def _counted(self, counts: Mapping[str, GraspCount] | BurgError, revision: int) -> None:
+    def _counted(self, found: Counted) -> None:
         """Called by the worker's thread."""
         with self._alone():
             if self._grasp_watch is None:
                 return
-            if isinstance(counts, BurgError):
-                self.notify(f"grasps cannot be counted: {counts}")
-                return
-            self._grasps = (counts, revision)
+            if found.error is not None:
+                self.notify(f"grasps cannot be counted: {found.error}")
+            elif found.complete:
+                self._grasps = (found.counts, found.revision)
+            else:
+                self._grasps = ({**self._grasps[0], **found.counts}, self._grasps[1])
             self._publish()
 
     def _change(self, opened: Opened) -> View:
@@ -349,7 +351,7 @@ class ComposeSession(Editor):
     def _dressed(self, view: View) -> View:
         if self._grasp_watch is not None:
             scene = known_scene(self._history.state, self._storage.place)
-            self._grasp_watch.tell(scene, self._revision)
+            self._grasp_watch.tell(scene, self._revision, self._state.selection)
         working = None
         if self._settling is not None:
             share, word = self._settling.progress

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from burg_drake.compose.worker import Reporting
 from burg_drake.scene.scene import Scene, SceneDocument
 from burg_drake.station.station import Station
 
@@ -51,7 +52,7 @@ class Settle:
     station: Station
     time_limit: float
 
-    def __call__(self, report: Callable[[float, str], None]) -> Proposal:
+    def __call__(self, report: Reporting) -> Proposal:
         from burg_drake.simulation.settle_scene import settle_scene
 
         passed = 0.0

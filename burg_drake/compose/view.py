@@ -51,9 +51,10 @@ class View:
         notices: what the user should know, one line each, until `ComposeSession.dismiss`.
         working: what is being done beside, and how far it is; None if nothing is.
         proposal: what came of it, to be accepted or reverted.
-        grasps: how many grasps of each instance are clear and reachable, when they were counted
-            last; see `ComposeSession.watch_grasps`.
-        grasps_revision: the revision that these counts belong to.
+        grasps: how many grasps of each instance are clear and reachable, as far as they are
+            counted; see `ComposeSession.watch_grasps`.
+        grasps_revision: the revision that all of these counts belong to; while a newer one is
+            counted, some are of that one already.
     """
 
     serial: int

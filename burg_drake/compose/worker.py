@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import subprocess
@@ -18,14 +19,27 @@ Result = TypeVar("Result", covariant=True)
 T = TypeVar("T")
 
 
+class Reporting(Protocol):
+    """How a task tells how far it is; it raises `Cancelled` if nobody waits for the result."""
+
+    def __call__(self, share: float, word: str, partial: Any = None) -> None:
+        """Tells it.
+
+        Args:
+            share: of the work that is done, in [0, 1].
+            word: for people.
+            partial: what came of it since the last report.
+        """
+
+
 class Task(Protocol[Result]):
     """What a worker does: a dataclass that can be pickled, as can what it gives."""
 
-    def __call__(self, report: Callable[[float, str], None]) -> Result:
+    def __call__(self, report: Reporting) -> Result:
         """Does it.
 
         Args:
-            report: tells how far it is: a share in [0, 1], and a word.
+            report: tells how far it is.
 
         Raises:
             BurgError: it cannot be done.
@@ -37,6 +51,7 @@ class Job(Generic[T]):
 
     Attributes:
         progress: share that is done, in [0, 1], and a word.
+        partial: what came of it since the report before, if it tells.
         cancelled: nobody waits for it any more.
         done: it has a result or an error, or was cancelled.
         error: why it has no result; None if it has, or is not done.
@@ -44,6 +59,7 @@ class Job(Generic[T]):
 
     def __init__(self, worker: Worker, task: Task[T], on_change: Callable[[Job[T]], None]) -> None:
         self.progress: tuple[float, str] = (0.0, "waiting")
+        self.partial: Any = None
         self.cancelled = False
         self.error: BurgError | None = None
         self.done = False
@@ -81,9 +97,9 @@ class Job(Generic[T]):
         """Ends it; nothing if it is done."""
         self._worker.cancel(self)
 
-    def report(self, share: float, word: str) -> None:
+    def report(self, share: float, word: str, partial: Any) -> None:
         """The worker is so far."""
-        self.progress = (share, word)
+        self.progress, self.partial = (share, word), partial
         self._on_change(self)
 
     def finish(self, result: T | BurgError) -> None:
@@ -105,10 +121,16 @@ class Cancelled(BurgError):
 class _Report:
     share: float
     word: str
+    partial: Any
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """What the worker process does, nobody waits for any more."""
 
 
 class Worker:
-    """One process, started with the first task; of tasks that wait only the newest is done."""
+    """One process, started with the first task, that does what it was asked last."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -120,7 +142,7 @@ class Worker:
         self._closed = False
 
     def ask(self, task: Task[T], on_change: Callable[[Job[T]], None] = lambda job: None) -> Job[T]:
-        """Asks for something; what waits for its turn is cancelled.
+        """Asks for something; what it was asked before is cancelled, if that is not done.
 
         Args:
             task: what to do.
@@ -129,6 +151,9 @@ class Worker:
         job = Job(self, task, on_change)
         with self._changed:
             older, self._waiting = self._waiting, job
+            if self._running is not None and not self._running.cancelled:
+                self._running.cancelled = True
+                self._send(_Stop())
             if self._thread is None:
                 self._thread = threading.Thread(target=self._serve, daemon=True)
                 self._thread.start()
@@ -190,15 +215,18 @@ class Worker:
                 process, connection = start_worker("burg_drake.compose.worker")
                 with self._changed:
                     self._process, self._connection = process, connection
-            assert self._connection is not None
-            if job.cancelled:
-                return _cancelled()
-            self._connection.send(job.task)
+            connection = self._connection
+            assert connection is not None
+            with self._changed:
+                if job.cancelled:
+                    return _cancelled()
+                connection.send(job.task)
             while True:
-                message = self._connection.recv()
+                message = connection.recv()
                 if not isinstance(message, _Report):
                     return _cancelled() if job.cancelled else message
-                job.report(message.share, message.word)
+                if not job.cancelled:
+                    job.report(message.share, message.word, message.partial)
         except (EOFError, OSError):
             cause = "no worker process can be started"
             if self._process is not None:
@@ -207,6 +235,11 @@ class Worker:
             if job.cancelled:
                 return _cancelled()
             return SimulationError(f"{cause}; the scene is as it was, try again")
+
+    def _send(self, message: object) -> None:
+        with contextlib.suppress(OSError):  # it has died; its thread finds out
+            if self._connection is not None:
+                self._connection.send(message)
 
     def _end(self) -> None:
         with self._changed:
@@ -239,15 +272,21 @@ def main(handle: int) -> None:
     try:
         while True:
             task = connection.recv()
-            connection.send(_result(task, connection))
+            if not isinstance(task, _Stop):  # one that came too late
+                connection.send(_result(task, connection))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         pass  # the parent is gone
     os._exit(0)
 
 
 def _result(task: Task[Any], connection: Connection) -> Any:
+    def report(share: float, word: str, partial: Any = None) -> None:
+        if connection.poll():
+            raise _cancelled()
+        connection.send(_Report(share, word, partial))
+
     try:
-        return task(lambda share, word: connection.send(_Report(share, word)))
+        return task(report)
     except BurgError as error:
         return error
     except (Exception, SystemExit) as error:  # Drake ends some failed checks by SystemExit
