@@ -16,6 +16,7 @@ from burg_drake.compose.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.state import State
 from burg_drake.compose.storage import Storage
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import builtin_names, data_root, resolve
 from burg_drake.objects.library import LIBRARY_FILE, load_library
 from burg_drake.scene.scene import Board, SceneDocument, load_scene
@@ -91,7 +92,7 @@ def new_scene(library: str | Path, folder: Path, address: str = "") -> Opened:
     """An empty board, A3 across, with the objects of a library at hand."""
     loaded = load_library(library)
     built_in = str(library) in builtin_names("models")
-    reference = str(library) if built_in else str(loaded.root)
+    reference = str(library) if built_in else portable_reference(loaded.root, folder)
 
     def make(name: str) -> State:
         board = Board(size=board_size("A3"))

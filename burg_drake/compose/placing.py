@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from burg_drake.compose.checker import lost
 from burg_drake.compose.command import FARTHEST, label_of, require_number
 from burg_drake.compose.footprint import bounds, object_bounds
-from burg_drake.compose.free_spot import free_spot
+from burg_drake.compose.free_spot import free_offset, free_spot
 from burg_drake.compose.moving import stable_pose_matrix, standing
 from burg_drake.compose.state import (
     State,
@@ -20,7 +19,7 @@ from burg_drake.compose.state import (
 )
 from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance
 
@@ -89,8 +88,8 @@ class Duplicate:
 
     Attributes:
         names: of what is copied; several keep their places to one another.
-        offset: from each to its copy along x and y [m]; to the nearest side where the copies are on
-            the board and free if None.
+        offset: from each to its copy along x and y [m]; to the nearest place where all of them are
+            on the board and free if None.
     """
 
     names: tuple[str, ...]
@@ -189,24 +188,9 @@ def _without_mass(state: State, instances: list[Instance]) -> set[str]:
 
 
 def _beside(state: State, names: tuple[str, ...]) -> tuple[float, float]:
-    """Offset of copies: to the first side of right, up, left, down where they fit."""
-    corners = np.array([bounds(state, name) for name in names])
-    lower, upper = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-    others = [bounds(state, name) for name in state.instances if name not in lost(state)]
-    width, depth = (float(v) for v in (upper - lower)[:2] + GAP)
-    sides = [(width, 0.0), (0.0, depth), (-width, 0.0), (0.0, -depth)]
-    for side in sides:
-        moved = corners[:, :, :2] + side
-        if _on_board(moved, state) and not any(_meet(m, o[:, :2]) for m in moved for o in others):
-            return side
-    return sides[0]
-
-
-def _on_board(corners: Array, state: State) -> bool:
-    """Whether boxes (N, 2, 2) in the plane of the board are on it."""
-    return bool((corners >= 0.0).all() and (corners <= np.array(state.document.board.size)).all())
-
-
-def _meet(a: Array, b: Array) -> bool:
-    """Whether two boxes (2, 2) overlap."""
-    return bool((a[0] < b[1]).all() and (b[0] < a[1]).all())
+    """Offset of copies: the shortest to where they are free, or to the right if that is nowhere."""
+    boxes = np.array([bounds(state, name)[:, :2] for name in names])
+    offset = free_offset(boxes, state)
+    if offset is None:
+        return float(np.ptp(boxes[:, :, 0])) + GAP, 0.0
+    return float(offset[0]), float(offset[1])

@@ -14,10 +14,10 @@ from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.frames import Array, inverse, transform_points
 from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import TRIES, Layout, PoseChoice, Wanted
+from burg_drake.scene.arrangement import Layout, PoseChoice, Wanted
 from burg_drake.station.station import Station
 
-MOST = 200
+MOST = 60
 """Objects of one configuration."""
 
 
@@ -45,15 +45,20 @@ class RandomConfiguration:
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._wanted(state, surroundings, rng)
+        shapes, board = surroundings.checker.shapes(state), state.document.board
+        covered = sum(min(map(_area, shapes[one.object].shadows)) for one in wanted)
+        if self.layout != "heap" and covered > board.size[0] * board.size[1]:
+            raise InvalidInputError(
+                f"{len(wanted)} objects cover more than the board; take fewer, or a larger board"
+            )
         found = arrange(
             wanted,
-            surroundings.checker.shapes(state),
-            state.document.board,
+            shapes,
+            board,
             rng,
             layout=self.layout,
             poses=self.poses,
             obstacles=_obstacles(state, surroundings),
-            tries=10 * TRIES,
         )
         if found.missing:
             raise InvalidInputError(
@@ -86,6 +91,12 @@ def _obstacles(state: State, surroundings: Surroundings) -> list[Array]:
     ]
     bodies += station_boxes(surroundings.station)
     return [p_SV for p_SV in bodies if p_SV[:, 2].max() > 0.0]
+
+
+def _area(polygon: Array) -> float:
+    """Of a convex polygon (N, 2) [m^2], by the shoelace formula."""
+    x, y = polygon.T
+    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
 def station_boxes(station: Station) -> list[Array]:

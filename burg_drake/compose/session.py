@@ -21,6 +21,7 @@ from burg_drake.compose.surroundings import Surroundings
 from burg_drake.compose.view import View
 from burg_drake.compose.worker import Cancelled, Job, Worker
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import builtin_names
 from burg_drake.objects.library import LIBRARY_FILE, ObjectLibrary, load_library
 from burg_drake.scene.scene import load_scene
@@ -212,9 +213,10 @@ class ComposeSession(Editor):
             raise UnknownNameError(
                 f"no library {reference!r} here; {nearest(reference, self.libraries())}"
             )
-        built_in = str(reference) in builtin_names("models")
         library = load_library(reference, self.folder)
-        return self.do(_UseLibrary(library, str(reference) if built_in else str(library.root)))
+        built_in = str(reference) in builtin_names("models")
+        written = str(reference) if built_in else portable_reference(library.root, self.folder)
+        return self.do(_UseLibrary(library, written))
 
     def refresh(self) -> View:
         """Looks whether the library has changed on the disk; also before each step."""
