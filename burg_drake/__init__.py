@@ -75,6 +75,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.simulation.perturbation": ["Noise", "success_rate"],
         "burg_drake.simulation.settle_scene": ["settle_scene"],
         "burg_drake.station.check": ["check_scene"],
+        "burg_drake.station.scene_check": ["SceneCheck"],
         "burg_drake.station.diagram": ["build_station_diagram"],
         "burg_drake.station.engine": ["ENGINES", "Engine"],
         "burg_drake.station.grasp_motion": ["GraspMotion"],
