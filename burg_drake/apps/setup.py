@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 import sys
 import threading
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from burg_drake.ui.door import Door
 
 DEFAULT_LIBRARY = "household"
+LARGEST_PICTURE = 1 << 27
+"""Pixels of an uploaded picture. OpenCV's own limit is 2**30, three gigabytes, for which a file of
+a few megabytes is enough."""
 
 
 def add_to(verbs: Any) -> None:
@@ -60,6 +64,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
     from burg_drake.ui.door import require_viser
 
     require_viser()  # before anything that takes time
+    bound_pictures()
     with terminated_as_interrupted():
         closing = contextlib.ExitStack()
         try:
@@ -76,6 +81,11 @@ def run_setup(arguments: argparse.Namespace) -> int:
             with deaf_to_interrupts():
                 closing.close()
     return 0
+
+
+def bound_pictures() -> None:
+    """Has OpenCV refuse larger pictures; it looks when it is imported."""
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(LARGEST_PICTURE))
 
 
 def _open(arguments: argparse.Namespace) -> ComposeSession:

@@ -5,8 +5,7 @@ a guard (`admission`) before the one call by which viser opens its port, so that
 viser unseen, and tries it before the address is handed out.
 
 What a page may use: everything of viser but forms, `get_render` and sharing by a public tunnel, of
-which the guard lets nothing through. Upload buttons belong to a client (`client.gui`): viser tells
-each page that is loaded later of all uploads by those of the server.
+which the guard lets nothing through.
 """
 
 from __future__ import annotations

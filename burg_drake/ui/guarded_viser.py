@@ -20,6 +20,7 @@ from typing import Any
 import rich
 import viser
 import websockets.asyncio.server
+from viser._messages import FileTransferPartAck
 from websockets.asyncio.server import ServerConnection
 
 from burg_drake.core.errors import MissingDependencyError
@@ -46,6 +47,7 @@ def guarded_server(listener: socket.socket, admission: Admission) -> viser.Viser
     with _quiet(), _guarded_serve(listener, admission) as calls:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if calls:
+        _forget_uploads(server)
         return server
     stop(server)
     raise MissingDependencyError(
@@ -86,6 +88,17 @@ def _guarded_serve(listener: socket.socket, admission: Admission) -> Iterator[li
         yield calls
     finally:
         websockets.asyncio.server.serve = original  # type: ignore[misc]
+
+
+def _forget_uploads(server: viser.ViserServer) -> None:
+    """viser keeps for pages to come how far uploads got, which they would show as their own."""
+
+    def forget(client: object) -> None:
+        server._websock_server.get_message_buffer().remove_from_buffer(
+            lambda message: isinstance(message, FileTransferPartAck)
+        )
+
+    server._websock_server.on_client_connect(forget)
 
 
 def _of_one_version(handler: Callable[[ServerConnection], Any]) -> Callable[..., Any]:

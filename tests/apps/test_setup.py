@@ -68,7 +68,9 @@ def test_a_new_scene(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_address_for_one_browser_after_the_other(tmp_path: Path) -> None:
+def test_an_address_for_one_browser_after_the_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     scene = tmp_path / "breakfast.yaml"
     scene.write_text(MUG)
     with running(tmp_path, "breakfast.yaml", "--host", "0.0.0.0") as (process, line):
@@ -82,6 +84,9 @@ def test_an_address_for_one_browser_after_the_other(tmp_path: Path) -> None:
         line = process.stdout.readline()
         assert re.match(r"opened by 127\.0\.0\.1; another browser: open http://\S+\?token=", line)
         assert line.strip().partition("?token=")[2] != token
+        assert main(["setup", str(scene)]) == 2  # a second page on the same scene
+        said = capsys.readouterr().err
+        assert f":{port}/; go there" in said and "token" not in said
         process.send_signal(signal.SIGTERM)
         assert process.wait(TIMEOUT) == 0
 
@@ -100,11 +105,19 @@ def test_without_viser(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
     assert said == "burg-drake: error: the page needs viser: pip install 'burg-drake[ui]'\n"
 
 
-def test_a_second_process_is_told_where_the_first_one_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    scene = tmp_path / "breakfast.yaml"
-    scene.write_text(MUG)
-    with running(tmp_path, "breakfast.yaml") as (_, line):
-        assert main(["setup", str(scene)]) == 2
-        assert url_in(line) in capsys.readouterr().err
+def test_small_files_of_huge_pictures_are_refused() -> None:
+    """As a process: OpenCV looks for its limit once."""
+    program = """
+import io
+from PIL import Image
+from burg_drake.apps.setup import bound_pictures
+bound_pictures()
+from burg_drake.cameras.image_file import decode_image
+for side in (1000, 12_000):
+    file = io.BytesIO()
+    Image.new("1", (side, side)).save(file, "png")
+    image = decode_image(file.getvalue())
+    print(len(file.getvalue()) < 1_000_000, image is not None)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("True True\nTrue False\n", "")

@@ -180,6 +180,17 @@ def unpacked(raw: str | bytes) -> bytes:
     return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
 
 
+def test_new_pages_hear_of_no_old_uploads(door: Door, button, client: ClientConnection) -> None:
+    announce(client, button, transfer_uuid="old")
+    part(client, button, bytes(10), transfer_uuid="old")
+    wait_for(client, "old")
+    with coming_in(door) as other:
+        replay = b""
+        while b"ReplayDoneMessage" not in replay:
+            replay += unpacked(other.recv(timeout=TIMEOUT))
+        assert b"Load a photo" in replay and b"FileTransferPartAck" not in replay
+
+
 def test_a_flood_is_paced(door: Door, button, client: ClientConnection) -> None:
     begun = time.monotonic()
     for _ in range(int(BURST + RATE)):
