@@ -7,7 +7,6 @@ and what is added is registered beside what is there.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
-from scipy.spatial import ConvexHull, QhullError
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, check_pose, transform_points
@@ -79,7 +77,7 @@ class SceneCheck:
         shapes = partial(object_shapes, library, packages=station.packages)
         self._world = CollisionWorld(fixed, shapes)
         self._travel: Travel | None = None
-        self._corners: dict[str, Array] = {}
+        self._surfaces: dict[str, Array] = {}
         self._placed: dict[str, _Placed] = {}
 
     def issues(self, scene: Scene) -> tuple[SceneIssue, ...]:
@@ -191,17 +189,10 @@ class SceneCheck:
 
     def _look_at(self, scene: Scene, name: str, instance: Instance) -> _Placed:
         X_SO = check_pose(instance.X_SO.matrix(), f"{scene.path}: X_SO of {name!r}")
-        extent = Extent.of(transform_points(X_SO, self._surface(instance.object)))
+        if instance.object not in self._surfaces:
+            self._surfaces[instance.object] = surface_vertices(self._library, instance.object)
+        extent = Extent.of(transform_points(X_SO, self._surfaces[instance.object]))
         return _Placed(instance, RigidTransform(self._X_WS @ X_SO), extent)
-
-    def _surface(self, name: str) -> Array:
-        """(N, 3) points of an object in its frame [m] that its surface lies between."""
-        if name not in self._corners:
-            p_OV = surface_vertices(self._library, name)
-            with suppress(QhullError, ValueError):  # of flat surfaces: then all points remain
-                p_OV = p_OV[ConvexHull(p_OV).vertices]
-            self._corners[name] = p_OV
-        return self._corners[name]
 
     def _require_free_names(self, scene: Scene) -> None:
         for name in (*scene.instances, *scene.background):
