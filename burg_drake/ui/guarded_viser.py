@@ -8,11 +8,13 @@ call is replaced while the server is constructed: it gets a socket that listens 
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import socket
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -71,6 +73,7 @@ def _guarded_serve(listener: socket.socket, admission: Admission) -> Iterator[li
         if handler.__module__ != viser.infra._infra.__name__:
             return original(handler, *place, **options)
         calls.append(None)
+        asyncio.get_running_loop().set_exception_handler(_handle_error)
         return original(
             _of_one_version(handler),
             sock=listener,
@@ -88,6 +91,16 @@ def _guarded_serve(listener: socket.socket, admission: Admission) -> Iterator[li
         yield calls
     finally:
         websockets.asyncio.server.serve = original  # type: ignore[misc]
+
+
+def _handle_error(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Errors are told, but for those of viser itself about values that no page sends."""
+    error = context.get("exception")
+    places = [] if error is None else [*traceback.walk_tb(error.__traceback__)]
+    if places and places[-1][0].f_globals.get("__name__", "").startswith("viser."):
+        _LOG.debug("a message could not be handled", exc_info=error)
+    else:
+        loop.default_exception_handler(context)
 
 
 def _forget_uploads(server: viser.ViserServer) -> None:

@@ -102,7 +102,7 @@ class BoundedConnection(ServerConnection):
             RefusedError: no page sends that.
         """
         if message.type not in TYPES:
-            _LOG.warning("dropped a %.60s from a browser", message.type)
+            _LOG.debug("dropped a %.60s from a browser", message.type)
             return False
         self._connected |= message.type == CONNECTED
         if message.type == "GuiUpdateMessage" and message.updates.keys() != {"value"}:

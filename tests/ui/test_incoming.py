@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ from viser._messages import FileTransferStartUpload, Message, ShareUrlRequest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from burg_drake.ui import guarded_viser
 from burg_drake.ui.door import Door, serve
 from burg_drake.ui.incoming import BURST, LARGEST_MESSAGE, RATE
 from burg_drake.ui.uploads import ALL_UPLOADS, LARGEST_UPLOAD
@@ -166,6 +168,15 @@ def test_who_goes_away_leaves_nothing_behind(door: Door, button) -> None:
         time.sleep(0.01)
 
 
+def told(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """What a terminal would show where nobody has set up logging."""
+    return [
+        record.getMessage()
+        for record in caplog.records
+        if record.levelno >= logging.WARNING and record.name != guarded_viser.__name__
+    ]
+
+
 def wait_for(client: ClientConnection, key: str) -> None:
     """Waits until viser has taken a part of this file."""
     taken = msgspec.msgpack.encode("transfer_uuid") + msgspec.msgpack.encode(key)
@@ -191,7 +202,9 @@ def test_new_pages_hear_of_no_old_uploads(door: Door, button, client: ClientConn
         assert b"Load a photo" in replay and b"FileTransferPartAck" not in replay
 
 
-def test_a_flood_is_paced(door: Door, button, client: ClientConnection) -> None:
+def test_a_flood_is_paced(
+    door: Door, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
+) -> None:
     begun = time.monotonic()
     for _ in range(int(BURST + RATE)):
         send(client, "ShareUrlRequest")
@@ -204,6 +217,7 @@ def test_a_flood_is_paced(door: Door, button, client: ClientConnection) -> None:
     part(client, button, bytes(10), transfer_uuid="late")
     wait_for(client, "late")
     assert time.monotonic() - begun > 0.9  # a second's worth more than what may come at once
+    assert told(caplog) == []
 
 
 def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnection) -> None:
@@ -216,6 +230,36 @@ def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnecti
     wait_for(client, "e")
     assert [type(message) for message in asked] == [FileTransferStartUpload]
     assert door.server._share_tunnel is None
+
+
+def test_values_of_another_type_change_nothing(
+    door: Door, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
+) -> None:
+    slider = door.server.gui.add_slider("Length", 0.0, 1.0, 0.1, 0.5)
+    for value in ("x", None, {}, []):
+        send(client, "GuiUpdateMessage", uuid=slider._impl.uuid, updates={"value": value})
+    announce(client, button, transfer_uuid="f")
+    part(client, button, bytes(10), transfer_uuid="f")
+    wait_for(client, "f")
+    assert slider.value == 0.5
+    assert told(caplog) == []
+
+
+def test_errors_of_a_page_are_told(
+    door: Door, client: ClientConnection, caplog: pytest.LogCaptureFixture
+) -> None:
+    slider = door.server.gui.add_slider("Width", 0.0, 1.0, 0.1, 0.5)
+
+    @slider.on_update
+    async def _(event: object) -> None:
+        raise ZeroDivisionError("of the page")
+
+    send(client, "GuiUpdateMessage", uuid=slider._impl.uuid, updates={"value": 0.25})
+    end = time.monotonic() + TIMEOUT
+    while not told(caplog):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert "ZeroDivisionError: of the page" in caplog.text
 
 
 def test_only_values_of_controls_are_set(door: Door, client: ClientConnection) -> None:
@@ -238,8 +282,8 @@ def test_only_values_of_controls_are_set(door: Door, client: ClientConnection) -
     ids=["text", "empty", "invalid", "nested", "type", "content", "large"],
 )
 def test_malformed_messages_end_the_connection_quietly(
-    client: ClientConnection, capfd: pytest.CaptureFixture[str], raw: str | bytes, code: int
+    client: ClientConnection, caplog: pytest.LogCaptureFixture, raw: str | bytes, code: int
 ) -> None:
     client.send(raw)
     assert closed(client)[0] == code
-    assert capfd.readouterr() == ("", "")
+    assert told(caplog) == []
