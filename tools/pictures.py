@@ -1,10 +1,11 @@
-"""`python -m tools.pictures [station] [board] [overlay] [pages] [ports]`: pictures for the docs.
+"""Pictures for the docs: `python -m tools.pictures [KIND ...]`.
 
 `station` renders those of stations and the built-in objects by Drake, `board` what a camera over
 the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
 of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
 pages that the commands write with --html, by a Chromium that runs without a display; `ports` what
-the example of the ports shows in Meshcat. The others are screenshots by hand.
+the example of the ports shows in Meshcat; `setup` those of the setup page. The others are
+screenshots by hand.
 """
 
 from __future__ import annotations
@@ -211,9 +212,19 @@ def overlay() -> None:
     save(Overlay(scene, loop.intrinsics).draw(photo, X_SC, placement=check), "overlay.png")
 
 
+def setup() -> None:
+    """Writes the pictures of the setup page, which needs playwright."""
+    from tools.setup_pictures import setup
+
+    setup(IMAGES)
+
+
 def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
-    kinds = {"station": station, "board": board, "overlay": overlay, "pages": pages, "ports": ports}
+    kinds = {
+        **{"station": station, "board": board, "overlay": overlay},
+        **{"pages": pages, "ports": ports, "setup": setup},
+    }
     for name in sys.argv[1:] or kinds:
         if name not in kinds:
             raise SystemExit(f"there are no pictures {name!r}, only {', '.join(kinds)}")

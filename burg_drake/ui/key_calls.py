@@ -37,7 +37,6 @@ def selection_calls(session: ComposeSession) -> dict[str, Callable[[], Any]]:
         "undo": session.undo,
         "redo": session.redo,
         "all": lambda: session.select(session.view.instances),
-        "none": lambda: session.select(()),
         "delete": lambda: session.do(Delete(selected())),
         "duplicate": lambda: session.do(Duplicate(selected())),
         "put_down": lambda: session.do(PutDown(selected())),

@@ -69,6 +69,14 @@ class ObjectDrags:
         """A page is gone; what it held stays where it is."""
         self._actions.ask(lambda: self._end(client_id))
 
+    def put_back(self, client_id: int) -> bool:
+        """Puts back what a page drags; False if it drags nothing."""
+        held = self._held.pop(client_id, None)
+        if held is None or held.drag.is_over:
+            return False
+        held.drag.cancel()
+        return True
+
     def _follow(self, event: Any, name: str, *, turns: bool) -> None:
         """Takes what has happened on a page as an action; the event loop goes on at once."""
         client, who = event.client, event.client_id

@@ -154,6 +154,7 @@ class SetupPage:
 
         calls = selection_calls(self._session)
         return {name: anywhere(action) for name, action in calls.items()} | {
+            "none": self._let_go,
             "save": self._files.save,
             "settle": anywhere(self._session.settle),
             "snap": anywhere(self._arrange.snap),
@@ -162,6 +163,10 @@ class SetupPage:
             "colors": anywhere(self._display.next_colors),
             "help": show_overlay,
         }
+
+    def _let_go(self, client: viser.ClientHandle | None) -> None:
+        if client is None or not self._drags.put_back(client.client_id):
+            self._session.select(())
 
     def _attach(self, handle: Any, name: str) -> None:
         self._drags.attach(handle, name)

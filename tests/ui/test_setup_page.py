@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
+from burg_drake.compose.moving import Move
 from burg_drake.compose.session import ComposeSession
 from burg_drake.compose.view import View
 from burg_drake.station.station import load_station
@@ -96,10 +97,18 @@ class Setup:
         """Presses a button, of which there is one of that name."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
-    def fill(self, label: str, text: str) -> None:
-        """Types into the field of a label, the last on the page that can be seen."""
+    def field(self, label: str) -> Any:
+        """The input of a label, the last on the page that can be seen."""
         row = f"//label[normalize-space()='{label}']/ancestor::div[.//input][1]//input"
-        self.tab.locator(f"xpath={row}").locator("visible=true").last.fill(text)
+        return self.tab.locator(f"xpath={row}").locator("visible=true").last
+
+    def fill(self, label: str, text: str) -> None:
+        """Types into a field."""
+        self.field(label).fill(text)
+
+    def value(self, label: str) -> str:
+        """What stands in a field."""
+        return str(self.field(label).input_value())
 
     def tab_of(self, name: str) -> None:
         """Brings a tab of the panel to the front."""
@@ -163,3 +172,42 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     with setup.tab.expect_download() as download:
         setup.click("Save printout")
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
+
+
+def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_path: Path) -> None:
+    setup.open()
+    with setup.tab.context.new_page() as other:
+        other.goto(setup.door.url)
+        setup.click("box")
+        other.get_by_text("1 ok").wait_for()
+
+    setup.fill("Name", "box/2")  # refused, and the field says again what is so
+    setup.tab.get_by_text("That cannot be done").wait_for()
+    until(lambda: setup.value("Name") == "box", "the name is set back")
+    setup.fill("x, y [mm]", "250")
+    until(lambda: setup.view.X_SO("box")[1, 3] == 0.25, "moved by a number")
+    setup.session.restrict_movement(False)
+    X_SO = setup.view.X_SO("box")
+    X_SO[2, 3] += 0.05
+    setup.session.do(Move({"box": X_SO}))
+    setup.tab_of("Check")
+    setup.tab.get_by_text("hovers").wait_for()
+    setup.click("Settle in physics")
+    setup.click("Accept")
+    until(lambda: abs(setup.view.X_SO("box")[2, 3] - X_SO[2, 3] + 0.05) < 1e-3, "settled")
+
+    before = setup.view.document
+    port = setup.door.port
+    setup.door.close()
+    setup.page.close()
+    setup.session.close()  # nothing was saved
+    with (
+        ComposeSession.open("household", setup.session.station, folder=tmp_path) as session,
+        serve(port=port) as door,
+    ):
+        page = SetupPage(door.server, session)
+        assert session.view.document == before
+        until(door.server.get_clients, "the tab that is still open has come back")
+        setup.tab.get_by_text("recovered what was not saved").wait_for()
+        setup.tab.get_by_text("1 ok").wait_for()
+        page.close()
