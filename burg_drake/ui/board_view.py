@@ -13,7 +13,7 @@ from burg_drake.station.board_visual import marker_grid
 from burg_drake.station.station import Station
 from burg_drake.ui.status_colors import FIXED
 
-PIXELS = 2400
+PIXELS = 1600
 """Of the longer side of the board's picture."""
 PAPER, INK, RIM = 252, 40, 200
 """Grey values of the paper, of its markers, and of its edge."""

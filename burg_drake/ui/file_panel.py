@@ -63,7 +63,9 @@ class FilePanel:
             )
 
     def show(self, view: View) -> None:
-        """Brings the panel to a view."""
+        """Brings the panel to a view; nothing of it changes while something is dragged."""
+        if view.dragging:
+            return
         if view.document.name != self._shown_name:
             self._shown_name = self._name.value = view.document.name
         names = scene_names(self._actions.session.folder) or (NO_SCENES,)

@@ -16,6 +16,8 @@ from burg_drake.ui.status_colors import Rgb
 
 COLOR: Rgb = (245, 159, 0)
 OPACITY = 0.5
+SEEN, SEEN_DEG = 2e-3, 2.0
+"""What moves by less [m, degrees] has no shade, which would flicker within the object."""
 
 
 class GhostView:
@@ -45,7 +47,7 @@ class GhostView:
         self._handles = []
         if proposal is None:
             return
-        moved = set(moved_names(proposal))
+        moved = moved_names(proposal, SEEN, SEEN_DEG)
         for instance in proposal.document.instances:
             if name_of(instance) in moved:
                 self._add(name_of(instance), instance.object, instance.X_SO.matrix(), shapes)

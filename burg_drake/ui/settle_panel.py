@@ -85,10 +85,12 @@ def _outcome(proposal: Proposal, *, outdated: bool) -> list[Child]:
     return said
 
 
-def moved_names(proposal: Proposal) -> list[str]:
-    """Instances whose move is worth showing."""
+def moved_names(
+    proposal: Proposal, distance: float = STAYS, angle_deg: float = STAYS_DEG
+) -> list[str]:
+    """Instances that would move further, or turn by more, than given [m, degrees]."""
     return [
         name
         for name, d in proposal.displacements.items()
-        if d.distance > STAYS or degrees(d.angle) > STAYS_DEG
+        if d.distance > distance or degrees(d.angle) > angle_deg
     ]

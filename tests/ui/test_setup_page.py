@@ -184,8 +184,8 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
     setup.fill("Name", "box/2")  # refused, and the field says again what is so
     setup.tab.get_by_text("That cannot be done").wait_for()
     until(lambda: setup.value("Name") == "box", "the name is set back")
-    setup.fill("x, y [mm]", "250")
-    until(lambda: setup.view.X_SO("box")[1, 3] == 0.25, "moved by a number")
+    setup.fill("x, y [mm]", "180")
+    until(lambda: setup.view.X_SO("box")[1, 3] == 0.18, "moved by a number")
     setup.session.restrict_movement(False)
     X_SO = setup.view.X_SO("box")
     X_SO[2, 3] += 0.05
