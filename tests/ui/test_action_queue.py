@@ -1,0 +1,62 @@
+"""Actions of pages run one after another, in order, and none that fails stops the others."""
+
+from __future__ import annotations
+
+import threading
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.ui.action_queue import ActionQueue
+
+PATIENCE = 30.0
+
+
+def test_actions_run_in_order_and_errors_reach_who_asked() -> None:
+    said: list[tuple[object, str]] = []
+    done: list[int] = []
+    queue = ActionQueue(lambda who, line: said.append((who, line)))
+
+    def refuse() -> None:
+        raise InvalidInputError("no")
+
+    def stumble() -> None:
+        raise ZeroDivisionError("oops")
+
+    for i in range(50):
+        queue.ask(lambda i=i: done.append(i))
+        if i == 20:
+            queue.ask(refuse, "a page")
+            queue.ask(stumble, "another")
+    assert queue.idle(PATIENCE)
+    assert done == list(range(50))
+    assert said[0] == ("a page", "no")
+    assert said[1][0] == "another" and "oops" in said[1][1]
+    queue.close()
+
+
+def test_of_actions_with_a_key_only_the_newest_that_waits_is_done() -> None:
+    done: list[int] = []
+    gate = threading.Event()
+    queue = ActionQueue(lambda who, line: None)
+    queue.ask(gate.wait)
+    for i in range(10):
+        queue.ask(lambda i=i: done.append(i), key="drag")
+    queue.ask(lambda: done.append(100))
+    queue.ask(lambda: done.append(200), key="drag")
+    gate.set()
+    assert queue.idle(PATIENCE)
+    assert done == [9, 100, 200]
+    queue.close()
+
+
+def test_what_is_typed_waits_for_more_but_holds_up_nobody() -> None:
+    done: list[str] = []
+    queue = ActionQueue(lambda who, line: None)
+    queue.ask(lambda: done.append("2"), key="field", after=3600.0)
+    queue.ask(lambda: done.append("25"), key="field", after=3600.0)
+    assert not queue.idle(0.05)
+    queue.ask(lambda: done.append("save"))
+    assert queue.idle(PATIENCE)
+    assert done == ["25", "save"]
+    queue.ask(lambda: done.append("last"), key="field", after=3600.0)
+    queue.close()
+    assert done[-1] == "last"
