@@ -95,7 +95,7 @@ class Editor:
         Raises:
             InvalidInputError: there is none.
         """
-        return self._go(self._history.undo)
+        return self._go(lambda: self._history.undo())
 
     def redo(self) -> View:
         """Takes the step again that was undone last.
@@ -103,7 +103,7 @@ class Editor:
         Raises:
             InvalidInputError: there is none.
         """
-        return self._go(self._history.redo)
+        return self._go(lambda: self._history.redo())
 
     def select(self, names: Iterable[str]) -> View:
         """Selects instances, and no others; this is no step.

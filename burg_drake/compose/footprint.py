@@ -10,7 +10,11 @@ import numpy as np
 from burg_drake.compose.state import State
 from burg_drake.core.frames import Array, rotation_angle, transform_points
 from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.polygons import convex_polygon, without_short_sides
 from burg_drake.scene.validate import read_vertices
+
+ROUNDED = 2e-4
+"""How far polygons with few corners reach beyond a side of the true ones [m]."""
 
 
 def object_vertices(library: ObjectLibrary, name: str) -> Array:
@@ -56,6 +60,17 @@ def object_bounds(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
     """(2, 3) the same of an object that need not be an instance."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
     return np.array([p_SV.min(axis=0), p_SV.max(axis=0)])
+
+
+def shadow(state: State, name: str) -> Array:
+    """(N, 2) convex polygon that an instance covers of the board [m]; see `object_shadow`."""
+    return object_shadow(state.library, state.instance(name).object, state.X_SO(name))
+
+
+def object_shadow(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
+    """(N, 2) what an object covers of the board, and at most `ROUNDED` more [m]."""
+    p_SV = transform_points(X_SO, object_vertices(library, object))
+    return without_short_sides(convex_polygon(p_SV[:, :2]), ROUNDED)
 
 
 def yaw_between(R_SA: Array, R_SB: Array) -> float:

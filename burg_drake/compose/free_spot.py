@@ -1,42 +1,53 @@
-"""A place on the board for more objects, by their bounds."""
+"""A place on the board for more objects, by the convex polygons that they cover of it."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from burg_drake.compose.checker import lost
-from burg_drake.compose.footprint import bounds
+from burg_drake.compose.footprint import shadow
 from burg_drake.compose.state import State
 from burg_drake.core.frames import Array
+from burg_drake.scene.polygons import distances, forbidden
 
 PITCH = 0.01
 """Between the places that are tried [m]; of large boards, a sixtieth of their longer side."""
 CLEARANCE = 0.005
-"""Between the new objects' bounds and those of others [m]."""
+"""Between the new objects and others, seen from above [m]."""
 
 
-def free_spot(standing: Array, state: State) -> tuple[float, float]:
+def free_spot(polygon: Array, state: State) -> tuple[float, float] | None:
     """The place nearest to the board's middle where an object is beside all others.
 
     Args:
-        standing: (2, 3) bounds of the object in its pose, its centre of mass above the origin [m].
+        polygon: (N, 2) what it covers, its centre of mass above the origin [m].
         state: what is there already.
 
     Returns:
-        x and y of its centre of mass [m]; the middle of the board if there is no room.
+        x and y of its centre of mass [m]; None if there is no room.
     """
-    middle = np.array(state.document.board.size) / 2 - standing[:, :2].mean(axis=0)
-    offset = free_offset(standing[None, :, :2] + middle, state)
-    x, y = np.round(middle if offset is None else middle + offset, 6)
+    middle = middle_of_board(polygon, state)
+    offset = free_offset([polygon + middle], state)
+    if offset is None:
+        return None
+    x, y = np.round(middle + offset, 6)
     return float(x), float(y)
 
 
-def free_offset(boxes: Array, state: State) -> Array | None:
+def middle_of_board(polygon: Array, state: State) -> Array:
+    """(2,) where an object is in the middle of the board, free or not; see `free_spot`."""
+    middle = (polygon.min(axis=0) + polygon.max(axis=0)) / 2
+    return np.asarray(np.array(state.document.board.size) / 2 - middle)
+
+
+def free_offset(polygons: Sequence[Array], state: State) -> Array | None:
     """The shortest way by which objects can be shifted to be on the board and beside all that is
     there.
 
     Args:
-        boxes: (N, 2, 2) lower and upper corners of their bounds along x and y [m].
+        polygons: (N, 2) what each covers now [m].
         state: what is there already.
 
     Returns:
@@ -47,12 +58,16 @@ def free_offset(boxes: Array, state: State) -> Array | None:
     ticks = [np.arange(-(s // pitch), s // pitch + 1) * pitch for s in size]
     offsets = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
     offsets = offsets[np.argsort((offsets**2).sum(axis=1), kind="stable")]
-    lower, upper = boxes.min(axis=(0, 1)) + offsets, boxes.max(axis=(0, 1)) + offsets
+    corners = np.concatenate(list(polygons))
+    lower, upper = corners.min(axis=0) + offsets, corners.max(axis=0) + offsets
     offsets = offsets[((lower >= 0.0) & (upper <= size)).all(axis=1)]
-    for name in set(state.instances) - set(lost(state)):
-        other = bounds(state, name)[:, :2]
-        for box in boxes:
-            beyond = box[0] + offsets > other[1] + CLEARANCE
-            before = box[1] + offsets < other[0] - CLEARANCE
-            offsets = offsets[(beyond | before).any(axis=1)]
+    gone = lost(state)
+    for name in state.instances:
+        if name in gone:
+            continue
+        other = shadow(state, name)
+        for polygon in polygons:
+            if len(offsets):
+                way = distances(forbidden(other, polygon), offsets)
+                offsets = offsets[way >= CLEARANCE]
     return offsets[0] if len(offsets) else None

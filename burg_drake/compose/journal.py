@@ -161,7 +161,7 @@ def _append(path: Path, line: bytes) -> None:
         try:
             stream.write(line)
             stream.flush()
-            os.fdatasync(stream.fileno())
+            os.fsync(stream.fileno())
         except OSError:
             with contextlib.suppress(OSError):
                 os.truncate(path, end)

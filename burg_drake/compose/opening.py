@@ -159,8 +159,7 @@ def _recovered(
     )
     storage.record_all(history)
     if not quiet:
-        steps = f"{history.position} step{'' if history.position == 1 else 's'}"
-        notices += (f"recovered what was not saved of {place.stem!r}: {steps}, all can be undone",)
+        notices += (f"recovered what was not saved of {place.stem!r}, with its history",)
     return Opened(history, storage, notices)
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from burg_drake.compose.command import FARTHEST, label_of, require_number
-from burg_drake.compose.footprint import bounds, object_bounds
-from burg_drake.compose.free_spot import free_offset, free_spot
+from burg_drake.compose.footprint import object_shadow, shadow
+from burg_drake.compose.free_spot import free_offset, free_spot, middle_of_board
 from burg_drake.compose.moving import stable_pose_matrix, standing
 from burg_drake.compose.state import (
     State,
@@ -19,7 +19,7 @@ from burg_drake.compose.state import (
 )
 from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
+from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance
 
@@ -34,14 +34,14 @@ class AddObject:
     Attributes:
         object: its name in the library.
         stable_pose: that it stands in.
-        position: x and y of its centre of mass [m]; a free spot near the middle if None.
-        yaw_deg: by which it is turned.
+        position: x and y of its centre of mass [m]; a free place near the middle if None.
+        yaw_deg: by which it is turned; not at all if None, unless there is room only if it is.
     """
 
     object: str
     stable_pose: int = 0
     position: tuple[float, float] | None = None
-    yaw_deg: float = 0.0
+    yaw_deg: float | None = None
 
     @property
     def label(self) -> str:
@@ -49,11 +49,11 @@ class AddObject:
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         X_SO = stable_pose_matrix(state, self.object, self.stable_pose)
-        yaw = np.deg2rad(require_number(self.yaw_deg, "yaw", -360.0, 360.0, "degrees"))
+        yaw_deg = require_number(self.yaw_deg or 0.0, "yaw", -360.0, 360.0, "degrees")
         position = self.position
         if position is None:
-            standing_there = object_bounds(state.library, self.object, standing(X_SO, (0, 0), yaw))
-            position = free_spot(standing_there, state)
+            yaw_deg, position = self._free_place(state, X_SO, yaw_deg)
+        yaw = np.deg2rad(yaw_deg)
         x, y = (
             require_number(value, f"{axis} of the new {self.object!r}", -FARTHEST, FARTHEST, "m")
             for axis, value in zip("xy", position, strict=True)
@@ -65,6 +65,20 @@ class AddObject:
             X_SO=Pose.readable(standing(X_SO, (x, y), yaw)),
         )
         return state.added([instance], fixed=_without_mass(state, [instance]))
+
+    def _free_place(
+        self, state: State, X_SO: Array, yaw_deg: float
+    ) -> tuple[float, tuple[float, float]]:
+        """Yaw and position where there is room; the middle of the board if there is none."""
+        for turn in (0.0, 90.0, 45.0, 135.0) if self.yaw_deg is None else (0.0,):
+            X_turned = standing(X_SO, (0.0, 0.0), np.deg2rad(yaw_deg + turn))
+            spot = free_spot(object_shadow(state.library, self.object, X_turned), state)
+            if spot is not None:
+                return yaw_deg + turn, spot
+        X_turned = standing(X_SO, (0.0, 0.0), np.deg2rad(yaw_deg))
+        polygon = object_shadow(state.library, self.object, X_turned)
+        x, y = np.round(middle_of_board(polygon, state), 6)
+        return yaw_deg, (float(x), float(y))
 
 
 @dataclass(frozen=True)
@@ -189,8 +203,8 @@ def _without_mass(state: State, instances: list[Instance]) -> set[str]:
 
 def _beside(state: State, names: tuple[str, ...]) -> tuple[float, float]:
     """Offset of copies: the shortest to where they are free, or to the right if that is nowhere."""
-    boxes = np.array([bounds(state, name)[:, :2] for name in names])
-    offset = free_offset(boxes, state)
+    polygons = [shadow(state, name) for name in names]
+    offset = free_offset(polygons, state)
     if offset is None:
-        return float(np.ptp(boxes[:, :, 0])) + GAP, 0.0
+        return float(np.ptp(np.concatenate(polygons)[:, 0])) + GAP, 0.0
     return float(offset[0]), float(offset[1])

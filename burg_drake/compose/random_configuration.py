@@ -15,6 +15,7 @@ from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.frames import Array, inverse, transform_points
 from burg_drake.scene.arrange import arrange, choose
 from burg_drake.scene.arrangement import Layout, PoseChoice, Wanted
+from burg_drake.scene.polygons import area
 from burg_drake.station.station import Station
 
 MOST = 60
@@ -46,7 +47,7 @@ class RandomConfiguration:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._wanted(state, surroundings, rng)
         shapes, board = surroundings.checker.shapes(state), state.document.board
-        covered = sum(min(map(_area, shapes[one.object].shadows)) for one in wanted)
+        covered = sum(min(map(area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(
                 f"{len(wanted)} objects cover more than the board; take fewer, or a larger board"
@@ -91,12 +92,6 @@ def _obstacles(state: State, surroundings: Surroundings) -> list[Array]:
     ]
     bodies += station_boxes(surroundings.station)
     return [p_SV for p_SV in bodies if p_SV[:, 2].max() > 0.0]
-
-
-def _area(polygon: Array) -> float:
-    """Of a convex polygon (N, 2) [m^2], by the shoelace formula."""
-    x, y = polygon.T
-    return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
 def station_boxes(station: Station) -> list[Array]:

@@ -6,12 +6,17 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.frames import Array
 from burg_drake.core.schema import Pose
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
+
+SAME = 1e-9
+"""Poses whose numbers differ by less are one; an instance then keeps all of its digits."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +98,9 @@ class State:
 
         def place(instance: Instance) -> Instance:
             X = X_SO.get(name_of(instance))
-            if X is None:
+            if X is None or np.abs(X - instance.X_SO.matrix()).max() < SAME:
                 return instance
-            X_new = Pose.readable(X)
-            return instance if X_new == instance.X_SO else replace(instance, X_SO=X_new)
+            return replace(instance, X_SO=Pose.readable(X))
 
         return self.changed(place)
 

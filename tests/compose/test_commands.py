@@ -58,10 +58,10 @@ def three(session: ComposeSession) -> ComposeSession:
 
 def test_objects_are_added_where_they_are_free(session: ComposeSession) -> None:
     session.do(SetBoard(Board(size=board_size("A2"))))
-    for object in ("can", "box", "can", "bottle", "bowl"):
+    for object in ("can", "box", "can", "bottle", "bowl", "screwdriver"):
         view = session.do(AddObject(object))
         assert set(view.status.values()) == {"ok"}, object
-    assert list(view.instances) == ["can", "box", "can_2", "bottle", "bowl"]
+    assert list(view.instances) == [*("can", "box", "can_2", "bottle", "bowl", "screwdriver")]
     np.testing.assert_allclose(center_of_mass(view, "can")[:2], (0.297, 0.21), atol=0.03)
 
 

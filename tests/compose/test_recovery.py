@@ -40,9 +40,7 @@ def test_a_killed_session_goes_on_where_it_was(station: Station, tmp_path: Path)
         process.wait()
     with ComposeSession.open("household", station, folder=tmp_path) as session:
         view = session.view
-        assert view.notices == (
-            "recovered what was not saved of 'new_scene': 3 steps, all can be undone",
-        )
+        assert view.notices == ("recovered what was not saved of 'new_scene', with its history",)
         assert list(view.instances) == ["bowl", "bowl_2", "marble"]
         assert (view.undo_label, view.redo_label) == ("add marble", "delete bowl")
         assert list(session.redo().instances) == ["bowl_2", "marble"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from burg_drake.compose import AddObject, ComposeSession, Delete, Move
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
+from burg_drake.station.station import Station
 
 
 def test_steps_are_undone_and_redone(session: ComposeSession) -> None:
@@ -63,3 +66,22 @@ def test_a_file_that_was_changed_is_not_overwritten(session: ComposeSession) -> 
     with pytest.raises(UnsavedChanges):
         session.load()
     assert session.load(discard=True).status == {"mug": "ok"}
+
+
+def test_what_is_not_moved_keeps_its_digits(station: Station, tmp_path: Path) -> None:
+    path = tmp_path / "exact.yaml"
+    path.write_text(
+        "version: 1\nname: exact\nlibrary: household\ninstances:\n"
+        "  - {object: can, X_SO: {translation: [0.12345678901, 0.2, 0.06],"
+        " quaternion_wxyz: [0.6, 0.0, 0.0, 0.8]}}\n"
+        "  - {object: marble, X_SO: {translation: [0.4, 0.2, 0.0]}}\n"
+    )
+    with ComposeSession.open(path, station) as session:
+        drag = session.drag(["can", "marble"])
+        drag.move_by((0.01, 0.0, 0.0))
+        drag.move_by((0.0, 0.0, 0.0))
+        assert not drag.end().changed
+        session.do(Delete(("marble",)))
+        session.save()
+    assert "[0.12345678901, 0.2, 0.06]" in path.read_text()
+    assert "[0.6, 0.0, 0.0, 0.8]" in path.read_text()
