@@ -162,7 +162,7 @@ def reach(path: Path) -> None:
 def grasps(path: Path) -> None:
     """How many grasps are clear and reachable, and what is in the way."""
     with opened("tabletop_six", "panda_tabletop") as open:
-        place(open, {"bottle": (-0.08, 0.04, 0.0), "box": (0.02, 0.10, 20.0)})
+        place(open, {"bottle": (-0.08, 0.04, 0.0), "box": (0.02, 0.05, 20.0)})
         open.session.select([])
         open.show("Check")
         open.check("Count grasps")
@@ -191,9 +191,9 @@ def backdrop(path: Path) -> None:
     photo = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels)).save(photo, format="PNG")
     with opened("household", "panda_tabletop") as open:
+        open.session.do(SetBoard(scene.board))
         for name in ("bowl", "banana", "screwdriver"):
             open.session.do(AddObject(name))
-        open.session.do(Move({n: scene.X_SO(n) for n in ("bowl", "banana", "screwdriver")}))
         open.session.restrict_movement(False)
         open.session.do(Move({n: scene.X_SO(n) for n in ("bowl", "banana", "screwdriver")}))
         open.session.restrict_movement(True)

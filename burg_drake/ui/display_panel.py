@@ -54,7 +54,7 @@ class DisplayPanel:
     @property
     def coloring(self) -> Coloring:
         """Which colours objects have."""
-        return COLORINGS[self._colors.value]
+        return COLORINGS.get(self._colors.value, "objects")
 
     @property
     def markers(self) -> bool:

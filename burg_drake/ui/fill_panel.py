@@ -48,8 +48,8 @@ class FillPanel:
         self._clear.disabled = not view.instances
 
     def _shuffle(self) -> None:
-        seed = int(self._seed.value)
+        seed = self._seed.value
         self._actions.session.do(
-            RandomConfiguration(seed, int(self._count.value) or None, self._layout.value)
+            RandomConfiguration(seed, self._count.value or None, self._layout.value)
         )
         self._seed.value = min(seed + 1, LARGEST_SEED)

@@ -198,8 +198,8 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
 
     before = setup.view.document
     port = setup.door.port
-    setup.door.close()
     setup.page.close()
+    setup.door.close()
     setup.session.close()  # nothing was saved
     with (
         ComposeSession.open("household", setup.session.station, folder=tmp_path) as session,
