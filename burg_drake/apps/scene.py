@@ -1,4 +1,5 @@
-"""`burg-drake scene`: show, validate and settle; `scene_export`, `scene_import` have the rest."""
+"""`burg-drake scene`: show, validate and settle; `scene_sample`, `scene_export` and `scene_import`
+have the rest."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps import scene_export, scene_import
+from burg_drake.apps import scene_export, scene_import, scene_sample
 from burg_drake.apps.arguments import (
     ENGINE_NAMES,
     add_group,
@@ -34,7 +35,7 @@ SETTLING_ENGINE = "screening"
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "scene", "show, validate, settle, export and import scenes")
+    group = add_group(verbs, "scene", "show, validate, settle, sample, export and import scenes")
     show = add_verb(
         group,
         "show",
@@ -58,6 +59,7 @@ def add_to(verbs: Any) -> None:
     add_scene(validate)
     add_station(validate)
     _add_settle(group)
+    scene_sample.add_to(group)
     scene_export.add_to(group)
     scene_import.add_to(group)
 
@@ -192,7 +194,7 @@ def _write_settled(settled: SettledScene, output: str) -> None:
 
     path, scene = Path(output), settled.scene
     library = library_reference(scene.document.library, scene.library, path.parent)
-    save_scene(dataclasses.replace(scene.document, library=library), path)
+    save_scene(dataclasses.replace(scene.document, library=library, origin=None), path)
 
 
 def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:

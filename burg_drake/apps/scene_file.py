@@ -10,6 +10,7 @@ from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectLibrary
+    from burg_drake.station.station import Station
 
 
 def require_another_file(scene: Path, output: str) -> None:
@@ -29,3 +30,11 @@ def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
     from burg_drake.core.resources import builtin_names
 
     return given if given in builtin_names("models") else portable_reference(library.root, folder)
+
+
+def station_reference(given: str, station: Station, folder: Path) -> str:
+    """The same for a station."""
+    from burg_drake.core.references import portable_reference
+    from burg_drake.core.resources import builtin_names
+
+    return given if given in builtin_names("stations") else portable_reference(station.path, folder)

@@ -12,11 +12,12 @@ from burg_drake.compose.footprint import object_vertices
 from burg_drake.compose.state import State
 from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError, listing
-from burg_drake.core.frames import Array, inverse, transform_points
+from burg_drake.core.frames import Array, transform_points
 from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import Layout, PoseChoice, Wanted
+from burg_drake.scene.arrangement import Wanted
+from burg_drake.scene.layout import Layout, PoseChoice
 from burg_drake.scene.polygons import area
-from burg_drake.station.station import Station
+from burg_drake.station.boxes import boxes_in_scene
 
 MOST = 60
 """Objects of one configuration."""
@@ -30,7 +31,7 @@ class RandomConfiguration:
         seed: the same one gives the same configuration.
         count: so many objects of the library take the place of the free ones; those that are there
             stay, elsewhere, if None.
-        layout: how they stand to one another; see `scene.arrangement.Layout`.
+        layout: how they stand to one another; see `scene.layout.Layout`.
         poses: how stable poses are drawn.
         repeat: an object of the library may come several times.
     """
@@ -60,6 +61,7 @@ class RandomConfiguration:
             layout=self.layout,
             poses=self.poses,
             obstacles=_obstacles(state, surroundings),
+            needs_all=True,
         )
         if found.missing:
             raise InvalidInputError(
@@ -90,15 +92,5 @@ def _obstacles(state: State, surroundings: Surroundings) -> list[Array]:
         transform_points(scene.X_SO(name), object_vertices(state.library, instance.object))
         for name, instance in scene.background.items()
     ]
-    bodies += station_boxes(surroundings.station)
+    bodies += boxes_in_scene(surroundings.station)
     return [p_SV for p_SV in bodies if p_SV[:, 2].max() > 0.0]
-
-
-def station_boxes(station: Station) -> list[Array]:
-    """(8, 3) corners of each of a station's fixed boxes, in the scene frame [m]."""
-    X_SW = inverse(station.document.X_WS.matrix())
-    corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3), axis=-1).reshape(-1, 3)
-    return [
-        np.asarray(transform_points(X_SW @ box.X_WB.matrix(), corners * np.array(box.size)))
-        for box in station.document.background.values()
-    ]

@@ -61,6 +61,10 @@ class SimulationError(BurgError, RuntimeError):
     """Drake could not step or evaluate a diagram that should have been sound."""
 
 
+class WorkerEnded(SimulationError):
+    """A worker process was ended from outside, through no fault of its work."""
+
+
 def quoted(value: object) -> str:
     """A value from outside as a message repeats it: in quotes if it is a text, never long.
 

@@ -1,9 +1,9 @@
 """Lays out objects on a board: at random, apart or together, packed, or hanging above a heap.
 
-Only geometry, without physics. But for what touches, objects are held apart by the convex polygons
-that their hulls cover of the board, which is quick, and on the safe side: nothing overlaps, and
-nothing stands under another one's overhang. What touches is pushed together until convex pieces of
-both are in contact (see `scene.convex_travel`).
+Only geometry, without physics. But for what touches, objects are held apart by what their convex
+pieces cover of the board, which is quick, and on the safe side: nothing overlaps, and nothing
+stands under another one's overhang. What touches is pushed together until pieces of both are in
+contact (see `scene.sweep`).
 """
 
 from __future__ import annotations
@@ -19,12 +19,8 @@ from burg_drake.scene.arrange_close import place_beside
 from burg_drake.scene.arrange_heap import Heap
 from burg_drake.scene.arrange_packed import density, pack
 from burg_drake.scene.arrangement import (
-    LAYOUTS,
-    TRIES,
     Arrangement,
-    Layout,
     Occupied,
-    PoseChoice,
     Standing,
     Wanted,
     draw_pose,
@@ -32,12 +28,15 @@ from burg_drake.scene.arrangement import (
     random_place,
     standing,
 )
+from burg_drake.scene.board import Board
+from burg_drake.scene.layout import LAYOUTS, TRIES, Layout, PoseChoice
 from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes
-from burg_drake.scene.scene import Board
 
 GAPS = {"random": 0.001, "wide": 0.040}
 """Least distance of shadows [m]; a finger of the Panda's hand is 22 mm wide."""
-ORDERS = 4
+PLACES = 20
+"""Random places that are tried for each random yaw."""
+ORDERS = 3
 """Orders in which objects are packed."""
 
 
@@ -100,6 +99,7 @@ def arrange(
     poses: PoseChoice = "probability",
     obstacles: Sequence[Array] = (),
     tries: int = TRIES,
+    needs_all: bool = False,
 ) -> Arrangement:
     """Looks for a place for each object.
 
@@ -116,6 +116,7 @@ def arrange(
         obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as those of
             `scene.arrangement.corners` and boxes of a station.
         tries: places to look at for each object.
+        needs_all: stop at the first object that finds no place.
 
     Raises:
         UnknownNameError: an object is not in the library.
@@ -133,7 +134,7 @@ def arrange(
     if layout == "packed":
         places, used = _packed(chosen, board, obstacles, rng)
     else:
-        places, used = _scattered(chosen, occupied, rng, layout, tries)
+        places, used = _scattered(chosen, occupied, rng, layout, tries, needs_all)
     X_SO = [None if place is None else place.X_SO for place in places]
     return _result(wanted, X_SO, used)
 
@@ -144,32 +145,29 @@ def _scattered(
     rng: np.random.Generator,
     layout: Layout,
     tries: int,
+    needs_all: bool,
 ) -> tuple[list[Standing | None], int]:
     """Places by trial and error, large objects first; and the number of trials."""
     places: list[Standing | None] = [None] * len(chosen)
-    used = 0
+    total = 0
     for i in _large_first(chosen):
         shape, pose = chosen[i]
-        for _ in range(tries):
-            used += 1
+        used = 0
+        while used < tries and places[i] is None:
+            some = min(PLACES, tries - used) if layout in GAPS else 1
+            turned = standing(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
             if layout in GAPS:
-                place = _anywhere(occupied, shape, pose, rng, GAPS[layout])
+                places[i], some = random_place(occupied, turned, rng, GAPS[layout], some)
             else:
-                place = place_beside(occupied, shape, pose, rng, touching=layout == "touching")
-            if place is not None:
-                occupied.add(place)
-                places[i] = place
-                break
-    return places, used
-
-
-def _anywhere(
-    occupied: Occupied, shape: ObjectShape, pose: int, rng: np.random.Generator, least: float
-) -> Standing | None:
-    """One random place on the board; None if it is not free."""
-    turned = standing(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
-    place = random_place(turned, occupied.size, rng)
-    return place if place is not None and occupied.is_free(place, least) else None
+                places[i] = place_beside(occupied, turned, rng, touching=layout == "touching")
+            used += some
+        total += used
+        place = places[i]
+        if place is not None:
+            occupied.add(place)
+        elif needs_all:
+            break
+    return places, total
 
 
 def _packed(
@@ -216,7 +214,7 @@ def _heap(
 
 def _large_first(chosen: Sequence[tuple[ObjectShape, int]]) -> list[int]:
     """Numbers of objects, those that cover most of the board first."""
-    size = [np.prod(np.ptp(shape.shadows[pose], axis=0)) for shape, pose in chosen]
+    size = [np.prod(np.ptp(shape.outline(pose).hull, axis=0)) for shape, pose in chosen]
     return [int(i) for i in np.argsort(-np.array(size), kind="stable")]
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.scene.arrangement import Occupied, Standing, random_place, standing
-from burg_drake.scene.convex_travel import travel
-from burg_drake.scene.object_shapes import ObjectShape
+from burg_drake.scene.arrangement import (
+    Occupied,
+    Standing,
+    random_place,
+    travel,
+)
 from burg_drake.scene.polygons import exit_distance, forbidden
 
 CLOSE = (0.002, 0.010)
@@ -16,31 +19,23 @@ START = 1e-4
 
 
 def place_beside(
-    occupied: Occupied,
-    shape: ObjectShape,
-    pose: int,
-    rng: np.random.Generator,
-    *,
-    touching: bool,
+    occupied: Occupied, turned: Standing, rng: np.random.Generator, *, touching: bool
 ) -> Standing | None:
     """Looks for a place beside one of those that stand there, or anywhere for the first one.
 
-    One try: one of them, a direction from there and a yaw are drawn, each as probable.
+    One try: one of them and a direction from there are drawn, each as probable.
 
     Args:
         occupied: the board and what stands there.
-        shape, pose: the object and the number of its stable pose.
+        turned: the object, turned by a yaw.
         rng: draws.
         touching: push it against them until the pieces of both touch.
 
     Returns:
         None if there is no room, or nothing to be pushed against.
     """
-    turned = standing(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
     if not occupied.standing:
-        anywhere = random_place(turned, occupied.size, rng)
-        free = anywhere is not None and occupied.is_free(anywhere, CLOSE[0])
-        return anywhere if free else None
+        return random_place(occupied, turned, rng, CLOSE[0], 1)[0]
     partner = occupied.standing[rng.integers(len(occupied.standing))]
     angle = rng.uniform(0.0, 2.0 * np.pi)
     direction = np.array([np.cos(angle), np.sin(angle)])
@@ -53,7 +48,7 @@ def place_beside(
         return None
     if touching:
         back = np.array([*-direction, 0.0])
-        pushed = travel(one.pieces(), occupied.bodies(), back, way)
+        pushed = travel(one.pieces(), occupied.pieces(), back, way)
         if pushed == way:
             return None
         one = one.shifted(-pushed * direction)

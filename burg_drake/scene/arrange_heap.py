@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.core.frames import Array, make_pose, rotation_from_quaternion
-from burg_drake.scene.arrangement import Occupied
-from burg_drake.scene.convex_travel import travel
+from burg_drake.scene.arrangement import Occupied, travel
 from burg_drake.scene.object_shapes import ObjectShape
 
 START_GAP = 0.004
@@ -34,7 +33,7 @@ class Heap:
         self._size = occupied.size
         self._below = [*occupied.obstacles]
         for one in occupied.standing:
-            self._below.append(one.shape.coarse.moved(one.X_SO))
+            self._below.append(one.shape.hull.moved(one.X_SO))
         covered = sum(np.pi * np.ptp(s.corners, axis=0).mean() ** 2 / 4.0 for s in shapes)
         self._radius = np.sqrt(covered / np.pi / LAYERS)
 
@@ -59,16 +58,16 @@ class Heap:
             if best is None or X_SO[2, 3] < best[2, 3]:
                 best = X_SO
         if best is not None:
-            self._below.append(shape.coarse.moved(best))
+            self._below.append(shape.hull.moved(best))
         return best
 
     def _let_down(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
         """The pose of an object that is let down on what is below."""
-        top = max((float(body.vertices[:, 2].max()) for body in self._below), default=0.0)
+        top = max((float(body.points[..., 2].max()) for body in self._below), default=0.0)
         start = max(top, 0.0) + START_GAP - lowest
         X_SO = make_pose(R_SO, (*xy, start))
         way = travel(
-            [shape.coarse.moved(X_SO)], self._below, np.array([0.0, 0.0, -1.0]), start + lowest
+            shape.hull.moved(X_SO), self._below, np.array([0.0, 0.0, -1.0]), start + lowest
         )
         X_SO[2, 3] -= max(0.0, way - START_GAP)
         return X_SO

@@ -28,19 +28,18 @@ from burg_drake.scene.polygons import (
 
 APART = 3e-4
 """Between shadows [m], so that rounding of poses lets nothing overlap."""
+MOST_YAWS = 10
+"""Of each object."""
 SIDES = 3
 """Longest sides of a shadow that another one is laid along."""
 
 
-def pack(
-    occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]], most_yaws: int = 16
-) -> list[Standing | None]:
+def pack(occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]]) -> list[Standing | None]:
     """Finds places, one object after the other, and adds them to what stands there.
 
     Args:
         occupied: the board and what stands there.
         objects: with the numbers of their stable poses.
-        most_yaws: of each object.
 
     Returns:
         None for those for which there is no room.
@@ -48,7 +47,7 @@ def pack(
     found: list[Standing | None] = []
     for shape, pose in objects:
         best, best_area = None, np.inf
-        for yaw in _yaws(shape.shadows[pose], occupied.standing)[:most_yaws]:
+        for yaw in _yaws(shape.outline(pose).hull, occupied.standing)[:MOST_YAWS]:
             turned = standing(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
             if place is not None and place_area < best_area - 1e-12:
@@ -94,19 +93,20 @@ def _best_place(occupied: Occupied, turned: Standing) -> tuple[Standing | None, 
     if (low > high).any():
         return None, np.inf
     there = [one.shadow for one in occupied.standing]
-    if not there:
-        middle = turned.shifted((low + high) / 2.0)
-        whole = float(support_area(reach(middle.shadow)))
-        return (middle, whole) if occupied.is_free(middle, APART) else (None, np.inf)
-    points = _touching(turned.shadow, there, low, high)
+    coarse = [one.outline.coarse for one in occupied.standing]
+    points = (
+        _touching(turned.outline.coarse, coarse, low, high) if there else ((low + high) / 2.0)[None]
+    )
     points = points[((points >= low) & (points <= high)).all(axis=1)]
-    there_reach = np.max([reach(shadow) for shadow in there], axis=0)
-    areas = support_area(np.maximum(there_reach, reach(turned.shadow) + points @ DIRECTIONS.T))
-    for i in np.argsort(areas, kind="stable"):
-        place = turned.shifted(points[i])
-        if occupied.is_free(place, APART):
-            return place, float(areas[i])
-    return None, np.inf
+    points = points[occupied.are_free(turned, points, APART)]
+    if not len(points):
+        return None, np.inf
+    reaches = reach(turned.shadow) + points @ DIRECTIONS.T
+    for shadow in there:
+        reaches = np.maximum(reaches, reach(shadow))
+    areas = support_area(reaches)
+    best = int(areas.argmin())
+    return turned.shifted(points[best]), float(areas[best])
 
 
 def _touching(shadow: Array, there: Sequence[Array], low: Array, high: Array) -> Array:

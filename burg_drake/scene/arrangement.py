@@ -4,29 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, rot_z, transform_points
 from burg_drake.core.schema import Pose
-from burg_drake.scene.convex_travel import ConvexBody
-from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes
-from burg_drake.scene.polygons import convex_polygon, gap, turned
-from burg_drake.scene.scene import Board, Instance
-
-Layout = Literal["random", "wide", "close", "touching", "packed", "heap"]
-"""`random`: anywhere on the board; `wide`: with room for an open hand's fingers in between; `close`
-and `touching`: beside one another, a few millimetres apart or in contact; `packed`: as dense as it
-gets; `heap`: in any orientation above a spot, to be dropped."""
-LAYOUTS: tuple[Layout, ...] = get_args(Layout)
-
-PoseChoice = Literal["probability", "uniform"]
-"""Which of its stable poses an object gets: by their probabilities, or each as often."""
-
-TRIES = 100
-"""Random places that are tried for an object."""
+from burg_drake.scene.board import Board
+from burg_drake.scene.layout import PoseChoice
+from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes, Outline
+from burg_drake.scene.polygons import convex_polygon, distances, forbidden
+from burg_drake.scene.scene import Instance
+from burg_drake.scene.sweep import ConvexShapes, ways_to_contact
 
 HEADROOM = 0.005
 """Between an object and what hangs above it [m]."""
@@ -69,31 +59,33 @@ class Standing:
     Attributes:
         shape: of the object.
         X_SO: (4, 4) pose in the scene frame.
-        shadow: (N, 2) polygon that it covers [m].
-        height: of its highest point above the board [m].
+        outline: what it covers of the board.
     """
 
     shape: ObjectShape
     X_SO: Array
-    shadow: Array
-    height: float
+    outline: Outline
+
+    @property
+    def shadow(self) -> Array:
+        """The convex hull (N, 2) of what it covers [m]."""
+        return self.outline.hull
 
     def shifted(self, offset: Array) -> Standing:
         """The same one elsewhere: `offset` is (2,) [m]."""
         X_SO = make_pose(None, (*offset, 0.0)) @ self.X_SO
-        return Standing(self.shape, X_SO, self.shadow + offset, self.height)
+        return Standing(self.shape, X_SO, self.outline.placed(offset))
 
-    def pieces(self) -> list[ConvexBody]:
+    def pieces(self) -> ConvexShapes:
         """What of it touches others, in the scene frame."""
-        return [piece.moved(self.X_SO) for piece in self.shape.pieces]
+        return self.shape.pieces.moved(self.X_SO)
 
 
 def standing(shape: ObjectShape, pose: int, yaw: float) -> Standing:
     """An object in its k-th stable pose, turned by a yaw [rad] about its centre of mass, which is
     above the board's corner."""
-    entry = shape.library.entry(shape.name)
-    X_SO = make_pose(rot_z(yaw)) @ entry.X_SO(pose)
-    return Standing(shape, X_SO, turned(shape.shadows[pose], yaw), shape.heights[pose])
+    X_SO = make_pose(rot_z(yaw)) @ shape.library.entry(shape.name).X_SO(pose)
+    return Standing(shape, X_SO, shape.outline(pose).placed(np.zeros(2), yaw))
 
 
 class Occupied:
@@ -105,37 +97,51 @@ class Occupied:
         obstacles: points (N, 3) of convex bodies that are there already, in S [m].
         """
         self.size = np.array(board.size)
-        self.obstacles = [ConvexBody.from_points(points) for points in obstacles]
+        self.obstacles = [ConvexShapes.of([p], [np.zeros((3, 3))]) for p in obstacles]
         self.standing: list[Standing] = []
-        self._shadows = [
-            (convex_polygon(body.vertices[:, :2]), *np.sort(body.vertices[:, 2])[[0, -1]])
-            for body in self.obstacles
-        ]
+        self._there = []
+        for p in obstacles:
+            hull = convex_polygon(p[:, :2])
+            self._there.append((Outline(hull, hull, float(p[:, 2].max())), float(p[:, 2].min())))
 
     def add(self, one: Standing) -> None:
         """Something stands there from now on."""
         self.standing.append(one)
-        self._shadows.append((one.shadow, 0.0, one.height))
+        self._there.append((one.outline, 0.0))
 
     def in_bounds(self, one: Standing) -> bool:
         """Whether nothing of it is beyond the board's edge."""
         return bool((one.shadow >= 0.0).all() and (one.shadow <= self.size).all())
 
-    def is_free(self, one: Standing, least: float) -> bool:
-        """Whether it is apart from all that stands there: shadows at least that far [m]."""
-        lower, upper = one.shadow.min(axis=0) - least, one.shadow.max(axis=0) + least
-        for shadow, bottom, top in self._shadows:
-            if bottom > one.height + HEADROOM or top < 0.0:
-                continue
-            if (shadow.max(axis=0) < lower).any() or (shadow.min(axis=0) > upper).any():
-                continue
-            if gap(shadow, one.shadow) < least:
-                return False
-        return True
+    def are_free(self, one: Standing, offsets: Array, least: float) -> NDArray[np.bool_]:
+        """Whether what it covers, moved by offsets (N, 2) [m], is at least that far [m] from all
+        that is there, (N,); what hangs above it and what is below the board is not in the way."""
+        free = np.ones(len(offsets), dtype=bool)
+        for there, bottom in self._there:
+            if bottom <= one.outline.height + HEADROOM and there.height >= 0.0 and free.any():
+                around = forbidden(there.hull, one.outline.hull)
+                free[free] = distances(around, offsets[free]) >= least
+        return free
 
-    def bodies(self) -> list[ConvexBody]:
-        """All that is there, as convex bodies in S."""
-        return [*self.obstacles, *(body for one in self.standing for body in one.pieces())]
+    def is_free(self, one: Standing, least: float) -> bool:
+        """Whether it is at least that far [m] from all that is there."""
+        return bool(self.are_free(one, np.zeros((1, 2)), least)[0])
+
+    def pieces(self) -> list[ConvexShapes]:
+        """What of all that is there touches others, in the scene frame."""
+        return [*self.obstacles, *(one.pieces() for one in self.standing)]
+
+
+def travel(
+    moving: ConvexShapes, still: Sequence[ConvexShapes], direction: Array, limit: float
+) -> float:
+    """How far shapes can be moved together along a unit vector (3,), at most `limit`, until they
+    touch others [m]."""
+    for others in still:
+        pairs = np.indices((len(moving), len(others))).reshape(2, -1)
+        ways = ways_to_contact(moving, others, (pairs[0], pairs[1]), direction, limit)
+        limit = min(limit, float(ways.min()))
+    return limit
 
 
 def draw_pose(
@@ -158,12 +164,28 @@ def draw_pose(
     return int(rng.choice(len(share), p=share / share.sum()))
 
 
-def random_place(one: Standing, size: Array, rng: np.random.Generator) -> Standing | None:
-    """The same one anywhere on a board (2,) [m], evenly distributed; None if it is too large."""
-    low, high = -one.shadow.min(axis=0), size - one.shadow.max(axis=0)
+def random_place(
+    occupied: Occupied, one: Standing, rng: np.random.Generator, least: float, tries: int
+) -> tuple[Standing | None, int]:
+    """Draws places all over the board, evenly distributed, until one is free.
+
+    Args:
+        occupied: the board and what stands there.
+        one: the object.
+        rng: draws.
+        least: that it has to be away from others [m].
+        tries: places to look at.
+
+    Returns:
+        The object there, or None; and the number of places that were looked at.
+    """
+    low, high = -one.shadow.min(axis=0), occupied.size - one.shadow.max(axis=0)
     if (low > high).any():
-        return None
-    return one.shifted(rng.uniform(low, high))
+        return None, tries
+    offsets = rng.uniform(low, high, (tries, 2))
+    free = occupied.are_free(one, offsets, least)
+    first = int(free.argmax())
+    return (one.shifted(offsets[first]), first + 1) if free[first] else (None, tries)
 
 
 def instance(wanted: Wanted, X_SO: Array) -> Instance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,17 +10,38 @@ import numpy as np
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, transform_points
-from burg_drake.objects.hulls import convex_hull, reduced_hull
+from burg_drake.objects.entry import Primitive
+from burg_drake.objects.hulls import convex_hull
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.objects.primitive import primitive_mesh
-from burg_drake.scene.convex_travel import ConvexBody
-from burg_drake.scene.polygons import convex_polygon, without_short_sides
+from burg_drake.scene.polygons import convex_polygon, turned, without_short_sides
+from burg_drake.scene.sweep import ConvexShapes
 from burg_drake.scene.validate import read_vertices
 
 ROUNDED = 2e-4
-"""How far shadows, which have few corners for speed, reach beyond a side of the true ones [m]."""
-COARSE_CORNERS = 64
-"""Of a coarse hull."""
+"""How far outlines, which have few corners for speed, reach beyond a side of the true ones [m]."""
+COARSE = 1.5e-3
+"""The same of coarse outlines [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What an object covers of the plane that it rests on, its centre of mass above the origin.
+
+    Attributes:
+        hull: polygon (N, 2) of its convex hull [m].
+        coarse: polygon (M, 2) around it with fewer corners [m].
+        height: of its highest point [m].
+    """
+
+    hull: Array
+    coarse: Array
+    height: float
+
+    def placed(self, offset: Array, yaw: float = 0.0) -> Outline:
+        """The same, turned by a yaw [rad] and then moved by an offset (2,) [m]."""
+        hull, coarse = (turned(polygon, yaw) + offset for polygon in (self.hull, self.coarse))
+        return Outline(hull, coarse, self.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,36 +59,40 @@ class ObjectShape:
     corners: Array
 
     @cached_property
+    def _known(self) -> dict[int, Outline]:
+        return {}
+
+    def outline(self, pose: int) -> Outline:
+        """What it covers in a stable pose."""
+        if pose not in self._known:
+            self._known[pose] = self._outline(self.library.entry(self.name).X_SO(pose))
+        return self._known[pose]
+
+    def _outline(self, X_SO: Array) -> Outline:
+        corners = transform_points(X_SO, self.corners)
+        hull = without_short_sides(convex_polygon(corners[:, :2]), ROUNDED)
+        coarse = without_short_sides(hull, COARSE)
+        return Outline(hull, coarse, float(corners[:, 2].max()))
+
+    @property
     def shadows(self) -> tuple[Array, ...]:
-        """Polygons (M, 2), one a stable pose: what it covers of the plane that it rests on, the
-        centre of mass above the origin [m]."""
-        poses = self.library.entry(self.name).stable_poses
-        return tuple(
-            without_short_sides(
-                convex_polygon(transform_points(pose.X_SO.matrix(), self.corners)[:, :2]), ROUNDED
-            )
-            for pose in poses
-        )
+        """The hulls (N, 2) of what it covers, one a stable pose [m]."""
+        count = len(self.library.entry(self.name).stable_poses)
+        return tuple(self.outline(pose).hull for pose in range(count))
 
     @cached_property
-    def heights(self) -> tuple[float, ...]:
-        """How high it is in each stable pose [m]."""
-        poses = self.library.entry(self.name).stable_poses
-        return tuple(
-            float(transform_points(pose.X_SO.matrix(), self.corners)[:, 2].max()) for pose in poses
-        )
+    def pieces(self) -> ConvexShapes:
+        """What of it touches others."""
+        entry = self.library.entry(self.name)
+        if entry.contact.primitive is not None:
+            return _exact(entry.contact.primitive)
+        points = _contact_points(self.library, self.name)
+        return ConvexShapes.of(points, [np.zeros((3, 3))] * len(points))
 
     @cached_property
-    def pieces(self) -> tuple[ConvexBody, ...]:
-        """What of it touches others, as convex pieces."""
-        return tuple(map(ConvexBody.from_points, _contact_points(self.library, self.name)))
-
-    @cached_property
-    def coarse(self) -> ConvexBody:
-        """Its hull with few corners, which lies inside of the hull."""
-        return ConvexBody.from_points(
-            np.asarray(reduced_hull(self.corners, COARSE_CORNERS).vertices)
-        )
+    def hull(self) -> ConvexShapes:
+        """Its convex hull."""
+        return ConvexShapes.of([self.corners], [np.zeros((3, 3))])
 
 
 class ObjectShapes:
@@ -105,12 +131,24 @@ def _read(library: ObjectLibrary, name: str) -> ObjectShape:
 def _contact_points(library: ObjectLibrary, name: str) -> list[Array]:
     """Points (N, 3) of each convex piece that touches others, or of the whole surface."""
     entry = library.entry(name)
-    primitive = entry.contact.primitive
-    if primitive is not None and primitive.shape != "sphere":
-        return [np.asarray(primitive_mesh(primitive).vertices)]
+    if entry.contact.primitive is not None:
+        return [np.asarray(primitive_mesh(entry.contact.primitive).vertices)]
     return [_vertices(library, piece) for piece in entry.pieces] or [
         _vertices(library, entry.surface or entry.mesh)
     ]
+
+
+def _exact(primitive: Primitive) -> ConvexShapes:
+    """A primitive, with its round surface."""
+    size, spread = primitive.size, np.zeros((3, 3))
+    if primitive.shape == "box":
+        points = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+    elif primitive.shape == "cylinder":
+        points = np.array([(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]) * size[1]
+        spread = np.diag([size[0], size[0], 0.0])
+    else:
+        points, spread = np.zeros((1, 3)), np.eye(3) * size[0]
+    return ConvexShapes.of([points], [spread]).moved(primitive.X_OP.matrix())
 
 
 def _vertices(library: ObjectLibrary, file: str) -> Array:

@@ -95,16 +95,6 @@ def without_short_sides(polygon: Array, most: float) -> Array:
     return polygon
 
 
-def gap(one: Array, other: Array) -> float:
-    """Distance of two polygons [m]; below 0 where they overlap."""
-    side, beside = _sides(one, other)
-    back, beyond = _sides(other, one)
-    apart = max(side.min(axis=0).max(), back.min(axis=0).max())
-    if apart <= 0.0:
-        return float(apart)
-    return float(np.sqrt(min((side**2 + beside**2).min(), (back**2 + beyond**2).min())))
-
-
 def distances(polygon: Array, points: Array) -> Array:
     """Distances (M,) of points (M, 2) from a polygon [m], below 0 inside."""
     side, beside = _sides(polygon, points)

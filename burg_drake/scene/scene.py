@@ -14,10 +14,8 @@ from burg_drake.core.resources import resolve
 from burg_drake.core.schema import Pose, dump_document, load_document, plain_data, save_document
 from burg_drake.objects.entry import ObjectEntry
 from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.markers import MarkerLayout, Markers, marker_layout
-
-LARGEST = 100.0
-"""Side of a board [m]."""
+from burg_drake.scene.board import Board as Board
+from burg_drake.scene.origin import SceneOrigin
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,35 +37,6 @@ class Instance:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Board:
-    """The printed board; the scene frame S has its origin in the board's corner.
-
-    Attributes:
-        size: extents along x and y [m]; A2 landscape by default.
-        markers: ArUco markers printed on it.
-    """
-
-    size: tuple[float, float] = (0.594, 0.420)
-    markers: Markers = Markers()
-
-    def __post_init__(self) -> None:
-        if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
-            raise InvalidInputError(
-                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m;"
-                " A2 is [0.594, 0.42]"
-            )
-
-    @cached_property
-    def layout(self) -> MarkerLayout:
-        """Where its markers lie; see `scene.markers.marker_layout`.
-
-        Raises:
-            InvalidInputError: they do not fit.
-        """
-        return marker_layout(self.size, self.markers)
-
-
-@dataclass(frozen=True, kw_only=True)
 class SceneDocument:
     """Schema of a scene file.
 
@@ -77,6 +46,7 @@ class SceneDocument:
         board: the printed board.
         instances: free objects.
         background: fixed objects.
+        origin: what made it, if it was sampled.
     """
 
     version: int = 1
@@ -86,6 +56,7 @@ class SceneDocument:
     board: Board = Board()
     instances: tuple[Instance, ...] = ()
     background: tuple[Instance, ...] = ()
+    origin: SceneOrigin | None = None
 
     def __post_init__(self) -> None:
         require_name(self.name, "name")
@@ -157,9 +128,13 @@ class Scene:
 
     @cached_property
     def content(self) -> str:
-        """Hash of the placement and of every object in it; file locations do not count."""
+        """Hash of the placement and of every object in it; neither where files are nor the origin
+        counts."""
         objects = {i.object for i in (*self.instances.values(), *self.background.values())}
-        placed = plain_data(replace(self.document, description="")) | {"name": "", "library": ""}
+        placed = plain_data(replace(self.document, description="", origin=None)) | {
+            "name": "",
+            "library": "",
+        }
         return content_hash(
             dump_document(placed), {name: self.library.content[name] for name in objects}
         )

@@ -9,7 +9,7 @@ import viser
 from burg_drake.compose.placing import Clear
 from burg_drake.compose.random_configuration import MOST, RandomConfiguration
 from burg_drake.compose.view import View
-from burg_drake.scene.arrangement import LAYOUTS
+from burg_drake.scene.layout import LAYOUTS
 from burg_drake.ui.buttons import quiet_button
 from burg_drake.ui.page_actions import PageActions
 

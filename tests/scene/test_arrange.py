@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 from burg_drake.core.frames import Array, transform_points
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import LAYOUTS, Arrangement, Layout
+from burg_drake.scene.arrangement import Arrangement
+from burg_drake.scene.layout import LAYOUTS, Layout
 from burg_drake.scene.object_shapes import ObjectShapes
 from burg_drake.scene.scene import Board
 
@@ -60,8 +61,8 @@ def test_nothing_overlaps_or_is_beyond_the_edge(shapes: ObjectShapes, layout: La
     pieces = placed_pieces(shapes.library, arrangement)
     for corners in pieces.values():
         points = np.concatenate(corners)
-        assert points[:, :2].min() > -1e-5
-        assert (points[:, :2].max(axis=0) < np.array(BOARD.size) + 1e-5).all()
+        assert points[:, :2].min() > -1e-4
+        assert (points[:, :2].max(axis=0) < np.array(BOARD.size) + 1e-4).all()
         assert points[:, 2].min() > -1e-3
     for one, other in itertools.combinations(pieces.values(), 2):
         # a hundredth of a millimetre smaller, as what touches overlaps by rounding

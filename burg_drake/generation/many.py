@@ -1,0 +1,155 @@
+"""Samples many scenes in worker processes, into a folder that goes on where it was left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from burg_drake.core.crew import serve, work_through
+from burg_drake.core.errors import InvalidInputError, SimulationError
+from burg_drake.evaluation.judge import one_line
+from burg_drake.generation.folder import Row, SceneFolder
+from burg_drake.generation.sample import (
+    SampledScene,
+    SceneSampler,
+    ingredients_of,
+    require_possible,
+)
+from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.scene.origin import Ingredients
+from burg_drake.scene.recipe import SceneRecipe
+from burg_drake.station.station import Station, load_station
+
+
+@dataclass(frozen=True)
+class Kitchen:
+    """Where a recipe's scenes are made: all that a worker needs to know.
+
+    Attributes:
+        recipe: the recipe.
+        library, station: where they are.
+        contents: hashes of the two, so that nobody goes on with what has changed.
+        folder: that scenes are written to.
+    """
+
+    recipe: SceneRecipe
+    library: Path
+    station: Path
+    contents: tuple[str, str]
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Work:
+    """A scene to sample: where, and its number."""
+
+    kitchen: Kitchen
+    number: int
+
+
+@dataclass(frozen=True)
+class SampledFolder:
+    """What is in a folder after sampling.
+
+    Attributes:
+        rows: of all scenes that were asked for and came to an end, by number.
+        new: numbers of those that were sampled now.
+        failed: one line for each scene that could not be sampled, by number: they are tried again
+            the next time.
+    """
+
+    rows: dict[int, Row]
+    new: tuple[int, ...]
+    failed: dict[int, str]
+
+
+def sample_scenes(
+    recipe: SceneRecipe,
+    library: ObjectLibrary,
+    station: Station,
+    folder: str | Path,
+    count: int,
+    *,
+    workers: int = 1,
+    progress: Callable[[SampledScene], None] | None = None,
+    known: Callable[[int], None] | None = None,
+) -> SampledFolder:
+    """Samples scenes 0 to `count` - 1 of a recipe, but for those that the folder has.
+
+    Args:
+        recipe: how scenes are drawn; what it refers to is relative to the folder.
+        library, station: those of the recipe.
+        folder: where to write.
+        count: number of scenes.
+        workers: number of processes; with one this process does it.
+        progress: called after each scene.
+        known: called at the beginning with the number of scenes that the folder has.
+
+    Raises:
+        InvalidInputError, UnknownNameError: see `SceneFolder` and `require_possible`.
+    """
+    require_possible(recipe, library, station)
+    ingredients = ingredients_of(recipe, library, station)
+    with SceneFolder(folder, ingredients) as opened:
+        kitchen = _kitchen(ingredients, library, station, opened.path)
+        todo = [Work(kitchen, number) for number in range(count) if number not in opened.rows]
+        if known is not None:
+            known(count - len(todo))
+        new: list[int] = []
+        failed: dict[int, str] = {}
+        try:
+            for work, outcome in work_through(todo, workers, __name__, attempt):
+                if isinstance(outcome, BaseException):
+                    failed[work.number] = one_line(outcome)
+                    continue
+                opened.add(outcome)
+                new.append(work.number)
+                if progress is not None:
+                    progress(outcome)
+        finally:
+            opened.sort()
+        rows = {number: row for number, row in sorted(opened.rows.items()) if number < count}
+    return SampledFolder(rows, tuple(sorted(new)), failed)
+
+
+def attempt(work: Work) -> SampledScene | BaseException:
+    """Samples one scene; what cannot be simulated is one failure."""
+    try:
+        return _sampler(work.kitchen).sample(work.number, work.kitchen.folder)
+    except Exception as error:
+        return error
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        return SimulationError(f"Drake gave up: {error}")
+
+
+def main(handle: int) -> None:
+    """Runs a worker; `handle` is the file descriptor of its end of the pipe."""
+    serve(handle, attempt)
+
+
+def _kitchen(
+    ingredients: Ingredients, library: ObjectLibrary, station: Station, folder: Path
+) -> Kitchen:
+    contents = (ingredients.library_content, ingredients.station_content)
+    return Kitchen(ingredients.recipe, library.root, station.path, contents, folder)
+
+
+@lru_cache(maxsize=1)
+def _sampler(kitchen: Kitchen) -> SceneSampler:
+    """The sampler that a process keeps from scene to scene.
+
+    Raises:
+        InvalidInputError: library or station are not any more what they were.
+    """
+    library, station = load_library(kitchen.library), load_station(kitchen.station)
+    sampler = SceneSampler(kitchen.recipe, library, station)
+    there = sampler.ingredients
+    for what, found, path, content in (
+        ("library", there.library_content, library.root, kitchen.contents[0]),
+        ("station", there.station_content, station.path, kitchen.contents[1]),
+    ):
+        if found != content:
+            raise InvalidInputError(f"the {what} {path} was changed meanwhile; sample again")
+    return sampler

@@ -1,0 +1,150 @@
+"""Single scenes: what a recipe asks for, and what becomes of the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.schema import Pose
+from burg_drake.generation import rules
+from burg_drake.generation.again import sample_again
+from burg_drake.generation.sample import SceneSampler, sample_scene
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.board import Board
+from burg_drake.scene.recipe import SceneRecipe
+from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.station.check import check_scene
+from burg_drake.station.station import Station, load_station
+
+A3 = Board(size=(0.42, 0.297))
+SMALL = ("can", "marble", "mug")
+PLACED = SceneRecipe(library="household", count=3, only=SMALL, board=A3, settle=False)
+
+
+def test_a_heap_comes_to_rest_where_it_is_sound(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    recipe = replace(PLACED, layout="heap", settle=True, count=2, only=("box", "marble"))
+    sampled = sample_scene(recipe, household, tabletop)
+    assert sampled.accepted and sampled.placed == 2 and not sampled.missing
+    assert not [i for i in check_scene(sampled.scene, tabletop) if i.is_error]
+
+
+def test_another_number_or_seed_is_another_scene(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    sampler = SceneSampler(PLACED, household, tabletop)
+    other = SceneSampler(replace(PLACED, seed=1), household, tabletop)
+    documents = [s.sample(n).scene.document for s in (sampler, other) for n in (0, 1)]
+    for i, one in enumerate(documents):
+        assert all(one.instances != other.instances for other in documents[i + 1 :])
+    assert sampler.sample(1).scene.document == documents[1]
+
+
+def test_the_origin_is_no_part_of_the_content(household: ObjectLibrary, tabletop: Station) -> None:
+    scene = sample_scene(PLACED, household, tabletop).scene
+    bare = Scene(replace(scene.document, origin=None), household, scene.path)
+    assert scene.document.origin is not None
+    assert bare.content == scene.content
+
+
+def test_a_scene_is_made_again(household: ObjectLibrary, tabletop: Station) -> None:
+    scene = sample_scene(PLACED, household, tabletop, number=4).scene
+    again = sample_again(scene)
+    assert again.same and again.scene is not None and again.scene.document == scene.document
+    moved = replace(scene.document, instances=scene.document.instances[::-1])
+    again = sample_again(Scene(moved, household, scene.path))
+    assert not again.same
+    assert again.differences == ("the file was changed since it was sampled",)
+
+
+def test_what_was_made_with_other_things_is_refused(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    scene = sample_scene(PLACED, household, tabletop).scene
+    origin = scene.document.origin
+    assert origin is not None
+    old = replace(origin, library_content="0" * 12, versions=origin.versions | {"drake": "1.0"})
+    other = Scene(replace(scene.document, origin=old), household, scene.path)
+    with pytest.raises(InvalidInputError) as caught:
+        sample_again(other)
+    assert str(caught.value) == (
+        "scene_0000.yaml was made with other things (the library has content 000000000000 there,"
+        f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']} here), and"
+        " may come out another way; --force tries"
+    )
+    assert sample_again(other, force=True).scene is not None
+    with pytest.raises(InvalidInputError, match="has no `origin`: it was not sampled"):
+        sample_again(Scene(replace(scene.document, origin=None), household, scene.path))
+
+
+def test_too_small_a_board(household: ObjectLibrary, tabletop: Station) -> None:
+    small = replace(PLACED, board=Board(size=(0.15, 0.12)), only=("can", "mug", "box"), attempts=4)
+    sampled = sample_scene(small, household, tabletop)
+    assert not sampled.accepted
+    assert sampled.refused == {"an object found no place": 4}
+    assert sampled.scene.document.origin is None
+    fewer = sample_scene(replace(small, fewer=True), household, tabletop)
+    assert fewer.accepted and fewer.missing
+    assert fewer.placed == 3 - len(fewer.missing)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"only": ("can", "cup")},
+            "object 'cup' is not in library {root}, or has no mass or no stable pose; known:"
+            " airplane, banana, bottle, bowl, box, can, marble, mug, scissors, screwdriver",
+        ),
+        (
+            {"count": 4},
+            "4 different objects are asked for, and there are 3 to choose from; ask for fewer, or"
+            " let objects repeat",
+        ),
+        (
+            {"visible_from": "boards"},
+            "station 'panda_tabletop' has no camera 'boards'; did you mean 'board'? Known: board,"
+            " overview",
+        ),
+    ],
+)
+def test_impossible_recipes(
+    household: ObjectLibrary, tabletop: Station, changes: dict[str, object], message: str
+) -> None:
+    recipe = replace(PLACED, **changes)  # type: ignore[arg-type]
+    with pytest.raises((InvalidInputError, UnknownNameError)) as caught:
+        sample_scene(recipe, household, tabletop)
+    assert str(caught.value) == message.format(root=household.root)
+
+
+def test_rules(household: ObjectLibrary, tabletop: Station) -> None:
+    """A can alone, the same between four taller boxes, and one that is far beside the board."""
+
+    def scene(*instances: tuple[str, str, tuple[float, float, float], float]) -> Scene:
+        placed = tuple(
+            Instance(name=name, object=what, X_SO=Pose(p, rpy_deg=(0.0, 0.0, yaw)))
+            for name, what, p, yaw in instances
+        )
+        document = SceneDocument(name="rules", library="household", instances=placed)
+        return Scene(document, household, Path("rules.yaml"))
+
+    asked = replace(PLACED, visible_from="overview", clear_grasps=1)
+    can = ("can", "can", (0.3, 0.2, 0.0), 0.0)
+    boxes = [
+        (f"box_{i}", "box", (0.3 + x, 0.2 + y, 0.0), yaw)
+        for i, (x, y, yaw) in enumerate(
+            [(0.07, 0.0, 0.0), (-0.07, 0.0, 0.0), (0.0, 0.07, 90.0), (0.0, -0.07, 90.0)]
+        )
+    ]
+    assert rules.broken_rule(scene(can), tabletop, asked) == ""
+    blocked = replace(PLACED, clear_grasps=1)
+    assert rules.broken_rule(scene(can, *boxes), tabletop, blocked) == rules.FEW_GRASPS
+    away = scene(("can", "can", (3.0, 0.2, 0.0), 0.0))
+    assert rules.broken_rule(away, tabletop, asked) == rules.HIDDEN
+    with pytest.raises(InvalidInputError, match="within_reach: station 'wsg_tabletop' has no arm"):
+        reach = replace(PLACED, within_reach=True)
+        SceneSampler(reach, household, load_station("wsg_tabletop"))
