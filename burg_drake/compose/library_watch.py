@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from burg_drake.compose.state import State, name_of
+from burg_drake.compose.surroundings import Surroundings
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing
 from burg_drake.objects.library import LIBRARY_FILE, ObjectLibrary, load_library
 
@@ -76,6 +78,28 @@ def require_objects(state: State, library: ObjectLibrary) -> None:
         raise InvalidInputError(
             f"library {library.root} gives {listing(heavy)} no mass; make them background first"
         )
+
+
+@dataclass(frozen=True)
+class UseLibrary:
+    """Takes the objects from another library.
+
+    Attributes:
+        library: which must have all objects of the scene.
+        reference: how the scene's document refers to it.
+    """
+
+    library: ObjectLibrary
+    reference: str
+
+    @property
+    def label(self) -> str:
+        return f"use library {self.library.name}"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        require_objects(state, self.library)
+        document = replace(state.document, library=self.reference)
+        return replace(state, document=document, library=self.library)
 
 
 def _stamp(root: Path) -> Stamp:

@@ -2,40 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from burg_drake.compose.beside import BesideEditor
 from burg_drake.compose.checker import known_scene
-from burg_drake.compose.editor import Editor
-from burg_drake.compose.grasp_watch import Counted, GraspWatch
 from burg_drake.compose.history import Step
-from burg_drake.compose.library_watch import LibraryWatch, changes_notice, require_objects
+from burg_drake.compose.library_watch import LibraryWatch, UseLibrary, changes_notice
 from burg_drake.compose.opening import Opened, new_scene, open_reference, open_scene_file
 from burg_drake.compose.scene_file import UnsavedChanges, fingerprint, scene_path
-from burg_drake.compose.settling import Proposal, Settle
 from burg_drake.compose.state import State
-from burg_drake.compose.surroundings import Surroundings
 from burg_drake.compose.view import View
-from burg_drake.compose.worker import Cancelled, Job, Worker
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import builtin_names
-from burg_drake.objects.library import LIBRARY_FILE, ObjectLibrary, load_library
+from burg_drake.objects.library import LIBRARY_FILE, load_library
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import Station
 
 if TYPE_CHECKING:
-    from burg_drake.evaluation.grasp_counts import GraspCount
     from burg_drake.printout.board_printout import Printout, PrintSettings
 
 SETTLE_TIME = 10.0
 """Simulated time that a scene gets to settle, where nothing else is asked for [s]."""
 
 
-class ComposeSession(Editor):
+class ComposeSession(BesideEditor):
     """Document, selection, commands and history of one scene, without any user interface.
 
     All methods may be called from any thread. What is refused raises a `BurgError`, and changes
@@ -51,11 +45,6 @@ class ComposeSession(Editor):
         self.folder = folder
         self._address = address
         self._watch: LibraryWatch | None = None
-        self._settler = Worker()
-        self._settling: Job[Proposal] | None = None
-        self._proposal: Proposal | None = None
-        self._grasp_watch: GraspWatch | None = None
-        self._grasps: tuple[Mapping[str, GraspCount], int] = ({}, 0)
         super().__init__(opened, station)
 
     @classmethod
@@ -107,8 +96,7 @@ class ComposeSession(Editor):
     def close(self) -> None:
         """Lets others open the scene. Changes that are in no file stay in the journal, and are
         there when the scene is opened again."""
-        self.watch_grasps(None)
-        self._settler.close()
+        self._end_beside()
         with self._alone():
             self._callbacks.clear()
             self._storage.close(keep=self._changed)
@@ -216,90 +204,13 @@ class ComposeSession(Editor):
         library = load_library(reference, self.folder)
         built_in = str(reference) in builtin_names("models")
         written = str(reference) if built_in else portable_reference(library.root, self.folder)
-        return self.do(_UseLibrary(library, written))
+        return self.do(UseLibrary(library, written))
 
     def refresh(self) -> View:
         """Looks whether the library has changed on the disk; also before each step."""
         with self._alone():
             self._look_around()
             return self._view
-
-    def settle(self, *, time_limit: float = SETTLE_TIME) -> Job[Proposal]:
-        """Lets the scene come to rest in a worker process; editing goes on meanwhile.
-
-        What comes of it is `View.proposal`. What was asked before is cancelled.
-
-        Args:
-            time_limit: simulated time allowed [s].
-        """
-        with self._alone():
-            self._drop_settling()
-            scene = known_scene(self._history.state, self._storage.place)
-            self._settling = self._settler.ask(
-                Settle(scene, self.station, time_limit), self._settled
-            )
-            self._publish()
-            return self._settling
-
-    def accept(self, proposal: Proposal | None = None) -> View:
-        """Makes a proposal a step.
-
-        Args:
-            proposal: the one in the view if None.
-
-        Raises:
-            InvalidInputError: there is none, or the scene has changed since it was made.
-        """
-        with self._alone():
-            proposal = proposal or self._proposal
-            if proposal is None:
-                raise InvalidInputError("there is no proposal to accept; settle the scene first")
-            if self._history.state.document != proposal.start:
-                raise InvalidInputError(
-                    "the scene has changed since it was settled; settle it again, or undo"
-                )
-            self._proposal = None
-            self._drag = None
-            before = self._history.state
-            state = replace(before, document=proposal.document)
-            moved = [n for n, i in state.instances.items() if i != before.instance(n)]
-            return self._take(Step(proposal.label, state.select(moved)))
-
-    def revert(self) -> View:
-        """Drops the proposal, and what is being done for one."""
-        with self._alone():
-            self._drop_settling()
-            return self._publish()
-
-    def watch_grasps(self, grasps_per_object: int | None = 50) -> View:
-        """Counts grasps from now on, in a worker process, a while after each change: how many of
-        each object are clear and reachable, and what is in the way of the others. They are in
-        `View.grasps`.
-
-        Args:
-            grasps_per_object: grasps that are sampled for each object; no more counting if None.
-        """
-        with self._alone():
-            watch, self._grasp_watch = self._grasp_watch, None
-            if grasps_per_object is not None:
-                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
-            view = self._publish()
-        if watch is not None:
-            watch.close()
-        return view
-
-    def _counted(self, found: Counted) -> None:
-        """Called by the worker's thread."""
-        with self._alone():
-            if self._grasp_watch is None:
-                return
-            if found.error is not None:
-                self.notify(f"grasps cannot be counted: {found.error}")
-            elif found.complete:
-                self._grasps = (found.counts, found.revision)
-            else:
-                self._grasps = ({**self._grasps[0], **found.counts}, self._grasps[1])
-            self._publish()
 
     def _change(self, opened: Opened) -> View:
         """Goes over to another scene."""
@@ -330,56 +241,3 @@ class ComposeSession(Editor):
         self._history.replace_library(changed)
         self._revision += 1
         self._show(replace(self._state, library=changed))
-
-    def _settled(self, job: Job[Proposal]) -> None:
-        """Called by the worker's thread."""
-        with self._alone():
-            if job is not self._settling:
-                return
-            if job.done:
-                self._settling = None
-                if job.error is None:
-                    self._proposal = job.result
-                elif not isinstance(job.error, Cancelled):
-                    self.notify(f"cannot settle the scene: {job.error}")
-            self._publish()
-
-    def _drop_settling(self) -> None:
-        job, self._settling = self._settling, None
-        self._proposal = None
-        if job is not None:
-            job.cancel()
-
-    def _dressed(self, view: View) -> View:
-        if self._grasp_watch is not None:
-            scene = known_scene(self._history.state, self._storage.place)
-            self._grasp_watch.tell(scene, self._revision, self._state.selection)
-        working = None
-        if self._settling is not None:
-            share, word = self._settling.progress
-            working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
-        grasps, revision = self._grasps
-        return replace(
-            view,
-            working=working,
-            proposal=self._proposal,
-            grasps=grasps,
-            grasps_revision=revision,
-        )
-
-
-@dataclass(frozen=True)
-class _UseLibrary:
-    """Takes the objects from another library."""
-
-    library: ObjectLibrary
-    reference: str
-
-    @property
-    def label(self) -> str:
-        return f"use library {self.library.name}"
-
-    def apply(self, state: State, surroundings: Surroundings) -> State:
-        require_objects(state, self.library)
-        document = replace(state.document, library=self.reference)
-        return replace(state, document=document, library=self.library)
