@@ -29,6 +29,7 @@ from burg_drake.station.station import Station
 if TYPE_CHECKING:
     import trimesh
 
+    from burg_drake.evaluation.clear_test import ClearTest
     from burg_drake.grasping.antipodal import Accept
     from burg_drake.grasping.clearance import HandClearance
 
@@ -216,16 +217,20 @@ class ObjectSampler:
     ) -> GraspSet:
         """Grasps of an object, by this name and at this place (4, 4) in the screen, that the hand
         can take; their provenance counts what `blocked` the others."""
+        test = self.clear_test(object, screen, name, X_WO)
+        grasps = self(object, cones, test)
+        told = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
+        return dataclasses.replace(grasps, provenance={**grasps.provenance, **told})
+
+    def clear_test(self, object: str, screen: HandClearance, name: str, X_WO: Array) -> ClearTest:
+        """Tells which grasps of an object the hand can take; see `clear`."""
         from burg_drake.evaluation.clear_test import ClearTest
         from burg_drake.grasping.jaws import jaws_of
         from burg_drake.grasping.surface import Surface
 
         surface, friction = Surface.of(self.surface(object)), self._friction(object)
         jaws = jaws_of(self._station.hand, self._station.hand_model, self._station.packages)
-        test = ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
-        grasps = self(object, cones, test)
-        told = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
-        return dataclasses.replace(grasps, provenance={**grasps.provenance, **told})
+        return ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
 
     def _friction(self, object: str) -> float:
         given = self._settings.friction

@@ -22,8 +22,8 @@ def within_reach(scene: Scene, station: Station) -> tuple[str, ...]:
     An object is within reach if the arm can execute one of `TRIED` sampled grasps, all the way from
     home to the end of the lift, as if it stood in its place alone: among the station's obstacles,
     but with no other object, so that the answer stays as it is when others are moved. What the hand
-    carries is not looked at. Stricter than distance from the base; what others block is counted by
-    `count_grasps`.
+    carries is not looked at. An object that the hand takes nowhere as it stands is out of reach.
+    What other objects block is counted by `count_grasps`.
 
     Args:
         scene: what stands where; it need not be sound.

@@ -132,6 +132,16 @@ def test_the_arm_and_obstacles_are_named(panda: Station) -> None:
     assert count.good == 0
 
 
+def test_an_object_that_the_hand_does_not_take_says_why(panda: Station) -> None:
+    """A box of 158 x 210 mm that lies flat: the hand opens by 80 mm."""
+    flat = Pose((0.3, 0.2, 0.03), rpy_deg=(0.0, 90.0, 0.0))
+    lying = replace(ALONE.document.instances[0], name="box", object="box", X_SO=flat)
+    scene = replace(ALONE, document=replace(ALONE.document, instances=(lying,)))
+    count = count_grasps(scene, panda, grasps_per_object=2, reach=False)["box"]
+    assert count.sampled < 2
+    assert count.note.startswith(f"box: {count.sampled} of 2 grasps: of ")
+
+
 def test_only_some_and_none(panda: Station) -> None:
     assert list(count_grasps(BETWEEN, panda, only=["box"], grasps_per_object=4, reach=False)) == [
         "left",
