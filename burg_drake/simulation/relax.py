@@ -33,6 +33,10 @@ WINDOW_TIME = WINDOW * RELAXING.time_step
 """The same in seconds."""
 CALM = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
+GROUP_CALM = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
+"""The same of objects that touch each other, which creep, slower and slower, for long."""
+MOVING = BodySpeed(speed=1e-3, turning=float(np.deg2rad(1.0)))
+"""What is faster at the end is still on its way."""
 CALM_WINDOWS = 2
 """So many windows in succession."""
 STOPPED = SpatialVelocity(np.zeros(3), np.zeros(3))
@@ -45,12 +49,16 @@ class Relaxed:
     Attributes:
         X_WO: (4, 4) poses of what is still on the table, by name.
         speed: of each of these over the last window in which it was free to move.
-        moving: those among them that still move.
+        moving: those among them that are still on their way.
+        alone: those that touched no other.
+        calm: everything was calm before time was up.
     """
 
     X_WO: Mapping[str, Array]
     speed: Mapping[str, BodySpeed]
     moving: tuple[str, ...]
+    alone: frozenset[str]
+    calm: bool
 
 
 def relax(built: StationDiagram, time_limit: float) -> Relaxed:
@@ -94,6 +102,7 @@ class _Relaxation:
             island = neighbours.close_to([left[0]])
             self._islands.append(_Island([index for index in left if index in island]))
             left = [index for index in left if index not in island]
+        self._alone = {i.bodies[0] for i in self._islands if len(i.bodies) == 1}
         self._energy = dict.fromkeys(built.free.values(), 0.0)
         self._speed: dict[BodyIndex, BodySpeed] = {}
         self._fallen: set[BodyIndex] = set()
@@ -127,7 +136,13 @@ class _Relaxation:
                 for name, index in names.items()
             },
             speed={name: self._speed[index] for name, index in names.items()},
-            moving=tuple(n for n, i in names.items() if i in awake and not self._is_calm(i)),
+            moving=tuple(
+                name
+                for name, index in names.items()
+                if index in awake and not is_slower(self._speed[index], MOVING)
+            ),
+            alone=frozenset(name for name, index in names.items() if index in self._alone),
+            calm=not self._islands,
         )
 
     def _look(self, island: _Island) -> None:
@@ -136,15 +151,12 @@ class _Relaxation:
             island.bodies.remove(index)
             self._fallen.add(index)
             self._plant.get_body(index).Lock(self._context)
-        calm = all(self._is_calm(index) for index in island.bodies)
+        limit = CALM if self._alone.issuperset(island.bodies) else GROUP_CALM
+        calm = all(is_slower(self._speed[index], limit) for index in island.bodies)
         island.calm = island.calm + 1 if calm else 0
         if island.calm == CALM_WINDOWS:
             self._islands.remove(island)
             self._freeze(island.bodies)
-
-    def _is_calm(self, index: BodyIndex) -> bool:
-        speed = self._speed[index]
-        return speed.speed < CALM.speed and speed.turning < CALM.turning
 
     def _damp(self, body: RigidBody) -> None:
         """Stops a body that has got slower."""
@@ -174,3 +186,8 @@ class _Relaxation:
         graph_context = graph.GetMyMutableContextFromRoot(self._root)
         declaration = CollisionFilterDeclaration().ExcludeWithin(geometries)
         graph.collision_filter_manager(graph_context).Apply(declaration)
+
+
+def is_slower(speed: BodySpeed, limit: BodySpeed) -> bool:
+    """Whether a body moves and turns slower than a limit."""
+    return speed.speed < limit.speed and speed.turning < limit.turning

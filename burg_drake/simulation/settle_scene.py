@@ -12,7 +12,7 @@ from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE
 from burg_drake.simulation.displacement import Displacement, displacement
 from burg_drake.simulation.fall import fall
-from burg_drake.simulation.placed_scene import placed_scene
+from burg_drake.simulation.placed_scene import has_moved, placed_scene
 from burg_drake.simulation.relax import RELAXING, relax
 from burg_drake.simulation.settle import BodySpeed
 from burg_drake.station.check import overlaps
@@ -24,12 +24,14 @@ DEFAULT_TIME_LIMIT = 10.0
 """Simulated time allowed [s]."""
 DEFAULT_ENGINE = "screening"
 """How time is stepped while objects fall; they come to rest in steps of their own."""
-RELAXING_TIME = 10.0
+RELAXING_TIME = 1.5
 """Time that may be stepped in each round of relaxing [s]."""
-ROUNDS = 8
+ROUNDS = 6
 """Of relaxing at most. After each, other objects may touch each other than before, and these are
 compliant in a diagram built anew; the last one starts where the one before ended, and finds all at
 rest there."""
+CREEPING_ROUNDS = 2
+"""After so many, what has no way to go any more may creep on."""
 
 
 @dataclass(frozen=True)
@@ -117,17 +119,17 @@ def _at_rest(
     scene: Scene, station: Station, progress: Callable[[float, int], None] | None
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene once it is at rest in the world of its own diagram, and what will not rest."""
-    for _ in range(ROUNDS):
+    for number in range(1, ROUNDS + 1):
         built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
         relaxed = relax(built, RELAXING_TIME)
-        before, scene = scene, placed_scene(built, relaxed.X_WO)
+        moved = [name for name, X_WO in relaxed.X_WO.items() if has_moved(built, name, X_WO)]
+        scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
         if progress is not None:
             progress(0.0, len(relaxed.moving))
-        moving = relaxed.moving
-        if moving or scene.document == before.document:
+        at_rest = relaxed.calm and not moved and len(relaxed.X_WO) == len(built.free)
+        if at_rest or (number >= CREEPING_ROUNDS and not relaxed.moving):
             break
-        moving = tuple(n for n, i in scene.instances.items() if i != before.instances[n])
-    return scene, {name: relaxed.speed[name] for name in moving}
+    return scene, {name: relaxed.speed[name] for name in relaxed.moving}
 
 
 def _require_above(built: StationDiagram) -> None:

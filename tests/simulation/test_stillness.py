@@ -1,0 +1,58 @@
+"""What is settled stands still in the diagram that users get, and what is not is told to move."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from trial_world import GRAVITY, make_station
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.schema import Pose
+from burg_drake.scene.scene import Instance, Scene
+from burg_drake.simulation.settle_scene import settle_scene
+from burg_drake.simulation.stillness import is_still, stillness
+
+EDGE = 0.05
+"""Of the blocks [m]."""
+
+
+def placed(name: str, object: str, x: float, z: float, yaw: float = 0.0) -> Instance:
+    return Instance(name=name, object=object, X_SO=Pose((x, 0.2, z), rpy_deg=(0.0, 0.0, yaw)))
+
+
+@pytest.fixture(scope="module")
+def heap(make_scene) -> Scene:
+    """A block on a block, beside a can that lies on its side against a ball."""
+    can = Instance(object="can", X_SO=Pose((0.45, 0.2, 0.031), rpy_deg=(90.0, 0.0, 0.0)))
+    return make_scene(
+        placed("low", "block", 0.2, 0.0005),
+        placed("high", "block", 0.205, EDGE + 0.001, 15.0),
+        can,
+        placed("ball", "ball", 0.52, 0.0),
+    )
+
+
+def test_a_settled_heap_is_still(heap: Scene) -> None:
+    settled = settle_scene(heap, make_station())
+    assert settled.at_rest
+    assert settled.scene.X_SO("high")[2, 3] == pytest.approx(EDGE, abs=3e-4)
+    assert settled.displacements["ball"].distance < 1e-3
+    moved = stillness(settled.scene, make_station(), duration=0.5)
+    assert moved.keys() == heap.instances.keys()
+    assert is_still(moved), moved
+    again = settle_scene(heap, make_station())
+    assert again.scene.document == settled.scene.document  # bit for bit
+
+
+def test_what_is_in_the_air_falls(make_scene) -> None:
+    scene = make_scene(placed("block", "block", 0.3, 0.5))
+    moved = stillness(scene, make_station(), duration=0.1)
+    assert not is_still(moved)
+    assert moved["block"].distance == pytest.approx(GRAVITY * 0.1**2 / 2, rel=0.02)
+    assert moved["block"].angle == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_duration_that_is_none(heap: Scene) -> None:
+    for duration in (0.0, np.nan):
+        with pytest.raises(InvalidInputError, match="give more than 0"):
+            stillness(heap, make_station(), duration=duration)
