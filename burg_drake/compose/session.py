@@ -25,9 +25,6 @@ from burg_drake.station.station import Station
 if TYPE_CHECKING:
     from burg_drake.printout.board_printout import Printout, PrintSettings
 
-SETTLE_TIME = 10.0
-"""Simulated time that a scene gets to settle, where nothing else is asked for [s]."""
-
 
 class ComposeSession(BesideEditor):
     """Document, selection, commands and history of one scene, without any user interface.
@@ -45,7 +42,9 @@ class ComposeSession(BesideEditor):
         self.folder = folder
         self._address = address
         self._watch: LibraryWatch | None = None
+        self._seen: str | None = opened.storage.known
         super().__init__(opened, station)
+        self.refresh()
 
     @classmethod
     def open(
@@ -207,7 +206,8 @@ class ComposeSession(BesideEditor):
         return self.do(UseLibrary(library, written))
 
     def refresh(self) -> View:
-        """Looks whether the library has changed on the disk; also before each step."""
+        """Looks whether the library or the scene's file has changed on the disk; notices say so.
+        Each step does that first."""
         with self._alone():
             self._look_around()
             return self._view
@@ -216,8 +216,9 @@ class ComposeSession(BesideEditor):
         """Goes over to another scene."""
         self._drop_settling()
         self._storage.close(keep=False)
+        self._seen = opened.storage.known
         self._begin(opened)
-        return self._view
+        return self.refresh()
 
     def _require_saved(self, *, discard: bool) -> None:
         if self._changed and not discard:
@@ -227,6 +228,7 @@ class ComposeSession(BesideEditor):
             )
 
     def _look_around(self) -> None:
+        self._look_at_file()
         library = self._history.state.library
         if self._watch is None or self._watch.library.root != library.root:
             self._watch = LibraryWatch(library)
@@ -241,3 +243,17 @@ class ComposeSession(BesideEditor):
         self._history.replace_library(changed)
         self._revision += 1
         self._show(replace(self._state, library=changed))
+
+    def _look_at_file(self) -> None:
+        """Tells once of each change of the scene's file that is not this session's."""
+        path = self._storage.path
+        if path is None:
+            return
+        try:
+            found = fingerprint(path)
+        except InvalidInputError:
+            return  # saving tells
+        if found not in (self._storage.known, self._seen):
+            what = "is gone" if found is None else "was changed by something else"
+            self.notify(f"{path} {what}; load it, or overwrite it by saving")
+        self._seen = found

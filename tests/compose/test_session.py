@@ -59,6 +59,9 @@ def test_a_file_that_was_changed_is_not_overwritten(session: ComposeSession) -> 
     assert load_scene(path).document == session.view.document
     theirs = path.read_text() + "# theirs\n"
     path.write_text(theirs)
+    assert session.refresh().notices == (
+        f"{path} was changed by something else; load it, or overwrite it by saving",
+    )
     session.do(Delete(("mug",)))
     with pytest.raises(FileChanged, match=r"was changed by something else meanwhile"):
         session.save()
