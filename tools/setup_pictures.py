@@ -22,7 +22,6 @@ from burg_drake.compose.moving import Move, SetPose
 from burg_drake.compose.placing import AddObject
 from burg_drake.compose.session import ComposeSession
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.scene import Board
 from burg_drake.ui.door import serve
 from burg_drake.ui.setup_page import SetupPage
 
@@ -151,11 +150,10 @@ def settling(path: Path) -> None:
 def reach(path: Path) -> None:
     """Where the arm grasps from above."""
     with opened("tabletop_six", "panda_shelf") as open:
-        open.session.do(SetBoard(Board(size=(0.841, 0.594))))
         open.show("View")
         open.check("Arm's reach")
         open.until(lambda: open.tab.get_by_text("turn of the hand").count())
-        open.tab.keyboard.press("f")
+        open.press("From the front")
         open.photograph(path)
 
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import viser
 
-from burg_drake.cameras.board_picture import board_picture
-from burg_drake.cameras.frame_source import Image
-from burg_drake.cameras.image_file import decode_image
-from burg_drake.cameras.sources import open_source
 from burg_drake.compose.view import View
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.ui.board_layers import BoardLayers, Sheet
-from burg_drake.ui.buttons import quiet_button
+from burg_drake.ui.buttons import quiet_button, upload_button
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import all_of, box, quiet
+
+if TYPE_CHECKING:
+    from burg_drake.cameras.frame_source import Image
 
 CAMERAS = ("0", "1", "2", "3")
 """Numbers of cameras of this machine that the page may open; it can name nothing else."""
@@ -38,9 +37,7 @@ class BackdropPanel:
         icon = viser.Icon
         with gui.add_folder("Real board"):
             self._text = gui.add_html("")
-            upload = gui.add_upload_button(
-                "Photo of the board", icon=icon.PHOTO, mime_type="image/*", color="gray"
-            )
+            upload = upload_button(gui, "Photo of the board", icon=icon.PHOTO, mime_type="image/*")
             upload.on_upload(self._uploaded)
             self._camera = gui.add_dropdown("Camera", CAMERAS)
             actions.clicked(quiet_button(gui, "Take a picture", icon=icon.CAMERA), self._take)
@@ -58,7 +55,12 @@ class BackdropPanel:
 
     async def _uploaded(self, event: Any) -> None:
         file = event.target.value
-        self._actions.ask(lambda: self._use(decode_image(file.content), file.name), event.client)
+        self._actions.ask(lambda: self._look_at(file.content, file.name), event.client)
+
+    def _look_at(self, data: bytes, name: str) -> None:
+        from burg_drake.cameras.image_file import decode_image
+
+        self._use(decode_image(data), name)
 
     def _take(self) -> None:
         """Takes a picture with a camera of this machine.
@@ -67,6 +69,8 @@ class BackdropPanel:
             InvalidInputError: it is not one of `CAMERAS`, or does not show the board.
             CameraLost: it gives no picture.
         """
+        from burg_drake.cameras.sources import open_source
+
         number = self._camera.value
         if number not in CAMERAS:
             raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
@@ -77,6 +81,8 @@ class BackdropPanel:
     def _use(self, image: Image | None, name: str) -> None:
         if image is None:
             raise InvalidInputError(f"{name} is not an image that can be read; give PNG or JPEG")
+        from burg_drake.cameras.board_picture import board_picture
+
         found = board_picture(image, self._actions.session.view.document.board)
         words = f"{name}: {len(found.ids)} markers, off by {1e3 * found.error:.1f} mm"
         sheet = Sheet(found.image, found.lower, found.upper, float(self._opacity.value))

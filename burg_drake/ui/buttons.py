@@ -10,6 +10,7 @@ from typing import Any
 
 import viser
 
+from burg_drake.ui.icons import icon_svg
 from burg_drake.ui.panel_text import picture
 
 
@@ -20,14 +21,22 @@ def quiet_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: A
         gui: of viser.
         label: on it.
         width: twelfths of the panel: 2, 3, 4, 6 or 12.
-        options: as of viser's `add_button`.
+        options: as of viser's `add_button`, `icon` among them.
     """
-    return _marked(gui.add_button(label, **options), width, "bd-quiet-button")
+    icon = options.pop("icon", None)
+    return _marked(gui.add_button(label, **options), icon, width, "bd-quiet-button")
+
+
+def upload_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: Any) -> Any:
+    """A button that asks for a file; see `quiet_button`."""
+    icon = options.pop("icon", None)
+    return _marked(gui.add_upload_button(label, **options), icon, width, "bd-quiet-button")
 
 
 def strong_button(gui: viser.GuiApi, label: str, *, width: int = 12, **options: Any) -> Any:
     """A button that stands out; see `quiet_button`."""
-    return _marked(gui.add_button(label, **options), width, "bd-strong-button")
+    icon = options.pop("icon", None)
+    return _marked(gui.add_button(label, **options), icon, width, "bd-strong-button")
 
 
 def picture_button(
@@ -53,8 +62,7 @@ def show_picture(button: Any, png: bytes | None, *, width: int = 4, chosen: bool
         button._icon_html = html
 
 
-def _marked(button: Any, width: int, look: str) -> Any:
-    drawn = button._icon_html
-    bare = "" if drawn else " bd-bare"
-    button._icon_html = f'<span class="bd-mark bd-{width} {look}{bare}">{drawn or ""}</span>'
+def _marked(button: Any, icon: str | None, width: int, look: str) -> Any:
+    drawn, bare = ("", " bd-bare") if icon is None else (icon_svg(icon), "")
+    button._icon_html = f'<span class="bd-mark bd-{width} {look}{bare}">{drawn}</span>'
     return button

@@ -13,8 +13,6 @@ from burg_drake.ui.board_layers import BoardLayers, Sheet
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import all_of, box, quiet
 from burg_drake.ui.reach_task import ReachTask
-from burg_drake.visualization.reach_image import reach_image
-from burg_drake.visualization.reachability_chart import reachability_key
 
 if TYPE_CHECKING:
     from burg_drake.motion.reach_layer import ReachLayer
@@ -98,6 +96,9 @@ class ReachPanel:
             if not isinstance(job.error, Cancelled):
                 self._say(str(job.error))
             return
+        from burg_drake.visualization.reach_image import reach_image
+        from burg_drake.visualization.reachability_chart import reachability_key
+
         layer = job.wait()
         width, depth = self._actions.session.view.document.board.size
         pixels = reach_image(layer, pixels=PIXELS)
