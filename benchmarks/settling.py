@@ -21,7 +21,7 @@ import numpy as np
 from burg_drake.core.frames import inverse
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import Layout
+from burg_drake.scene.layout import Layout
 from burg_drake.scene.object_shapes import ObjectShapes
 from burg_drake.scene.scene import Board, Scene, SceneDocument
 from burg_drake.simulation import settle_scene as settling
