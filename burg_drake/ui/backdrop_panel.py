@@ -11,10 +11,12 @@ from burg_drake.compose.view import View
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.ui.board_layers import BoardLayers, Sheet
 from burg_drake.ui.buttons import quiet_button, upload_button
+from burg_drake.ui.live_picture import LivePicture
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import all_of, box, quiet
 
 if TYPE_CHECKING:
+    from burg_drake.cameras.board_picture import BoardPicture
     from burg_drake.cameras.frame_source import Image
 
 CAMERAS = ("0", "1", "2", "3")
@@ -34,6 +36,7 @@ class BackdropPanel:
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
         self._actions, self._layers = actions, layers
         self._sheet: Sheet | None = None
+        self._live: LivePicture | None = None
         icon = viser.Icon
         with gui.add_folder("Real board"):
             self._text = gui.add_html("")
@@ -41,17 +44,34 @@ class BackdropPanel:
             upload.on_upload(self._uploaded)
             self._camera = gui.add_dropdown("Camera", CAMERAS)
             actions.clicked(quiet_button(gui, "Take a picture", icon=icon.CAMERA), self._take)
+            self._on = actions.chosen(
+                gui.add_checkbox("Live", False, hint="Show what the camera sees, again and again"),
+                self._watch,
+            )
             self._opacity = actions.chosen(
                 gui.add_slider("Opacity", 0.0, 1.0, 0.05, OPACITY), self._fade, key="backdrop"
             )
             self._remove = actions.clicked(
-                quiet_button(gui, "Remove the picture", icon=icon.X), lambda: self._lay(None, "")
+                quiet_button(gui, "Remove the picture", icon=icon.X), self._clear
             )
             self._lay(None, "")
 
     def show(self, view: View) -> None:
         """Brings the panel to a view; a picture stays as it is."""
+        if self._live is not None and self._live.board != view.document.board:
+            self._watch(True)
         self._remove.visible = self._opacity.visible = self._sheet is not None
+
+    def close(self) -> None:
+        """Lets go of the camera."""
+        live, self._live = self._live, None
+        if live is not None:
+            live.close()
+
+    def _clear(self) -> None:
+        self.close()
+        self._on.value = False
+        self._lay(None, "")
 
     async def _uploaded(self, event: Any) -> None:
         file = event.target.value
@@ -71,22 +91,49 @@ class BackdropPanel:
         """
         from burg_drake.cameras.sources import open_source
 
-        number = self._camera.value
-        if number not in CAMERAS:
-            raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
+        number = self._chosen_camera()
         with open_source(number) as source:
             frame = source.read()
         self._use(None if frame is None else frame.image, f"camera {number}")
+
+    def _chosen_camera(self) -> str:
+        number = str(self._camera.value)
+        if number not in CAMERAS:
+            raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
+        return number
 
     def _use(self, image: Image | None, name: str) -> None:
         if image is None:
             raise InvalidInputError(f"{name} is not an image that can be read; give PNG or JPEG")
         from burg_drake.cameras.board_picture import board_picture
 
-        found = board_picture(image, self._actions.session.view.document.board)
+        self._lay_found(board_picture(image, self._actions.session.view.document.board), name)
+
+    def _lay_found(self, found: BoardPicture, name: str) -> None:
         words = f"{name}: {len(found.ids)} markers, off by {1e3 * found.error:.1f} mm"
         sheet = Sheet(found.image, found.lower, found.upper, float(self._opacity.value))
         self._lay(sheet, f"{words}. {found.note}" if found.note else words)
+
+    def _watch(self, on: bool) -> None:
+        """Shows what a camera sees from now on, or no more."""
+        self.close()
+        if on:
+            camera, board = self._chosen_camera(), self._actions.session.view.document.board
+            self._live = LivePicture(camera, board, self._seen)
+
+    def _seen(self, what: BoardPicture | str) -> None:
+        """Called by the live picture's thread."""
+        live = self._live
+
+        def lay() -> None:
+            if live is None or live is not self._live:
+                return
+            if isinstance(what, str):
+                self._say(what)
+            else:
+                self._lay_found(what, f"camera {live.camera}")
+
+        self._actions.ask(lay, key="live picture")
 
     def _fade(self, opacity: float) -> None:
         if self._sheet is not None:
@@ -96,7 +143,8 @@ class BackdropPanel:
     def _lay(self, sheet: Sheet | None, words: str) -> None:
         self._sheet = sheet
         self._layers.show("backdrop", sheet)
-        self._text.content = all_of(
-            box(quiet(words or "Lay a picture of the printed board under the objects."))
-        )
+        self._say(words or "Lay a picture of the printed board under the objects.")
         self.show(self._actions.session.view)
+
+    def _say(self, line: str) -> None:
+        self._text.content = all_of(box(quiet(line)))

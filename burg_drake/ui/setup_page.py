@@ -90,6 +90,7 @@ class SetupPage:
         self._unsubscribe()
         self.actions.queue.close()
         self._reach.close()
+        self._backdrop.close()
         self._pictures.close()
 
     def _set_stage(self, view: View) -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from burg_drake.cameras.board_picture import BoardPicture
 from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.scene import Board
 from burg_drake.ui.board_view import board_picture
 from burg_drake.ui.footprint import footprint
+from burg_drake.ui.live_picture import LivePicture
 from burg_drake.ui.panel_text import notice, table
 from burg_drake.ui.scene_files import scene_names
 from burg_drake.ui.shortcuts import SHORTCUTS, overlay_text
@@ -39,6 +41,23 @@ def test_the_boards_picture_has_its_markers_where_they_are_printed() -> None:
         p_SQ = board.layout.p_SQ[list(board.layout.ids).index(number), :, :2]
         expected = np.stack([p_SQ[:, 0], board.size[1] - p_SQ[:, 1]], axis=-1) * scale
         np.testing.assert_allclose(found[0], expected, atol=2.0)
+
+
+def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: Path) -> None:
+    board = Board()
+    corners = np.array([[300, 250], [1100, 180], [1200, 720], [180, 800]], dtype=np.float32)
+    sheet = board_picture(board)
+    height, width = sheet.shape[:2]
+    edges = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float32)
+    H = cv2.getPerspectiveTransform(edges, corners)
+    photo = cv2.warpPerspective(sheet, H, (1400, 950), flags=cv2.INTER_AREA, borderValue=(90,) * 3)
+    cv2.imwrite(str(tmp_path / "photo.png"), photo)
+    found: list[BoardPicture | str] = []
+    live = LivePicture(str(tmp_path / "photo.png"), board, found.append)
+    live.wait(60.0)
+    live.close()
+    assert len(found) == 1 and isinstance(found[0], BoardPicture), found
+    assert found[0].error < 1e-3 and len(found[0].ids) == len(board.layout.ids)
 
 
 def test_only_files_that_name_a_library_are_offered_as_scenes(tmp_path: Path) -> None:
