@@ -96,6 +96,8 @@ class SheetFinder:
                 f"the image shows another board: only {fit} of {n} markers in sight stand where"
                 " this one has them; are columns, rows and first_id right?"
             )
+        if 2 * fit < len(self._layout.ids):
+            self._require_no_strangers(grey, fit)
         p_SQ, corners = p_SQ[kept].reshape(-1, 2), corners[kept].reshape(-1, 2)
         H, bend = _fitted(p_SQ, corners, fit, 1.0 / radius)
         off = _project(H, bend, p_SQ) - corners
@@ -109,6 +111,20 @@ class SheetFinder:
             )
         ids = tuple(int(i) for i in self._layout.ids[seen.index[kept]])
         return Sheet(H, bend, middle, radius, error, ids)
+
+    def _require_no_strangers(self, grey: NDArray[np.uint8], fit: int) -> None:
+        """Refuses a sheet that has more markers which are not this board's than fit: a part of the
+        first row is the same on boards of several sizes."""
+        layout = self._layout
+        other = other_markers(grey, layout)
+        if other is None or other.dictionary.lower() != layout.dictionary.lower():
+            return
+        strangers = set(other.ids) - set(layout.ids.tolist())
+        if len(strangers) > fit:
+            raise InvalidInputError(
+                f"the image shows another board: {len(strangers)} markers in sight have ids beyond"
+                f" {layout.ids[-1]}, the last of this one; is its size right?"
+            )
 
     def _why_nothing(self, grey: NDArray[np.uint8], candidates: int) -> str:
         layout = self._layout

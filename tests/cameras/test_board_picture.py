@@ -15,6 +15,7 @@ from burg_drake.cameras.board_picture import BoardPicture, BoardRectifier, board
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.sources import open_source
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import inverse, transform_points
 from burg_drake.scene.markers import Markers
 from burg_drake.scene.scene import Board
 from tests.cameras.board_views import view
@@ -107,6 +108,21 @@ def test_refusals(plain: np.ndarray, intrinsics: Intrinsics | None) -> None:
     assert "another board" in why(plain, Board(markers=larger))
     assert "an image is (H, W, 3) of uint8" in why(plain[..., 0], BOARD)
     assert "an image is (H, W, 3) of uint8" in why(plain.astype(float), BOARD)
+
+
+@pytest.mark.parametrize("intrinsics", [VGA, None])
+def test_a_larger_board_whose_first_row_is_the_same(
+    plain: np.ndarray, intrinsics: Intrinsics | None
+) -> None:
+    smaller = Board(size=(0.42, 0.297))
+    columns = len({round(x, 6) for x in smaller.layout.p_SQ[:, 0, 0]})
+    image = plain.copy()
+    for p_SQ in BOARD.layout.p_SQ[columns : len(smaller.layout.ids)]:  # objects stand on these
+        corners = VGA.project(transform_points(inverse(TILTED), p_SQ))
+        cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), (128, 128, 128))
+    assert board_picture(image, BOARD, intrinsics).error < 0.001
+    with pytest.raises(InvalidInputError, match="another board"):
+        board_picture(image, smaller, intrinsics)
 
 
 def test_numbers_out_of_range() -> None:
