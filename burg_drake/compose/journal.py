@@ -21,6 +21,10 @@ LARGEST = 1 << 30
 """Bytes of a journal; a step takes some hundred."""
 
 
+class LibraryGone(InvalidInputError):
+    """A journal needs a library that is not where it was."""
+
+
 @dataclass(frozen=True)
 class Recovered:
     """What a journal holds.
@@ -117,14 +121,21 @@ def recover(path: Path) -> Recovered | None:
         What it holds; None if there is none.
 
     Raises:
-        BurgError: the library of its last steps is not there, or it cannot be read.
+        LibraryGone: the library of its last steps is not there.
+        InvalidInputError: it cannot be read.
     """
     if not path.exists():
         return None
     text = read_bytes(path, LARGEST).decode("utf-8", errors="replace")
     whole, _, _ = text.rpartition("\n")
     lines = whole.split("\n") if whole else []
-    reader = JournalReader(_libraries(lines))
+    try:
+        reader = JournalReader(_libraries(lines))
+    except BurgError as error:
+        raise LibraryGone(
+            f"{error}; the last session of this scene, whose steps are in {path}, used it: bring it"
+            " back, or delete that file"
+        ) from error
     damaged = not lines
     for line in lines:
         try:

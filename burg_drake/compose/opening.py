@@ -10,7 +10,7 @@ from pathlib import Path
 
 from burg_drake.compose.board_change import board_size
 from burg_drake.compose.history import History
-from burg_drake.compose.journal import Recovered, journal_path, recover
+from burg_drake.compose.journal import LibraryGone, Recovered, journal_path, recover
 from burg_drake.compose.scene_file import fingerprint
 from burg_drake.compose.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.state import State
@@ -136,6 +136,8 @@ def _unsaved(
                 )
             if found.origin == origin and found.saved is None:
                 return _recovered(place, None, found, lock, notices)
+        except LibraryGone as error:
+            notices += (str(error),)
         except BaseException:
             lock.release()
             raise

@@ -158,11 +158,12 @@ class ComposeSession(BesideEditor):
 
         Raises:
             UnsavedChanges: there are such.
-            BurgError: the library cannot be loaded.
+            UnknownNameError: there is no such library.
+            DocumentError: its document does not fit the schema.
         """
         with self._alone():
             self._require_saved(discard=discard)
-            reference = self._history.state.library.root if library is None else library
+            reference = self._history.state.library.root if library is None else self._own(library)
             if library is None and self._history.state.document.library in builtin_names("models"):
                 reference = self._history.state.document.library
             return self._change(new_scene(reference, self.folder, self._address))
@@ -196,14 +197,24 @@ class ComposeSession(BesideEditor):
             UnknownNameError: there is no such library, or it lacks objects of the scene.
             DocumentError: its document does not fit the schema.
         """
-        if isinstance(reference, str) and reference not in self.libraries():
-            raise UnknownNameError(
-                f"no library {reference!r} here; {nearest(reference, self.libraries())}"
-            )
-        library = load_library(reference, self.folder)
+        library = load_library(self._own(reference))
         built_in = str(reference) in builtin_names("models")
         written = str(reference) if built_in else portable_reference(library.root, self.folder)
         return self.do(UseLibrary(library, written))
+
+    def _own(self, reference: str | Path) -> str | Path:
+        """Where one of `libraries` is; a `Path` is what it is, as no page gives one.
+
+        Raises:
+            UnknownNameError: there is no such library.
+        """
+        if isinstance(reference, Path):
+            return self.folder / reference
+        if reference not in self.libraries():
+            raise UnknownNameError(
+                f"no library {reference!r} here; {nearest(reference, self.libraries())}"
+            )
+        return reference if reference in builtin_names("models") else self.folder / reference
 
     def refresh(self) -> View:
         """Looks whether the library or the scene's file has changed on the disk; notices say so.

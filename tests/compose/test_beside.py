@@ -117,6 +117,15 @@ def test_another_library_is_a_step(session: ComposeSession, library: Path) -> No
         session.use_library("../mine")
 
 
+def test_a_new_scene_takes_a_library_of_the_folder_alone(
+    session: ComposeSession, library: Path
+) -> None:
+    assert session.new("mine").document.library == "mine"
+    for elsewhere in ("../mine", str(library)):
+        with pytest.raises(UnknownNameError, match=r"no library '.*mine' here"):
+            session.new(elsewhere)
+
+
 def test_names_of_files_stay_in_the_folder(session: ComposeSession) -> None:
     session.do(AddObject("can"))
     for name in ("../scene", "/tmp/scene", ".scene", "a/b", "", "x" * 300, "a\0b"):

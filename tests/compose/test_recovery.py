@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 from burg_drake.compose import AddObject, ComposeSession
 from burg_drake.compose.scene_file import FileChanged
 from burg_drake.compose.scene_lock import SceneInUse
+from burg_drake.core.resources import resolve
 from burg_drake.station.station import Station
 
 SCRIPT = Path(__file__).with_name("scripted_session.py")
@@ -114,6 +116,20 @@ def test_what_is_no_journal_is_no_obstacle(station: Station, left: Path, content
     with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
         assert list(session.view.instances) == ["mug"]
         assert "is damaged" in session.view.notices[0]
+
+
+def test_steps_whose_library_is_gone_hinder_no_new_scene(station: Station, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    shutil.copytree(resolve("household", "models"), mine)
+    with ComposeSession.open(mine, station, folder=tmp_path) as session:
+        session.do(AddObject("mug"))
+    mine.rename(tmp_path / "elsewhere")
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        assert session.view.document.name == "new_scene_2"
+        assert str(tmp_path / ".new_scene.yaml.journal") in session.view.notices[0]
+    (tmp_path / "elsewhere").rename(mine)
+    with ComposeSession.open(mine, station, folder=tmp_path) as session:
+        assert list(session.view.instances) == ["mug"]
 
 
 def test_a_file_that_was_changed_since_is_not_overwritten(station: Station, left: Path) -> None:
