@@ -4,8 +4,8 @@
 the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
 of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
 pages that the commands write with --html, by a Chromium that runs without a display; `ports` what
-the example of the ports shows in Meshcat; `setup` those of the setup page. The others are
-screenshots by hand.
+the example of the ports shows in Meshcat; `sampled` renders a scene of each layout; `setup` takes
+those of the setup page. The others are screenshots by hand.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from burg_drake.cameras.placement import check_placement
 from burg_drake.core.frames import rot_z
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.run_store import load_run
+from burg_drake.generation.sample import sample_scene
+from burg_drake.scene.layout import Layout
+from burg_drake.scene.recipe import SceneRecipe
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.station.station import Camera, Station
 
@@ -49,6 +52,16 @@ PLACES = {
     "airplane": (0.33, 0.52, 250.0),
 }
 """Where the built-in objects stand for their portrait: x, y [m] and yaw [degrees] in S."""
+
+SAMPLED: dict[Layout, int] = {
+    "random": 6,
+    "wide": 5,
+    "close": 6,
+    "touching": 6,
+    "packed": 8,
+    "heap": 9,
+}
+"""Objects of a sampled scene by layout."""
 
 
 def household() -> Scene:
@@ -212,6 +225,26 @@ def overlay() -> None:
     save(Overlay(scene, loop.intrinsics).draw(photo, X_SC, placement=check), "overlay.png")
 
 
+def sampled() -> None:
+    """Scenes of each layout, settled, side by side from above at a slant."""
+    pictures = []
+    library, tabletop = load_library("household"), load_station("panda_tabletop")
+    camera = Camera(
+        X_WC=Pose((-0.18, 0.0, 0.78), rpy_deg=(-138.0, 0.0, -90.0)),
+        width=480,
+        height=400,
+        focal=(560.0, 560.0),
+    )
+    for layout, count in SAMPLED.items():
+        recipe = SceneRecipe(library="household", count=count, layout=layout, seed=6)
+        scene = sample_scene(recipe, library, tabletop).scene
+        render(scene, tabletop, camera, "none", "part.png")
+        pictures.append(np.asarray(Image.open(IMAGES / "part.png")))
+    (IMAGES / "part.png").unlink()
+    rows = [np.hstack(pictures[i : i + 3]) for i in (0, 3)]
+    save(np.vstack(rows), "sampled.png")
+
+
 def setup() -> None:
     """Writes the pictures of the setup page, which needs playwright."""
     from tools.setup_pictures import setup
@@ -223,7 +256,7 @@ def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
     kinds = {
         **{"station": station, "board": board, "overlay": overlay},
-        **{"pages": pages, "ports": ports, "setup": setup},
+        **{"pages": pages, "ports": ports, "sampled": sampled, "setup": setup},
     }
     for name in sys.argv[1:] or kinds:
         if name not in kinds:

@@ -36,7 +36,7 @@ GAPS = {"random": 0.001, "wide": 0.040}
 """Least distance of shadows [m]; a finger of the Panda's hand is 22 mm wide."""
 PLACES = 20
 """Random places that are tried for each random yaw."""
-ORDERS = 3
+ORDERS = 4
 """Orders in which objects are packed."""
 
 
@@ -176,12 +176,12 @@ def _packed(
     obstacles: Sequence[Array],
     rng: np.random.Generator,
 ) -> tuple[list[Standing | None], int]:
-    """The densest of several orders; the first is by size, the others are random."""
+    """The densest of several orders; the first two are by size, the others are random."""
     best: list[Standing | None] = [None] * len(chosen)
     value = (-1, 0.0)
     for k in range(ORDERS):
-        order = _large_first(chosen) if k == 0 else rng.permutation(len(chosen)).tolist()
-        found = pack(Occupied(board, obstacles), [chosen[i] for i in order])
+        order = _large_first(chosen) if k < 2 else rng.permutation(len(chosen)).tolist()
+        found = pack(Occupied(board, obstacles), [chosen[i] for i in order], k % 2)
         placed = [place for place in found if place is not None]
         if (len(placed), density(placed)) > value:
             value = (len(placed), density(placed))

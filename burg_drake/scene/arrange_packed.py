@@ -1,11 +1,11 @@
 """Objects packed side by side, as densely as it gets.
 
-They are set down one after the other, in several orders, of which the densest result is kept. Each
-has some yaws to choose from: those that lay the longest side of its shadow along a side of the
-board, or along the longest sides of what stands there. For each yaw the places are looked at where
-it touches two others, or one and the board's edge: there edges of the forbidden polygons cross, or
-have their ends. Of all places the one wins that leaves the convex hull of all shadows smallest; the
-first object stands in the middle.
+They are set down one after the other, in several orders, the first one upright or across; the
+densest result is kept. Each has some yaws to choose from: those that lay the longest side of its
+shadow along a side of the board, or along the longest sides of what stands there. For each yaw the
+places are looked at where it touches two others, or one and the board's edge: there edges of the
+forbidden polygons cross, or have their ends. Of all places the one wins that leaves the convex hull
+of all shadows smallest; the first object stands in the middle.
 """
 
 from __future__ import annotations
@@ -34,12 +34,15 @@ SIDES = 3
 """Longest sides of a shadow that another one is laid along."""
 
 
-def pack(occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]]) -> list[Standing | None]:
+def pack(
+    occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]], quarter: int = 0
+) -> list[Standing | None]:
     """Finds places, one object after the other, and adds them to what stands there.
 
     Args:
         occupied: the board and what stands there.
         objects: with the numbers of their stable poses.
+        quarter: turns of 90 degrees of the first one against the board.
 
     Returns:
         None for those for which there is no room.
@@ -47,7 +50,8 @@ def pack(occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]]) -> list
     found: list[Standing | None] = []
     for shape, pose in objects:
         best, best_area = None, np.inf
-        for yaw in _yaws(shape.outline(pose).hull, occupied.standing)[:MOST_YAWS]:
+        yaws = _yaws(shape.outline(pose).hull, occupied.standing)
+        for yaw in yaws[:MOST_YAWS] if occupied.standing else yaws[quarter : quarter + 1]:
             turned = standing(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
             if place is not None and place_area < best_area - 1e-12:
