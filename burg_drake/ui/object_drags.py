@@ -19,7 +19,7 @@ from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.pointer import Eye
 
 UP = np.array([0.0, 0.0, 1.0])
-FULL_TURN = 4.0 * np.pi
+FULL_TURN = 2.0 * np.pi
 """By which an object turns while the pointer goes across the whole page [rad]."""
 
 

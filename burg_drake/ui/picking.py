@@ -30,7 +30,8 @@ class Picking:
         self._last: tuple[int, tuple[float, float]] | None = None
 
         async def beside(event: Any) -> None:
-            if self._last != (event.client_id, tuple(event.screen_pos)):
+            last, self._last = self._last, None
+            if last != (event.client_id, tuple(event.screen_pos)):
                 actions.ask(lambda: actions.session.select(()), event.client)
 
         scene.on_click()(beside)  # type: ignore[arg-type]
