@@ -15,7 +15,7 @@ from burg_drake.cameras.board_estimate import BoardEstimate
 from burg_drake.cameras.board_pose import BoardPose
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.placement_alignment import Aligner
-from burg_drake.cameras.placement_board import board_picture
+from burg_drake.cameras.placement_board import empty_board
 from burg_drake.cameras.placement_depth import DepthAligner, check_depth
 from burg_drake.cameras.placement_document import (
     CameraPlace,
@@ -131,7 +131,7 @@ def _aligner(
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
     image = straight.color(color).astype(float)
-    picture = board_picture(scene.board, image, intrinsics.K, estimate.X_SC, scale)
+    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale)
     return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
 
 

@@ -31,7 +31,7 @@ EXPLAINED = 0.12
 
 
 @dataclass(frozen=True, eq=False)
-class BoardPicture:
+class EmptyBoard:
     """The empty board as the camera would see it.
 
     Attributes:
@@ -52,9 +52,9 @@ class BoardPicture:
     noise: float
 
 
-def board_picture(
+def empty_board(
     board: Board, image: Array, K: Array, X_SC: Array, scale: tuple[float, float] = (1.0, 1.0)
-) -> BoardPicture | None:
+) -> EmptyBoard | None:
     """Predicts the empty board.
 
     Args:
@@ -87,7 +87,7 @@ def board_picture(
     density = sheet.sum() / max(float(np.prod(board.size)), 1e-9)
     cell = layout.side / layout.cells * float(np.sqrt(density))
     evidence = _evidence(image, ink, white, black, contrast, max(cell, 1.0))
-    return BoardPicture(color, sheet, np.where(sheet, evidence, 0.0), contrast, blur, noise)
+    return EmptyBoard(color, sheet, np.where(sheet, evidence, 0.0), contrast, blur, noise)
 
 
 def _projected(
@@ -207,7 +207,7 @@ def _blurred(
 def _evidence(
     image: Array, ink: Array, white: Array, black: Array, contrast: float, cell: float
 ) -> Array:
-    """(H, W) see `BoardPicture.evidence`; tolerates a pixel of misalignment."""
+    """(H, W) see `EmptyBoard.evidence`; tolerates a pixel of misalignment."""
     kernel = np.ones((3, 3))
     most, least = cv2.dilate(ink, kernel)[..., None], cv2.erode(ink, kernel)[..., None]
     dark, bright = white + (black - white) * most, white + (black - white) * least

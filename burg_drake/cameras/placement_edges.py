@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from burg_drake.cameras.placement_board import BoardPicture
+from burg_drake.cameras.placement_board import EmptyBoard
 from burg_drake.cameras.placement_contour import Contour
 from burg_drake.cameras.placement_view import sampled
 from burg_drake.core.frames import Array
@@ -83,7 +83,7 @@ class Lines:
 
 
 def lines(
-    contour: Contour, image: NDArray[np.float32], picture: BoardPicture, others: Array, reach: float
+    contour: Contour, image: NDArray[np.float32], picture: EmptyBoard, others: Array, reach: float
 ) -> Lines:
     """Samples a photo on the normals of an outline.
 
@@ -108,7 +108,7 @@ def lines(
     return Lines(t, seen.reshape(shape), board.reshape(shape), known, contour.inside(points), other)
 
 
-def far_edges(on: Lines, picture: BoardPicture) -> Edges:
+def far_edges(on: Lines, picture: EmptyBoard) -> Edges:
     """The best place on each line for a step from the object to the background."""
     t, reach = on.t, float(on.t[-1])
     far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
@@ -132,7 +132,7 @@ def far_edges(on: Lines, picture: BoardPicture) -> Edges:
     return Edges(t[best] + STEP / 2, even + 1.0, even, found, usable)
 
 
-def near_edges(on: Lines, picture: BoardPicture) -> Edges:
+def near_edges(on: Lines, picture: EmptyBoard) -> Edges:
     """Edges near to the outline, by least squares: a blurred step between two known colors.
 
     With the object's color F, the background's B(t) and the blurred step s, the image is

@@ -1,6 +1,6 @@
 """Where an object is, roughly: the silhouette that covers most of what the board does not explain.
 
-Silhouettes at several angles slide over the evidence (`BoardPicture.evidence`: +1 something stands
+Silhouettes at several angles slide over the evidence (`EmptyBoard.evidence`: +1 something stands
 here, -1 the board is seen); sliding is a correlation, which finds all translations at once.
 """
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.placement_alignment import Alignment, sectors
-from burg_drake.cameras.placement_board import BoardPicture
+from burg_drake.cameras.placement_board import EmptyBoard
 from burg_drake.cameras.placement_contour import Contour, outline
 from burg_drake.cameras.placement_edges import (
     REACH,
@@ -57,7 +57,7 @@ class SilhouetteAligner:
         picture: the board without objects.
     """
 
-    def __init__(self, view: View, image: Array, picture: BoardPicture) -> None:
+    def __init__(self, view: View, image: Array, picture: EmptyBoard) -> None:
         self.view = view
         self.convincing, self.better, self.clearly, self.strict = 2.8, 0.15, 0.08, False
         self.evidence = picture.evidence

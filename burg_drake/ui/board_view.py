@@ -23,7 +23,7 @@ TABLE_BELOW = 2e-3
 TABLE_COLOR = (222, 216, 206)
 
 
-def board_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
+def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
     """(H, W, 3) the printed sheet from above, its upper edge at the top.
 
     A board that its markers do not fit on is white.
@@ -67,7 +67,7 @@ class BoardView:
         width, height = board.size
         self._scene.add_image(
             "/board",
-            board_picture(board, markers=markers),
+            sheet_picture(board, markers=markers),
             width,
             height,
             format="png",

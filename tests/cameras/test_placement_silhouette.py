@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_board import board_picture
+from burg_drake.cameras.placement_board import empty_board
 from burg_drake.cameras.placement_locate import locate
 from burg_drake.cameras.placement_search import find
 from burg_drake.cameras.placement_shape import Shape, target_shape
@@ -45,7 +45,7 @@ def cover(size: tuple[float, float], place: tuple[float, ...], q: np.ndarray) ->
 
 
 def aligner(image: np.ndarray) -> SilhouetteAligner:
-    picture = board_picture(BOARD, image.astype(float), INTRINSICS.K, X_SC)
+    picture = empty_board(BOARD, image.astype(float), INTRINSICS.K, X_SC)
     assert picture is not None
     return SilhouetteAligner(VIEW, image, picture)
 
@@ -68,8 +68,8 @@ def test_a_plate_is_found_and_measured(look: Look) -> None:
 def test_a_scaled_print_is_an_empty_board_only_to_who_knows_its_scale() -> None:
     scale = (0.97, 0.98)
     image = board_image(BOARD, INTRINSICS, X_SC, scale=scale).astype(float)
-    known = board_picture(BOARD, image, INTRINSICS.K, X_SC, scale)
-    unknown = board_picture(BOARD, image, INTRINSICS.K, X_SC)
+    known = empty_board(BOARD, image, INTRINSICS.K, X_SC, scale)
+    unknown = empty_board(BOARD, image, INTRINSICS.K, X_SC)
     assert known is not None and unknown is not None
     assert (known.evidence[known.sheet] > 0.0).mean() < 0.01
     assert (unknown.evidence[unknown.sheet] > 0.0).mean() > 0.1
@@ -77,7 +77,7 @@ def test_a_scaled_print_is_an_empty_board_only_to_who_knows_its_scale() -> None:
 
 def test_an_empty_board_in_uneven_light_is_empty() -> None:
     image = drawing([], Look(blur=0.8, noise=3.0, gain=0.8, gradient=0.4))
-    picture = board_picture(BOARD, image.astype(float), INTRINSICS.K, X_SC)
+    picture = empty_board(BOARD, image.astype(float), INTRINSICS.K, X_SC)
     assert picture is not None
     here = picture.sheet
     assert (picture.evidence[here] > 0.0).mean() < 0.01
@@ -97,4 +97,4 @@ def test_a_plate_that_is_not_there_is_not_found_in_its_neighbour() -> None:
 
 
 def test_black_photos_have_no_contrast() -> None:
-    assert board_picture(BOARD, np.zeros((240, 320, 3)), INTRINSICS.K, X_SC) is None
+    assert empty_board(BOARD, np.zeros((240, 320, 3)), INTRINSICS.K, X_SC) is None
