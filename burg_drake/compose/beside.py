@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from burg_drake.compose.checker import known_scene
+from burg_drake.compose.checker import known_scene, with_lost
 from burg_drake.compose.editor import Editor
 from burg_drake.compose.grasp_watch import Counted, GraspWatch
-from burg_drake.compose.history import Step
 from burg_drake.compose.opening import Opened
 from burg_drake.compose.settling import Proposal, Settle
 from burg_drake.compose.view import View
@@ -70,16 +69,16 @@ class BesideEditor(Editor):
             proposal = proposal or self._proposal
             if proposal is None:
                 raise InvalidInputError("there is no proposal to accept; settle the scene first")
-            if self._history.state.document != proposal.start:
+            before = self._history.state
+            if known_scene(before, self._storage.place).document != proposal.start:
                 raise InvalidInputError(
                     "the scene has changed since it was settled; settle it again, or undo"
                 )
             self._proposal = None
             self._drag = None
-            before = self._history.state
-            state = replace(before, document=proposal.document)
+            state = replace(before, document=with_lost(proposal.document, before))
             moved = [n for n, i in state.instances.items() if i != before.instance(n)]
-            return self._take(Step(proposal.label, state.select(moved)))
+            return self._edit(proposal.label, state.select(moved))
 
     def revert(self) -> View:
         """Drops the proposal, and what is being done for one."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from burg_drake.compose.state import State
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.scene import Scene, SceneDocument
 from burg_drake.scene.validate import SceneIssue
 from burg_drake.station.station import Station
 
@@ -81,3 +81,13 @@ def known_scene(state: State, path: Path) -> Scene:
         background=tuple(i for i in state.document.background if i not in gone),
     )
     return Scene(document, state.library, path)
+
+
+def with_lost(document: SceneDocument, state: State) -> SceneDocument:
+    """What became of a `known_scene`, with the instances that it was without."""
+    gone = [state.instance(name) for name in lost(state)]
+    return replace(
+        document,
+        instances=(*document.instances, *(i for i in state.document.instances if i in gone)),
+        background=(*document.background, *(i for i in state.document.background if i in gone)),
+    )

@@ -87,7 +87,7 @@ class Editor:
             selected = replace(self._history.state, selection=self._state.selection)
             state = command.apply(selected, self._surroundings)
             self._drag = None
-            return self._take(Step(command.label, state))
+            return self._edit(command.label, state)
 
     def undo(self) -> View:
         """Takes the last step back, and selects what it had changed.
@@ -169,7 +169,7 @@ class Editor:
             self._require(drag)
             self._drag = None
             state = replace(self._state, library=self._history.state.library)
-            return self._take(Step(label_of("move", drag.names), state))
+            return self._edit(label_of("move", drag.names), state)
 
     def put_back(self, drag: Drag) -> View:
         """Ends a drag without a step; see `Drag.cancel`."""
@@ -228,6 +228,13 @@ class Editor:
                         callback(view)
                     except Exception:  # what listens must not undo what was done
                         logging.getLogger(__name__).exception("a listener of a session failed")
+
+    def _edit(self, label: str, state: State) -> View:
+        """Takes a step after which the scene is not any more the one that was sampled."""
+        document = state.document
+        if document != self._history.state.document and document.origin is not None:
+            state = replace(state, document=replace(document, origin=None))
+        return self._take(Step(label, state))
 
     def _take(self, step: Step) -> View:
         before = self._history.state

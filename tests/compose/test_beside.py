@@ -6,11 +6,14 @@ from __future__ import annotations
 import os
 import shutil
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from burg_drake.compose import AddObject, ComposeSession, Delete, Move
+from burg_drake.compose.checker import known_scene
+from burg_drake.compose.settling import Proposal
 from burg_drake.compose.view import View
 from burg_drake.compose.worker import Cancelled
 from burg_drake.core.errors import InvalidInputError, SimulationError, UnknownNameError
@@ -97,6 +100,12 @@ def test_a_library_that_loses_an_object_is_told(station: Station, library: Path)
         session.do(Delete(("marble",)))
         session.save()
         assert set(load_scene(saved).instances) == {"can", "can_2"}
+        session.undo()
+        known = known_scene(session.view.state, saved).document
+        assert [instance.object for instance in known.instances] == ["can", "can"]
+        settled = replace(known, instances=known.instances[:1])  # as if the other one had fallen
+        kept = session.accept(Proposal(known, settled, {}, {}, ("can_2",), 1.0))
+        assert list(kept.instances) == ["can", "marble"]
         file.write_text("nonsense")
         assert "cannot be read any more" in session.refresh().notices[-1]
         assert session.undo().instances

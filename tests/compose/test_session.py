@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move
+from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
+from burg_drake.generation.sample import sample_scene
+from burg_drake.scene.recipe import SceneRecipe
+from burg_drake.scene.scene import save_scene
 from burg_drake.station.station import Station
 
 
@@ -69,6 +72,21 @@ def test_a_file_that_was_changed_is_not_overwritten(session: ComposeSession) -> 
     with pytest.raises(UnsavedChanges):
         session.load()
     assert session.load(discard=True).status == {"mug": "ok"}
+
+
+def test_a_sampled_scene_that_is_changed_forgets_how_it_was_made(
+    station: Station, tmp_path: Path
+) -> None:
+    recipe = SceneRecipe(library="household", count=2, station="wsg_tabletop", settle=False)
+    path = tmp_path / "sampled.yaml"
+    save_scene(sample_scene(recipe).scene.document, path)
+    with ComposeSession.open(path, station) as session:
+        name = next(iter(session.view.instances))
+        assert session.view.document.origin is not None
+        session.do(Rename(name, "other"))
+        session.save()
+        assert load_scene(path).document.origin is None
+        assert session.undo().document.origin is not None
 
 
 def test_what_is_not_moved_keeps_its_digits(station: Station, tmp_path: Path) -> None:
