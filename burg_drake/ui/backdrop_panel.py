@@ -11,7 +11,7 @@ from burg_drake.compose.view import View
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.ui.board_layers import BoardLayers, Sheet
 from burg_drake.ui.buttons import quiet_button, upload_button
-from burg_drake.ui.live_picture import LivePicture
+from burg_drake.ui.live_picture import LETS_GO, LivePicture
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import all_of, box, quiet
 
@@ -91,7 +91,11 @@ class BackdropPanel:
         """
         from burg_drake.cameras.sources import open_source
 
-        number = self._chosen_camera()
+        number, live = self._chosen_camera(), self._live
+        if live is not None:
+            self._watch(False)
+            self._on.value = False
+            live.wait(LETS_GO)
         with open_source(number) as source:
             frame = source.read()
         self._use(None if frame is None else frame.image, f"camera {number}")
@@ -116,10 +120,11 @@ class BackdropPanel:
 
     def _watch(self, on: bool) -> None:
         """Shows what a camera sees from now on, or no more."""
+        before = self._live
         self.close()
         if on:
             camera, board = self._chosen_camera(), self._actions.session.view.document.board
-            self._live = LivePicture(camera, board, self._seen)
+            self._live = LivePicture(camera, board, self._seen, before)
 
     def _seen(self, what: BoardPicture | str) -> None:
         """Called by the live picture's thread."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import viser
 
 from burg_drake.compose.view import STATUS, View
+from burg_drake.core.errors import listing as names_of
 from burg_drake.ui.panel_text import all_of, box, dot, listing, quiet
 from burg_drake.ui.status_colors import look_of
 from burg_drake.visualization.markup import Child, element
@@ -26,19 +27,24 @@ class CheckPanel:
 
     def show(self, view: View) -> None:
         """Brings the panel to a view."""
-        text = all_of(box(*_found(view)))
+        text = all_of(box(*findings(view)))
         if self._text.content != text:
             self._text.content = text
 
 
-def _found(view: View) -> list[Child]:
+def findings(view: View) -> list[Child]:
+    """What there is to say about the scene."""
     if not view.instances:
         return [quiet("Add objects; they are checked as they are moved.")]
-    if not view.issues:
+    unknown = [name for name, status in view.status.items() if status == "unknown"]
+    if not view.issues and not unknown:
         return [dot(look_of("ok").hex), "All objects are on the board, free and supported."]
     rows = [
         element("span", dot(look_of(STATUS[issue.kind]).hex), issue.message)
         for issue in view.issues[:MOST]
     ]
+    if unknown:
+        line = f"cannot be checked: {names_of(unknown)}"
+        rows.insert(0, element("span", dot(look_of("unknown").hex), line))
     more = len(view.issues) - MOST
     return [listing(rows), quiet(f"and {more} more" if more > 0 else None)]

@@ -38,6 +38,7 @@ class Gizmo:
         self._scene, self._actions = scene, actions
         self._handle: viser.TransformControlsHandle | None = None
         self._drag: Drag | None = None
+        self._who: int | None = None
         self._X_SGi = np.eye(4)
         self._start: dict[str, Array] = {}
 
@@ -57,6 +58,17 @@ class Gizmo:
         self._handle.wxyz = quaternion_from_rotation(R_SG)
         self._handle.visible = True
 
+    def drop(self, client_id: int) -> None:
+        """A page is gone; what it held stays where it is."""
+        self._actions.ask(lambda: self._end(client_id))
+
+    def put_back(self, client_id: int) -> bool:
+        """Puts back what a page drags; False if it drags nothing."""
+        if self._who != client_id or self._drag is None or self._drag.is_over:
+            return False
+        self._drag.cancel()
+        return True
+
     def _made(self) -> viser.TransformControlsHandle:
         handle = self._scene.add_transform_controls(
             "/gizmo",
@@ -71,29 +83,33 @@ class Gizmo:
             X_SG = make_pose(
                 rotation_from_quaternion(event.target.wxyz), np.array(event.target.position)
             )
+            who, client = event.client_id, event.client
             if event.phase == "start":
-                self._actions.ask(lambda: self._begin(X_SG), event.client)
+                self._actions.ask(lambda: self._begin(who, X_SG), client)
             elif event.phase == "update":
-                self._actions.ask(lambda: self._move(X_SG), event.client, key="gizmo")
+                self._actions.ask(lambda: self._move(who, X_SG), client, key=f"gizmo {who}")
             else:
-                self._actions.ask(self._end, event.client)
+                self._actions.ask(lambda: self._end(who), client)
 
         return handle
 
-    def _begin(self, X_SG: Array) -> None:
+    def _begin(self, who: int | None, X_SG: Array) -> None:
+        self._who = who
         view = self._actions.session.view
         self._X_SGi = X_SG
         self._start = {name: view.X_SO(name) for name in view.selection}
         self._drag = self._actions.session.drag(view.selection)
 
-    def _move(self, X_SG: Array) -> None:
-        if self._drag is None or self._drag.is_over:
+    def _move(self, who: int | None, X_SG: Array) -> None:
+        if who != self._who or self._drag is None or self._drag.is_over:
             return
         X = X_SG @ inverse(self._X_SGi)
         self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()})
 
-    def _end(self) -> None:
-        drag, self._drag = self._drag, None
+    def _end(self, who: int | None) -> None:
+        if who != self._who:
+            return
+        drag, self._drag, self._who = self._drag, None, None
         if drag is not None and not drag.is_over:
             drag.end()
         self.show(self._actions.session.view)

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 PAUSE = 0.5
 """Between two pictures [s]; each is some hundred kilobytes for every page."""
 
+LETS_GO = 10.0
+"""For a camera that is closed to be free for others [s]."""
+
 
 class LivePicture:
     """Looks at a board in a thread of its own until it is closed.
@@ -23,18 +26,25 @@ class LivePicture:
         camera: as of `cameras.sources.open_source`.
         board: that it sees.
         show: gets each picture, or one line that says why there is none.
+        after: another one that is closed, and may have the camera yet; it is waited for.
 
     Attributes:
         camera, board: as given.
     """
 
     def __init__(
-        self, camera: str, board: Board, show: Callable[[BoardPicture | str], None]
+        self,
+        camera: str,
+        board: Board,
+        show: Callable[[BoardPicture | str], None],
+        after: LivePicture | None = None,
     ) -> None:
         self.camera, self.board = camera, board
         self._show = show
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="live-picture", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(after,), name="live-picture", daemon=True
+        )
         self._thread.start()
 
     def close(self) -> None:
@@ -45,10 +55,12 @@ class LivePicture:
         """Waits for the last picture of a source that has an end [s]."""
         self._thread.join(timeout)
 
-    def _run(self) -> None:
+    def _run(self, after: LivePicture | None) -> None:
         from burg_drake.cameras.board_picture import BoardRectifier
         from burg_drake.cameras.sources import open_source
 
+        if after is not None:
+            after.wait(LETS_GO)
         try:
             rectifier = BoardRectifier(self.board)
             with open_source(self.camera) as source:

@@ -66,9 +66,17 @@ class ObjectPictures:
         with self._condition:
             self._closed = True
             self._condition.notify()
-        self._end_worker()
+            if self._worker is not None:
+                self._worker[0].kill()
+        self._thread.join()
 
     def _run(self) -> None:
+        try:
+            self._make_all()
+        finally:
+            self._end_worker()
+
+    def _make_all(self) -> None:
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: bool(self._wanted) or self._closed)
@@ -101,9 +109,12 @@ class ObjectPictures:
         missing = missing_render_libraries()
         if missing:
             raise MissingDependencyError(describe_missing(missing))
-        if self._worker is None:
-            self._worker = start_worker("burg_drake.ui.picture_worker")
-        process, connection = self._worker
+        with self._condition:
+            if self._closed:
+                raise BurgError("the page was closed")
+            if self._worker is None:
+                self._worker = start_worker("burg_drake.ui.picture_worker")
+            process, connection = self._worker
         try:
             connection.send((str(self.library.root), *wanted, SIZE))
             png, why = connection.recv()
@@ -120,5 +131,5 @@ class ObjectPictures:
         if self._worker is not None:
             process, connection = self._worker
             connection.close()
-            process.terminate()
+            process.kill()
             process.wait()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -60,7 +60,6 @@ class _Nodes:
     color: Rgb
     tint: viser.MeshHandle | None = None
     drawn: tuple[bytes, str, bool] | None = None
-    handles: list[Any] = field(default_factory=list)
 
 
 class SceneView:
@@ -84,11 +83,6 @@ class SceneView:
         self._nodes: dict[str, _Nodes] = {}
         self._coloring: Coloring = "objects"
         self._made = 0
-
-    @property
-    def coloring(self) -> Coloring:
-        """Which colours objects have."""
-        return self._coloring
 
     def use(self, shapes: ObjectShapes) -> None:
         """Shows objects of another library from now on."""

@@ -166,7 +166,8 @@ class SetupPage:
         }
 
     def _let_go(self, client: viser.ClientHandle | None) -> None:
-        if client is None or not self._drags.put_back(client.client_id):
+        who = None if client is None else client.client_id
+        if who is None or not (self._drags.put_back(who) or self._gizmo.put_back(who)):
             self._session.select(())
 
     def _attach(self, handle: Any, name: str) -> None:
@@ -208,6 +209,7 @@ class SetupPage:
 
     async def _gone(self, client: viser.ClientHandle) -> None:
         self._drags.drop(client.client_id)
+        self._gizmo.drop(client.client_id)
 
 
 def _shown(view: View) -> dict[str, Shown]:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from burg_drake import load_station
 from burg_drake.cameras.board_picture import BoardPicture
+from burg_drake.compose import AddObject, ComposeSession
 from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.scene import Board
-from burg_drake.ui.board_view import board_picture
+from burg_drake.ui.board_view import sheet_picture
+from burg_drake.ui.check_panel import findings
 from burg_drake.ui.footprint import footprint
 from burg_drake.ui.live_picture import LivePicture
-from burg_drake.ui.panel_text import notice, table
+from burg_drake.ui.panel_text import all_of, notice, table
 from burg_drake.ui.scene_files import scene_names
 from burg_drake.ui.shortcuts import SHORTCUTS, overlay_text
 
@@ -32,7 +36,7 @@ def test_a_footprint_is_the_outline_with_a_rounded_margin() -> None:
 
 def test_the_boards_picture_has_its_markers_where_they_are_printed() -> None:
     board = Board()
-    picture = board_picture(board)
+    picture = sheet_picture(board)
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_ARUCO_MIP_36h12)
     corners, ids, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(picture)
     assert sorted(ids.ravel()) == sorted(board.layout.ids)
@@ -46,7 +50,7 @@ def test_the_boards_picture_has_its_markers_where_they_are_printed() -> None:
 def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: Path) -> None:
     board = Board()
     corners = np.array([[300, 250], [1100, 180], [1200, 720], [180, 800]], dtype=np.float32)
-    sheet = board_picture(board)
+    sheet = sheet_picture(board)
     height, width = sheet.shape[:2]
     edges = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float32)
     H = cv2.getPerspectiveTransform(edges, corners)
@@ -58,6 +62,14 @@ def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: 
     live.close()
     assert len(found) == 1 and isinstance(found[0], BoardPicture), found
     assert found[0].error < 1e-3 and len(found[0].ids) == len(board.layout.ids)
+
+
+def test_what_cannot_be_checked_is_not_called_sound(tmp_path: Path) -> None:
+    with ComposeSession.open("household", load_station("wsg_tabletop"), folder=tmp_path) as session:
+        view = session.do(AddObject("mug"))
+    assert "free and supported" in all_of(*findings(view))
+    text = all_of(*findings(replace(view, status={"mug": "unknown"})))
+    assert "cannot be checked: mug" in text and "supported" not in text
 
 
 def test_only_files_that_name_a_library_are_offered_as_scenes(tmp_path: Path) -> None:
