@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # In step with scene.recipe and scene.layout, which import numpy; a test compares them.
 DEFAULT_COUNT, DEFAULT_TRIES, DEFAULT_ATTEMPTS = 6, 100, 100
+MOST_OBJECTS = 1000
 SPACINGS = ("wide", "close", "touching")
 
 
@@ -24,6 +25,18 @@ def add_recipe(parser: Any) -> None:
     _add_objects(parser)
     _add_layout(parser)
     _add_rules(parser)
+
+
+def recipe_defaults() -> dict[str, Any]:
+    """Values of the options that nobody gave, by name."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_recipe(parser)
+    return vars(parser.parse_args([]))
+
+
+def written(name: str) -> str:
+    """How the option of a value is written."""
+    return "-n" if name == "objects" else f"--{name.replace('_', '-')}"
 
 
 def _add_objects(parser: Any) -> None:
@@ -124,9 +137,14 @@ def recipe_of(
 ) -> SceneRecipe:
     """The recipe that the options ask for, with references that start from a folder."""
     from burg_drake.apps.scene_file import library_reference, station_reference
+    from burg_drake.core.errors import InvalidInputError
     from burg_drake.scene.board import Board
     from burg_drake.scene.recipe import SceneRecipe
 
+    if arguments.objects > MOST_OBJECTS:
+        raise InvalidInputError(
+            f"-n {arguments.objects}: a scene has {MOST_OBJECTS} objects at most"
+        )
     names = [name.strip() for name in (arguments.only or "").split(",")]
     layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
     return SceneRecipe(

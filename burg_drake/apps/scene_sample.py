@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_quiet, add_verb
-from burg_drake.apps.recipe_options import add_recipe, recipe_of
+from burg_drake.apps.recipe_options import add_recipe, recipe_defaults, recipe_of, written
 
 if TYPE_CHECKING:
     from burg_drake.generation.again import Again
@@ -73,7 +73,10 @@ def run_sample(arguments: argparse.Namespace) -> int:
     if (arguments.library is None) == (arguments.again is None):
         raise InvalidInputError("give a LIBRARY to sample from, or --again SCENE")
     if arguments.again is not None:
+        _require_no_recipe(arguments)
         return _again(arguments)
+    if arguments.force:
+        raise InvalidInputError("--force goes with --again")
     if single and arguments.count > 1:
         raise InvalidInputError(
             f"-o {arguments.output} is a file, for a single scene; give a folder for"
@@ -93,11 +96,16 @@ def _one(
 ) -> int:
     """Writes one file."""
     from burg_drake.core.files import require_writable
+    from burg_drake.core.progress import Pace, Progress, Reporter
     from burg_drake.generation.sample import SceneSampler
     from burg_drake.scene.scene import save_scene
 
     require_writable(arguments.output)
-    sampled = SceneSampler(recipe, library, station).sample(0)
+    with Reporter(not arguments.quiet) as reporter:
+        pace = Pace(
+            reporter.show, Progress("sampling", 0, recipe.attempts, unit="attempts at most")
+        )
+        sampled = SceneSampler(recipe, library, station).sample(0, refused=pace.step)
     if sampled.accepted:
         save_scene(sampled.scene.document, arguments.output)
     _tell_refused(Counter(sampled.refused))
@@ -157,6 +165,21 @@ def _tell(found: SampledFolder, arguments: argparse.Namespace) -> int:
     return 0 if accepted == arguments.count else 1
 
 
+def _require_no_recipe(arguments: argparse.Namespace) -> None:
+    """Refuses options of a recipe beside --again, which has that of its scene.
+
+    Raises:
+        InvalidInputError: there is one.
+    """
+    from burg_drake.core.errors import InvalidInputError
+
+    for name, default in recipe_defaults().items():
+        if getattr(arguments, name) != default:
+            raise InvalidInputError(
+                f"--again takes the recipe of its scene: leave out {written(name)}"
+            )
+
+
 def _again(arguments: argparse.Namespace) -> int:
     """Makes a scene again, and says whether it is the same."""
     from burg_drake.apps.scene_file import require_another_file
@@ -207,9 +230,7 @@ def _why(sampled: SampledScene, recipe: SceneRecipe) -> str:
     """Why no attempt was accepted, and what helps."""
     told = f"none of {sampled.attempts} attempts was accepted"
     if sampled.missing:
-        told += (
-            f"; the best has room for {sampled.placed} of {recipe.count} objects (--fewer takes it)"
-        )
+        told += "; an object found no place (--fewer accepts scenes without it)"
     return f"{told}; give a larger --size, a smaller -n, another --seed or more --attempts"
 
 

@@ -7,7 +7,7 @@ scene is the same alone, among others, and on any worker.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -30,7 +30,7 @@ from burg_drake.station.station import MODEL_NAMES, Station, load_station
 
 NO_ROOM = "an object found no place"
 REASONS = {
-    "out_of_bounds": "an object came to lie beyond the board's edge",
+    "out_of_bounds": "an object came to lie beyond the edge of board or table",
     "in_ground": "an object is in the ground",
     "overlap": "objects overlap, or are in what stands around the board",
 }
@@ -83,17 +83,24 @@ class SceneSampler:
         self._check = SceneCheck(station, library)
         self._obstacles = boxes_in_scene(station)
 
-    def sample(self, number: int, folder: Path | None = None) -> SampledScene:
+    def sample(
+        self,
+        number: int,
+        folder: Path | None = None,
+        *,
+        refused: Callable[[], None] | None = None,
+    ) -> SampledScene:
         """The scene of a number.
 
         Args:
             number: from 0.
             folder: of the file that the scene is to be written to.
+            refused: called when an attempt was.
 
         Raises:
             BurgError: the station or an object cannot be built.
         """
-        refused: Counter[str] = Counter()
+        reasons: Counter[str] = Counter()
         tries = 0
         best: tuple[Scene, tuple[str, ...]] | None = None
         for attempt in range(1, self.recipe.attempts + 1):
@@ -103,13 +110,15 @@ class SceneSampler:
             reason, scene = self._judged(scene) if enough else (NO_ROOM, scene)
             if not reason:
                 scene = self._with_origin(scene, number, attempt)
-                return SampledScene(scene, number, True, missing, attempt, tries, dict(refused))
-            refused[reason] += 1
+                return SampledScene(scene, number, True, missing, attempt, tries, dict(reasons))
+            reasons[reason] += 1
+            if refused is not None:
+                refused()
             if best is None or len(scene.instances) > len(best[0].instances):
                 best = scene, missing
         assert best is not None
         return SampledScene(
-            best[0], number, False, best[1], self.recipe.attempts, tries, dict(refused)
+            best[0], number, False, best[1], self.recipe.attempts, tries, dict(reasons)
         )
 
     def _draw(self, number: int, attempt: int, folder: Path) -> tuple[Scene, tuple[str, ...], int]:

@@ -57,8 +57,8 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
     assert main([*command, "-o", str(file)]) == 1
     assert capsys.readouterr().err == (
         "burg-drake: 3 refused: an object found no place\n"
-        "burg-drake: no scene: none of 3 attempts was accepted; the best has room for 1 of 2"
-        " objects (--fewer takes it); give a larger --size, a smaller -n, another --seed or more"
+        "burg-drake: no scene: none of 3 attempts was accepted; an object found no place (--fewer"
+        " accepts scenes without it); give a larger --size, a smaller -n, another --seed or more"
         " --attempts\n"
     )
     assert not file.exists()
@@ -79,7 +79,13 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
             ["household", "--size", "A9", "-o", "x.yaml"],
             "no board has size 'A9'; known: A0, A1, A2, A3, A4; or WxH in mm: 700x500",
         ),
+        (["household", "-n", "5000", "-o", "x"], "-n 5000: a scene has 1000 objects at most"),
+        (["household", "--force", "-o", "x"], "--force goes with --again"),
         (["--again", "tabletop_six", "-o", "x.yaml"], "has no `origin`: it was not sampled"),
+        (
+            ["--again", "tabletop_six", "--seed", "3", "-o", "x.yaml"],
+            "--again takes the recipe of its scene: leave out --seed",
+        ),
     ],
 )
 def test_what_cannot_be(arguments: list[str], message: str, capsys: Captured) -> None:
