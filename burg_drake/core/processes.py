@@ -10,11 +10,15 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from multiprocessing.connection import Connection, Pipe
 
 FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process from outside: the system when memory runs out, a batch system, a user.
 All others (SIGSEGV, SIGABRT) are of its own making, and would come again."""
+LOOK = 1.0
+"""Between two looks of a worker whether its parent is there [s]."""
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
 }
@@ -59,6 +63,19 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     theirs.close()
     return process, ours
+
+
+def end_with_parent() -> None:
+    """Has this worker process end when its parent does, also while it is at work and does not look
+    at its pipe: a parent that is killed cannot end it."""
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent-watch", daemon=True).start()
 
 
 def cause_of_death(process: subprocess.Popen[bytes], last_words: str = "") -> str:

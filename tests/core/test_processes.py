@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -61,3 +62,31 @@ def test_what_ends_a_worker_from_outside(echo: str, number: str, outside: bool) 
 
 def test_there_is_a_processor() -> None:
     assert default_workers() >= 1
+
+
+CHILD = """
+import time
+from burg_drake.core.processes import end_with_parent
+end_with_parent()
+print("at work", flush=True)
+time.sleep(60)
+print("left alone", flush=True)
+"""
+PARENT = f"""
+import subprocess, sys
+subprocess.Popen([sys.executable, "-c", {CHILD!r}]).wait()
+"""
+
+
+def test_a_worker_at_work_ends_with_a_parent_that_is_killed() -> None:
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert parent.stdout is not None
+    assert parent.stdout.readline() == "at work\n"
+    parent.kill()
+    assert parent.stdout.read() == ""  # to the end of both
+    parent.wait()
