@@ -173,6 +173,13 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
         setup.click("Save printout")
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
 
+    setup.click("Clear scene")
+    until(lambda: not setup.view.instances, "an empty board")
+    setup.click("Load scene")
+    setup.click("Discard them")
+    until(lambda: setup.view.saved, "loaded")
+    assert list(setup.view.instances) == ["box", "can"]
+
 
 def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_path: Path) -> None:
     setup.open()
