@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
+from burg_drake.compose.amending import Amending
 from burg_drake.compose.checker import SceneChecker
 from burg_drake.compose.command import Command, label_of
 from burg_drake.compose.drag import Drag
@@ -40,6 +41,7 @@ class Editor:
         self._callbacks: list[Callback] = []
         self._told = 0
         self._checker = SceneChecker(station)
+        self._amending = Amending()
         self._planar = True
         self._serial = self._revision = 0
         self._notices: tuple[str, ...] = ()
@@ -76,8 +78,13 @@ class Editor:
 
         return unsubscribe
 
-    def do(self, command: Command) -> View:
+    def do(self, command: Command, *, field: str = "") -> View:
         """Takes a step; none if the command changes nothing.
+
+        Args:
+            command: to do.
+            field: that the user is typing in: the step takes the place of the last one if that is
+                of the same field and recent, and neither was anything selected since.
 
         Raises:
             BurgError: it cannot be taken; one clear line says why.
@@ -87,7 +94,7 @@ class Editor:
             selected = replace(self._history.state, selection=self._state.selection)
             state = command.apply(selected, self._surroundings)
             self._drag = None
-            return self._edit(command.label, state)
+            return self._edit(command.label, state, field)
 
     def undo(self) -> View:
         """Takes the last step back, and selects what it had changed.
@@ -112,6 +119,7 @@ class Editor:
             UnknownNameError: one is not there.
         """
         with self._alone():
+            self._amending.end()
             return self._show(self._state.select(names))
 
     def restrict_movement(self, planar: bool) -> View:
@@ -229,12 +237,19 @@ class Editor:
                     except Exception:  # what listens must not undo what was done
                         logging.getLogger(__name__).exception("a listener of a session failed")
 
-    def _edit(self, label: str, state: State) -> View:
+    def _edit(self, label: str, state: State, field: str = "") -> View:
         """Takes a step after which the scene is not any more the one that was sampled."""
         document = state.document
         if document != self._history.state.document and document.origin is not None:
             state = replace(state, document=replace(document, origin=None))
-        return self._take(Step(label, state))
+        if self._amending.allows(field, self._history):
+            label = self._history.undo_label or label
+            self._history.undo()
+            self._storage.record_position(self._history)
+            self._revision += 1
+        step = Step(label, state)
+        self._amending.begin(field, step)
+        return self._take(step)
 
     def _take(self, step: Step) -> View:
         before = self._history.state
@@ -249,6 +264,7 @@ class Editor:
         with self._alone():
             state = there()
             self._drag = None
+            self._amending.end()
             self._storage.record_position(self._history)
             self._revision += 1
             return self._show(state)

@@ -22,7 +22,7 @@ Complaint = Callable[[Any, str], None]
 _log = logging.getLogger("burg_drake")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Asked:
     """An action that waits.
 
@@ -31,12 +31,14 @@ class _Asked:
         who: asked for it, and hears of its errors.
         key: a newer action of the same key takes the place of one that is still the last to wait.
         due: when it may run if nothing waits behind it [s of the monotonic clock].
+        patient: it hurries none that waits before it, but runs before that.
     """
 
     action: Action
     who: Any
     key: str
     due: float
+    patient: bool
 
 
 class ActionQueue:
@@ -55,7 +57,15 @@ class ActionQueue:
         self._thread = threading.Thread(target=self._run, name="setup-page", daemon=True)
         self._thread.start()
 
-    def ask(self, action: Action, who: Any = None, *, key: str = "", after: float = 0.0) -> None:
+    def ask(
+        self,
+        action: Action,
+        who: Any = None,
+        *,
+        key: str = "",
+        after: float = 0.0,
+        patient: bool = False,
+    ) -> None:
         """Puts an action last.
 
         Args:
@@ -64,13 +74,15 @@ class ActionQueue:
             key: it replaces an action of the same key that nothing waits behind, as of a drag only
                 the last position counts.
             after: it waits that long for a newer one of its key [s], but never holds up others.
+            patient: it only shows what is so, and does not hurry those that wait before it.
         """
-        asked = _Asked(action, who, key, time.monotonic() + after)
+        asked = _Asked(action, who, key, time.monotonic() + after, patient)
         with self._condition:
             if self._closed:
                 return
-            if key and self._waiting and self._waiting[-1].key == key:
-                self._waiting.pop()
+            last = self._last(patient=patient)
+            if key and last is not None and last.key == key:
+                self._waiting.remove(last)
             self._waiting.append(asked)
             self._condition.notify_all()
 
@@ -97,19 +109,29 @@ class ActionQueue:
                 _log.exception("the setup page could not do what it was asked")
                 self._complain(asked.who, f"that failed unexpectedly: {error!r}")
 
+    def _last(self, *, patient: bool) -> _Asked | None:
+        """The last action that waits; the last that is not patient for those that are not."""
+        return next((a for a in reversed(self._waiting) if patient or not a.patient), None)
+
     def _next(self) -> _Asked | None:
         """The next action, as soon as it may run; None at the end."""
         with self._condition:
             self._busy = False
             self._condition.notify_all()
             while True:
-                if self._waiting:
-                    left = self._waiting[0].due - time.monotonic()
-                    if left <= 0.0 or len(self._waiting) > 1 or self._closed:
-                        self._busy = True
-                        return self._waiting.popleft()
-                    self._condition.wait(left)
-                elif self._closed:
+                now = time.monotonic()
+                if (ready := self._ready(now)) is not None:
+                    self._busy = True
+                    self._waiting.remove(ready)
+                    return ready
+                if self._closed:
                     return None
-                else:
-                    self._condition.wait()
+                self._condition.wait(min((a.due - now for a in self._waiting), default=None))
+
+    def _ready(self, now: float) -> _Asked | None:
+        """The first that may run at a time."""
+        hurried = self._closed or len([a for a in self._waiting if not a.patient]) > 1
+        for asked in self._waiting:
+            if asked.due <= now or (hurried and not asked.patient) or self._closed:
+                return asked
+        return None

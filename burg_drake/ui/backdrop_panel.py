@@ -138,7 +138,7 @@ class BackdropPanel:
             else:
                 self._lay_found(what, f"camera {live.camera}")
 
-        self._actions.ask(lay, key="live picture")
+        self._actions.ask(lay, key="live picture", patient=True)
 
     def _fade(self, opacity: float) -> None:
         if self._sheet is not None:

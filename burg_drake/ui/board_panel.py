@@ -50,8 +50,8 @@ class BoardPanel:
         self._size.value = OWN if self._own or name is None else name
         self._way.value = UPRIGHT if size[1] > size[0] else ACROSS
         self._way.visible = not self._own
-        self._extents.visible = self._own
-        self._extents.value = tuple(round(1e3 * side, 3) for side in size)
+        self._extents.handle.visible = self._own
+        self._extents.show(tuple(round(1e3 * side, 3) for side in size))
 
     def _choose(self, name: str | None) -> None:
         name = name or self._size.value
@@ -63,8 +63,8 @@ class BoardPanel:
 
     def _resize(self, extents_mm: tuple[float, float]) -> None:
         width, depth = (round(1e-3 * side, 6) for side in extents_mm)
-        self._set((width, depth))
+        self._set((width, depth), field="board")
 
-    def _set(self, size: tuple[float, float]) -> None:
+    def _set(self, size: tuple[float, float], field: str = "") -> None:
         session = self._actions.session
-        session.do(SetBoard(replace(session.view.document.board, size=size)))
+        session.do(SetBoard(replace(session.view.document.board, size=size)), field=field)

@@ -33,7 +33,7 @@ class FilePanel:
         self._shown_name = ""
         icon = viser.Icon
         with gui.add_folder("Save"):
-            self._name: Any = gui.add_text("Name", "", hint="Of the file, and of the scene")
+            self._name: Any = gui.add_text("Name", "", hint="Of the file")
             actions.clicked_by(strong_button(gui, "Save scene", icon=icon.DEVICE_FLOPPY), self.save)
         with gui.add_folder("Load"):
             self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
@@ -66,8 +66,9 @@ class FilePanel:
         """Brings the panel to a view; nothing of it changes while something is dragged."""
         if view.dragging:
             return
-        if view.document.name != self._shown_name:
-            self._shown_name = self._name.value = view.document.name
+        name = view.path.stem if view.path else view.document.name
+        if name != self._shown_name:
+            self._shown_name = self._name.value = name
         names = scene_names(self._actions.session.folder) or (NO_SCENES,)
         if names != self._scene.options:
             self._scene.options = names

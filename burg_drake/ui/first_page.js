@@ -78,4 +78,42 @@
     },
     true,
   );
+
+  // What is typed counts once Enter is pressed or the field is left: a key says so that nobody
+  // presses, which the program knows as a command (shortcuts.py).
+  const isTypedIn = (element) =>
+    element instanceof HTMLInputElement &&
+    ["text", "number"].includes(element.type) &&
+    !element.hasAttribute("aria-haspopup");
+  const TYPED = { key: "Enter", code: "Enter", altKey: true, shiftKey: true, bubbles: true };
+  const SENT = 150; // viser sends what was typed within 50 ms
+  let edited = null;
+  let saying = 0;
+  let byPointer = false;
+  document.addEventListener(
+    "input",
+    (event) => {
+      clearTimeout(saying); // typing in the next field says it, too
+      edited = event.target;
+    },
+    true,
+  );
+  document.addEventListener("focusout", (event) => {
+    if (event.target !== edited || !isTypedIn(edited)) return;
+    edited = null;
+    const say = () => document.documentElement.dispatchEvent(new KeyboardEvent("keydown", TYPED));
+    saying = setTimeout(say, SENT);
+  });
+  document.addEventListener("pointerdown", () => (byPointer = true), true);
+  document.addEventListener("keydown", () => (byPointer = false), true);
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && isTypedIn(event.target)) event.target.blur();
+  });
+
+  // viser's page leaves keys to a box that was ticked, and to a list that was chosen from.
+  document.addEventListener("click", (event) => {
+    const isTicked = event.target instanceof HTMLInputElement && event.target.type === "checkbox";
+    if (!byPointer || !(isTicked || event.target.closest?.("[role=option]"))) return;
+    setTimeout(() => document.activeElement?.blur(), 0);
+  });
 })();

@@ -57,8 +57,15 @@ class LibraryPanel:
         """Shows the pictures that are there by now."""
         self._draw()
 
-    def _add(self, name: str) -> None:
-        self._actions.session.do(AddObject(name))
+    def _add(self, name: str, client: viser.ClientHandle | None) -> None:
+        view = self._actions.session.do(AddObject(name))
+        (added,) = view.selection
+        if view.status[added] in ("collision", "out_of_bounds"):
+            self._actions.warn(
+                client,
+                f"There is no free place for {added!r}: it is in the middle of the board; move it,"
+                " make room, or choose a larger board.",
+            )
 
     def _fill(self, library: ObjectLibrary) -> None:
         for button in self._buttons.values():
@@ -69,7 +76,7 @@ class LibraryPanel:
                 hint = entry.description or name
                 weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
                 button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
-                self._actions.clicked(button, partial(self._add, name))
+                self._actions.clicked_by(button, partial(self._add, name))
                 self._buttons[name] = button
         self._filter(self._search.value)
 

@@ -15,6 +15,7 @@ from burg_drake.ui.buttons import quiet_button
 from burg_drake.ui.page_actions import PageActions
 from burg_drake.ui.panel_text import all_of, box, dot, quiet, title
 from burg_drake.ui.status_colors import look_of
+from burg_drake.ui.typed_field import NAMING
 
 QUARTER_DEG = 90.0
 DECIMALS_MM, DECIMALS_DEG = 2, 2
@@ -34,7 +35,7 @@ class ObjectPanel:
         self._text = gui.add_html("")
         self._one = gui.add_folder(None)
         with self._one:
-            self._name = actions.typed(gui.add_text("Name", ""), self._rename)
+            self._name = actions.typed(gui.add_text("Name", ""), self._rename, after=NAMING)
             self._fixed = actions.chosen(
                 gui.add_checkbox(
                     "Background", False, hint="It stays where it is when the scene is simulated"
@@ -64,7 +65,7 @@ class ObjectPanel:
         self._some.visible = bool(names)
         self._text.content = _about(view)
         if len(names) == 1:
-            self._name.value = names[0]
+            self._name.show(names[0])
             self._fixed.value = view.instances[names[0]] in view.document.background
             for numbers, shown in ((self._planar, view.planar), (self._free, not view.planar)):
                 numbers.show(view.X_SO(names[0]), shown)
@@ -72,7 +73,7 @@ class ObjectPanel:
     def _rename(self, new: str) -> None:
         names = self._actions.session.view.selection
         if len(names) == 1:
-            self._actions.session.do(Rename(names[0], new))
+            self._actions.session.do(Rename(names[0], new), field="name")
 
     def _fix(self, fixed: bool) -> None:
         self._actions.session.do(SetFixed(self._actions.session.view.selection, fixed))
@@ -104,46 +105,52 @@ class _Numbers:
         self._actions, self._free = actions, free
         limit = LARGEST_MM
         if free:
-            self._position: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.01)
-            self._angles: Any = gui.add_vector3("roll, pitch, yaw [°]", (0.0, 0.0, 0.0), step=0.01)
+            position: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.01)
+            angles: Any = gui.add_vector3("roll, pitch, yaw [°]", (0.0, 0.0, 0.0), step=0.01)
         else:
-            self._position = gui.add_vector2("x, y [mm]", (0.0, 0.0), step=0.01)
-            self._angles = gui.add_number("yaw [°]", 0.0, step=0.01, min=-limit, max=limit)
-        for field in (self._position, self._angles):
-            actions.typed(field, lambda value: self._move())
+            position = gui.add_vector2("x, y [mm]", (0.0, 0.0), step=0.01)
+            angles = gui.add_number("yaw [°]", 0.0, step=0.01, min=-limit, max=limit)
+        self._position = actions.typed(position, self._place)
+        self._angles = actions.typed(angles, self._turn)
 
     def show(self, X_SO: Array, visible: bool) -> None:
         """Shows a pose (4, 4), or nothing."""
         position, angles = _numbers(X_SO)
-        self._position.visible = self._angles.visible = visible
-        self._position.value = position if self._free else position[:2]
-        self._angles.value = angles if self._free else angles[2]
+        self._position.handle.visible = self._angles.handle.visible = visible
+        self._position.show(position if self._free else position[:2])
+        self._angles.show(angles if self._free else angles[2])
 
-    def _move(self) -> None:
-        """Moves the selected object to what the fields say; fields that were left alone keep its
-        exact numbers."""
-        session = self._actions.session
-        if len(session.view.selection) != 1:
+    def _place(self, typed_mm: tuple[float, ...]) -> None:
+        """Moves the selected object; numbers that were left alone stay exact."""
+        if (X_SO := self._selected()) is None:
             return
-        (name,) = session.view.selection
-        X_SO = session.view.X_SO(name)
-        shown_mm, shown_deg = _numbers(X_SO)
-        typed_mm = (*self._position.value, shown_mm[2])[:3]
-        typed_deg = self._angles.value if self._free else (*shown_deg[:2], self._angles.value)
+        shown_mm, _ = _numbers(X_SO)
+        typed_mm = (*typed_mm, shown_mm[2])[:3]
         exact_mm = 1e3 * X_SO[:3, 3]
-        exact_deg = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
         p_mm = [e if t == s else t for t, s, e in zip(typed_mm, shown_mm, exact_mm, strict=True)]
+        X_SO[:3, 3] = 1e-3 * np.array(p_mm)
+        self._move(X_SO, "position")
+
+    def _turn(self, typed: Any) -> None:
+        """Turns the selected object; angles that were left alone stay exact."""
+        if (X_SO := self._selected()) is None:
+            return
+        _, shown_deg = _numbers(X_SO)
+        typed_deg = tuple(typed) if self._free else (*shown_deg[:2], typed)
+        exact_deg = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
         rpy = [e if t == s else t for t, s, e in zip(typed_deg, shown_deg, exact_deg, strict=True)]
-        R_SO = X_SO[:3, :3]
-        if tuple(typed_deg) != shown_deg:
-            R_SO = rotation_from_rpy(np.deg2rad(rpy))
-        session.do(Move({name: _pose(R_SO, p_mm)}))
+        if typed_deg != shown_deg:
+            X_SO[:3, :3] = rotation_from_rpy(np.deg2rad(rpy))
+        self._move(X_SO, "angles")
 
+    def _selected(self) -> Array | None:
+        """(4, 4) pose of the selected object; None unless it is one."""
+        view = self._actions.session.view
+        return view.X_SO(view.selection[0]) if len(view.selection) == 1 else None
 
-def _pose(R_SO: Array, p_mm: list[float]) -> Array:
-    X_SO = np.eye(4)
-    X_SO[:3, :3], X_SO[:3, 3] = R_SO, 1e-3 * np.array(p_mm)
-    return X_SO
+    def _move(self, X_SO: Array, field: str) -> None:
+        session = self._actions.session
+        session.do(Move({session.view.selection[0]: X_SO}), field=field)
 
 
 def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -10,9 +10,8 @@ import viser
 from burg_drake.compose.command import Command
 from burg_drake.compose.session import ComposeSession
 from burg_drake.ui.action_queue import ActionQueue
+from burg_drake.ui.typed_field import TYPING, TypedField
 
-TYPING = 0.4
-"""After the last key in a field before it counts [s]."""
 SHORT, LONG = 5.0, 12.0
 """Messages stay for that time [s]: those that tell what was done, those that tell what failed."""
 
@@ -42,9 +41,10 @@ class PageActions:
         *,
         key: str = "",
         after: float = 0.0,
+        patient: bool = False,
     ) -> None:
         """Has something done; see `ActionQueue.ask`."""
-        self.queue.ask(action, client, key=key, after=after)
+        self.queue.ask(action, client, key=key, after=after, patient=patient)
 
     def do(self, command: Command, client: viser.ClientHandle | None = None) -> None:
         """Has a step taken."""
@@ -67,15 +67,13 @@ class PageActions:
 
         return button
 
-    def chosen(
-        self, field: Any, action: Callable[[Any], Any], *, key: str = "", after: float = 0.0
-    ) -> Any:
+    def chosen(self, field: Any, action: Callable[[Any], Any], *, key: str = "") -> Any:
         """Has something done with each value that a user gives a field; gives the field.
 
         Args:
             field: of viser.
             action: gets the value.
-            key, after: see `ActionQueue.ask`.
+            key: see `ActionQueue.ask`.
         """
 
         @field.on_update
@@ -83,13 +81,15 @@ class PageActions:
             if event.client_id is None:  # it was this program
                 return
             value = event.target.value
-            self.ask(lambda: action(value), event.client, key=key, after=after)
+            self.ask(lambda: action(value), event.client, key=key)
 
         return field
 
-    def typed(self, field: Any, action: Callable[[Any], Any]) -> Any:
-        """The same of a field that is typed in: once nothing is typed any more."""
-        return self.chosen(field, action, key=f"typed {id(field)}", after=TYPING)
+    def typed(
+        self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING
+    ) -> TypedField:
+        """The same of a field that is typed in: `after` the last key, or when typing ends."""
+        return TypedField(field, self, action, after)
 
     def tell(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what was done; every page if `client` is None."""

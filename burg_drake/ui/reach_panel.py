@@ -87,7 +87,7 @@ class ReachPanel:
     def _told(self, job: Job[ReachLayer]) -> None:
         """Called by the worker's thread."""
         if job.done:
-            self._actions.ask(lambda: self._finish(job))
+            self._actions.ask(lambda: self._finish(job), patient=True)
 
     def _finish(self, job: Job[ReachLayer]) -> None:
         if job is not self._job:

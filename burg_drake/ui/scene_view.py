@@ -15,14 +15,14 @@ from burg_drake.core.frames import Array, quaternion_from_rotation
 from burg_drake.objects.hulls import hull_mesh
 from burg_drake.ui.footprint import footprint
 from burg_drake.ui.object_shapes import ObjectShapes
-from burg_drake.ui.status_colors import FIXED, SELECTED, Rgb, look_of
+from burg_drake.ui.status_colors import FIXED, Rgb, look_of
 
 Coloring = Literal["objects", "random", "status"]
 
 ROOT = "/objects"
 OUTLINE_HEIGHT = 4e-4
 """Of outlines over the board [m]; at the board's own height they would flicker."""
-THIN, THICK = 2.5, 5.0
+THIN, THICK = 2.0, 6.0
 """Lines of outlines and of those of selected objects [pixel]."""
 MISSING: Rgb = (200, 60, 200)
 UNKNOWN_RADIUS = 0.03
@@ -123,7 +123,7 @@ class SceneView:
         outline = self._scene.add_line_segments(
             f"/outlines/{name}",
             np.zeros((1, 2, 3)),
-            SELECTED,
+            FIXED,
             thickness=THIN,
             thickness_units="screen",
         )
@@ -141,7 +141,7 @@ class SceneView:
             nodes.drawn = drawn
             line = footprint(nodes.p_OV, shown.X_SO, OUTLINE_HEIGHT)
             nodes.outline.points = line.astype(np.float32)
-            nodes.outline.colors = np.array(_outline_color(shown), dtype=np.uint8)
+            nodes.outline.colors = np.array(_status_color(shown), dtype=np.uint8)
             nodes.outline.thickness = THICK if shown.selected else THIN
 
     def _paint(self, nodes: _Nodes, name: str, shown: Shown) -> None:
@@ -173,10 +173,3 @@ class SceneView:
 
 def _status_color(shown: Shown) -> Rgb:
     return FIXED if shown.fixed and shown.status == "ok" else look_of(shown.status).color
-
-
-def _outline_color(shown: Shown) -> Rgb:
-    """Of an outline: what is wrong goes before what is selected, which has the thicker line."""
-    if shown.selected and shown.status == "ok":
-        return SELECTED
-    return _status_color(shown)

@@ -176,7 +176,7 @@ class SetupPage:
 
     def _pictures_of(self, library: ObjectLibrary) -> ObjectPictures:
         def ready(wanted: object) -> None:
-            self.actions.ask(self._draw_pictures, key="pictures", after=0.1)
+            self.actions.ask(self._draw_pictures, key="pictures", after=0.1, patient=True)
 
         return ObjectPictures(library, ready)
 
@@ -186,7 +186,7 @@ class SetupPage:
             self._poses.draw()
 
     def _changed(self) -> None:
-        self.actions.ask(self._refresh, key="refresh")
+        self.actions.ask(self._refresh, key="refresh", patient=True)
 
     def _refresh(self) -> None:
         """Brings everything to the session's view of now."""

@@ -35,7 +35,6 @@ LOOKS: dict[str, StatusLook] = {
 """By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022)."""
 
 OTHER = StatusLook((120, 120, 120), "not checked")
-SELECTED: Rgb = (25, 110, 255)
 FIXED: Rgb = (150, 155, 162)
 """Of background objects and obstacles."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename
+from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename, amending
+from burg_drake.compose.journal import journal_path, recover
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
@@ -31,6 +33,68 @@ def test_steps_are_undone_and_redone(session: ComposeSession) -> None:
     session.redo()
     assert session.redo().document == placed.document
     assert session.view.redo_label == "delete bowl"
+
+
+@pytest.fixture
+def slow_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(amending, "AMENDING", 3600.0)
+
+
+@pytest.mark.usefixtures("slow_machine")
+def test_what_is_typed_bit_by_bit_is_one_step(session: ComposeSession) -> None:
+    mug = session.do(AddObject("mug"))
+    old = "mug"
+    for new in ("b", "bo", "box"):
+        session.do(Rename(old, new), field="Name")
+        old = new
+    with pytest.raises(InvalidInputError):
+        session.do(Rename("box", "box/"), field="Name")
+    named = session.do(Rename("box", "box2"), field="Name")
+    assert list(named.instances) == ["box2"]
+    for x in (0.002, 0.021, 0.21):
+        moved = session.do(Move({"box2": make_pose(p_AB=(x, 0.1, 0.0))}), field="x")
+    journal = recover(journal_path(session.folder / "new_scene.yaml"))
+    assert journal is not None and journal.history is not None
+    documents = [mug.document, named.document, moved.document]
+    assert [s.state.document for s in journal.history.steps][1:] == documents
+    assert journal.history.position == 3
+    assert session.undo().document == named.document
+    assert session.undo().document == mug.document and session.view.redo_label == "rename mug"
+
+
+@pytest.mark.usefixtures("slow_machine")
+def test_what_was_typed_stays_a_step_once_something_else_was_done(
+    session: ComposeSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session.do(AddObject("mug"))
+    poses = iter(make_pose(p_AB=(x, 0.1, 0.0)) for x in np.linspace(0.1, 0.3, 40))
+
+    def steps(between: Callable[[], object]) -> int:
+        before = session.do(Move({"mug": next(poses)})).document
+        session.do(Move({"mug": next(poses)}), field="x")
+        between()
+        session.do(Move({"mug": next(poses)}), field="x")
+        count = 1
+        while session.undo().document != before:
+            count += 1
+        return count
+
+    assert steps(lambda: None) == 1
+    assert steps(lambda: session.select(["mug"])) == 2
+    assert steps(lambda: session.do(Move({"mug": next(poses)}), field="y")) == 3
+    assert steps(lambda: session.do(Move({"mug": next(poses)}))) == 3
+    assert steps(session.save) == 2
+    assert steps(lambda: monkeypatch.setattr(amending, "AMENDING", 0.0)) == 1
+    assert steps(lambda: None) == 2  # too late
+    monkeypatch.setattr(amending, "AMENDING", 3600.0)
+    # typed back to what it was, there is nothing to undo; and nothing typed, nothing to amend
+    start = session.view
+    session.do(Move({"mug": next(poses)}), field="x")
+    back = session.do(Move({"mug": start.X_SO("mug")}), field="x")
+    assert back.document == start.document and back.undo_label == start.undo_label
+    session.do(Move({"mug": start.X_SO("mug")}), field="y")
+    session.do(Move({"mug": next(poses)}), field="y")
+    assert session.undo().document == start.document
 
 
 def test_a_drag_is_one_step_and_tells_of_collisions_on_its_way(session: ComposeSession) -> None:

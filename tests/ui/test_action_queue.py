@@ -60,3 +60,19 @@ def test_what_is_typed_waits_for_more_but_holds_up_nobody() -> None:
     queue.ask(lambda: done.append("last"), key="field", after=3600.0)
     queue.close()
     assert done[-1] == "last"
+
+
+def test_what_only_shows_runs_at_once_and_does_not_end_typing() -> None:
+    done: list[str] = []
+    queue = ActionQueue(lambda who, line: None)
+    shown = threading.Event()
+    queue.ask(lambda: done.append("2"), key="field", after=3600.0)
+    queue.ask(lambda: done.append("shown"), key="refresh", patient=True)
+    queue.ask(shown.set, key="other", patient=True)
+    assert shown.wait(PATIENCE)
+    queue.ask(lambda: done.append("25"), key="field", after=3600.0)
+    assert not queue.idle(0.05)
+    queue.ask(lambda: done.append("save"))
+    assert queue.idle(PATIENCE)
+    assert done == ["shown", "25", "save"]
+    queue.close()
