@@ -169,7 +169,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
             time_limit=arguments.time_limit,
             progress=lambda time, moving: pace.step(time, note=f"{moving} moving"),
         )
-    faults = _faults(settled, kept=arguments.keep)
+    faults = _faults(settled, arguments.time_limit, kept=arguments.keep)
     faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
     written = arguments.keep or not faults
     if written:
@@ -205,15 +205,17 @@ def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:
     return table
 
 
-def _faults(settled: SettledScene, *, kept: bool) -> list[str]:
+def _faults(settled: SettledScene, time_limit: float, *, kept: bool) -> list[str]:
     """What keeps a scene from being settled, a line each."""
     lines = []
     if settled.moving:
         moving = ", ".join(
-            f"{name!r} at {v.speed * 1e3:.1f} mm/s and {math.degrees(v.turning):.1f} deg/s"
+            f"{name!r} at {v.speed * 1e3:.2f} mm/s and {math.degrees(v.turning):.2f} deg/s"
             for name, v in settled.moving.items()
         )
-        advice = "give a longer --time-limit" + ("" if kept else ", or --keep")
+        in_time = settled.duration < time_limit - 1e-9
+        advice = "place it otherwise" if in_time else "give a longer --time-limit"
+        advice += "" if kept else ", or --keep"
         lines.append(f"after {settled.duration:g} s something still moves: {moving}; {advice}")
     if settled.fallen:
         lines.append(f"fell off the table: {', '.join(settled.fallen)}")

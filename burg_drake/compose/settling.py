@@ -67,7 +67,7 @@ class Settle:
             self.scene, self.station, time_limit=self.time_limit, progress=progress
         )
         moving = {
-            name: f"{v.speed * 1e3:.1f} mm/s, {math.degrees(v.turning):.1f} deg/s"
+            name: f"{v.speed * 1e3:.2f} mm/s, {math.degrees(v.turning):.2f} deg/s"
             for name, v in settled.moving.items()
         }
         return Proposal(

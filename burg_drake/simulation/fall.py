@@ -21,7 +21,7 @@ from burg_drake.station.touching import soften
 
 STRETCH = 0.5
 """What falls off the table is looked for at this interval [s]."""
-BRAKING_TIME = 0.2
+BRAKING_TIME = 0.1
 """Turning is braked with this time constant [s], as by air and rolling resistance, which Drake does
 not have: a marble would roll, and a banana that hangs on its tips would swing, for ever."""
 SLOW = RestCriterion(speed=0.01, turning=0.1, dying=6.0)

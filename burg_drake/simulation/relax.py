@@ -3,8 +3,7 @@
 Something slow may still have far to go: a banana rocks for seconds, and what leans creeps. Kinetic
 damping takes a body to its equilibrium on the shortest way: whenever it has got slower, which means
 that it has passed the equilibrium, it is stopped (dynamic relaxation, P. Cundall 1976, as used for
-form finding of nets and membranes). Steps are long. Drake's friction creeps in proportion to the
-step, so that a second at 10 ms foretells ten seconds at 1 ms.
+form finding of nets and membranes). Steps are long.
 """
 
 from __future__ import annotations
@@ -35,8 +34,6 @@ CALM = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
 GROUP_CALM = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
 """The same of objects that touch each other, which creep, slower and slower, for long."""
-MOVING = BodySpeed(speed=1e-3, turning=float(np.deg2rad(1.0)))
-"""What is faster at the end is still on its way."""
 CALM_WINDOWS = 2
 """So many windows in succession."""
 STOPPED = SpatialVelocity(np.zeros(3), np.zeros(3))
@@ -48,17 +45,11 @@ class Relaxed:
 
     Attributes:
         X_WO: (4, 4) poses of what is still on the table, by name.
-        speed: of each of these over the last window in which it was free to move.
-        moving: those among them that are still on their way.
         alone: those that touched no other.
-        calm: everything was calm before time was up.
     """
 
     X_WO: Mapping[str, Array]
-    speed: Mapping[str, BodySpeed]
-    moving: tuple[str, ...]
     alone: frozenset[str]
-    calm: bool
 
 
 def relax(built: StationDiagram, time_limit: float) -> Relaxed:
@@ -127,7 +118,6 @@ class _Relaxation:
     def result(self) -> Relaxed:
         """Where everything is now."""
         names = {n: i for n, i in self._built.free.items() if i not in self._fallen}
-        awake = {index for island in self._islands for index in island.bodies}
         return Relaxed(
             X_WO={
                 name: self._plant.EvalBodyPoseInWorld(
@@ -135,14 +125,7 @@ class _Relaxation:
                 ).GetAsMatrix4()
                 for name, index in names.items()
             },
-            speed={name: self._speed[index] for name, index in names.items()},
-            moving=tuple(
-                name
-                for name, index in names.items()
-                if index in awake and not is_slower(self._speed[index], MOVING)
-            ),
             alone=frozenset(name for name, index in names.items() if index in self._alone),
-            calm=not self._islands,
         )
 
     def _look(self, island: _Island) -> None:

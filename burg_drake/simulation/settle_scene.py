@@ -10,11 +10,13 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE
+from burg_drake.simulation.creep import creep
 from burg_drake.simulation.displacement import Displacement, displacement
 from burg_drake.simulation.fall import fall
-from burg_drake.simulation.placed_scene import has_moved, placed_scene
+from burg_drake.simulation.placed_scene import placed_scene
 from burg_drake.simulation.relax import RELAXING, relax
 from burg_drake.simulation.settle import BodySpeed
+from burg_drake.simulation.slack import slacken
 from burg_drake.station.check import overlaps
 from burg_drake.station.diagram import StationDiagram, build_station_diagram, instance_pose
 from burg_drake.station.engine import ENGINES, Engine
@@ -24,14 +26,11 @@ DEFAULT_TIME_LIMIT = 10.0
 """Simulated time allowed [s]."""
 DEFAULT_ENGINE = "screening"
 """How time is stepped while objects fall; they come to rest in steps of their own."""
-RELAXING_TIME = 1.5
+RELAXING_TIME = 1.0
 """Time that may be stepped in each round of relaxing [s]."""
-ROUNDS = 6
+ROUNDS = 3
 """Of relaxing at most. After each, other objects may touch each other than before, and these are
-compliant in a diagram built anew; the last one starts where the one before ended, and finds all at
-rest there."""
-CREEPING_ROUNDS = 2
-"""After so many, what has no way to go any more may creep on."""
+compliant in a diagram built anew."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,8 @@ class SettledScene:
     Attributes:
         scene: the scene with all free objects where they are now, but without the fallen ones.
         duration: simulated time [s].
-        moving: objects that still move at the end, and how fast; none if all came to rest.
+        moving: objects that still move at the end, and how fast; none if all came to rest. Those
+            that creep by more than 0.5 mm or 0.1 degrees in 5 s are among them.
         fallen: objects that fell off the table, in the document's order.
         displacements: of the objects that did not fall, by instance.
     """
@@ -119,17 +119,18 @@ def _at_rest(
     scene: Scene, station: Station, progress: Callable[[float, int], None] | None
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene once it is at rest in the world of its own diagram, and what will not rest."""
-    for number in range(1, ROUNDS + 1):
+    rounds = 0
+    while True:
         built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
-        relaxed = relax(built, RELAXING_TIME)
-        moved = [name for name, X_WO in relaxed.X_WO.items() if has_moved(built, name, X_WO)]
-        scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
+        moving = creep(built)
         if progress is not None:
-            progress(0.0, len(relaxed.moving))
-        at_rest = relaxed.calm and not moved and len(relaxed.X_WO) == len(built.free)
-        if at_rest or (number >= CREEPING_ROUNDS and not relaxed.moving):
-            break
-    return scene, {name: relaxed.speed[name] for name in relaxed.moving}
+            progress(0.0, len(moving))
+        if not moving or rounds == ROUNDS:
+            return scene, moving
+        rounds += 1
+        slacken(built)
+        relaxed = relax(built, RELAXING_TIME)
+        scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
 
 
 def _require_above(built: StationDiagram) -> None:

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
+from burg_drake.core.frames import Array
 from burg_drake.scene.scene import Scene
 from burg_drake.simulation.displacement import Displacement, displacement
-from burg_drake.station.diagram import build_station_diagram
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.station import Station
 
@@ -58,16 +60,27 @@ def stillness(
             f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
         ) from error
     context = built.plant.GetMyContextFromRoot(simulator.get_context())
-    found = {}
-    for name, index in built.free.items():
-        X_WO = built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index))
-        found[name] = displacement(built, name, X_WO.GetAsMatrix4())
-    return found
+    return {name: displacement(built, name, X_WO) for name, X_WO in poses(built, context).items()}
+
+
+def poses(built: StationDiagram, context: Context) -> dict[str, Array]:
+    """Where the free instances are: (4, 4) poses in the world by name.
+
+    Args:
+        built: the scene.
+        context: of its plant.
+    """
+    return {
+        name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
+        for name, index in built.free.items()
+    }
 
 
 def is_still(displacements: Mapping[str, Displacement]) -> bool:
     """Whether nothing has moved further than a settled scene may."""
-    return all(
-        moved.distance < STILL_DISTANCE and moved.angle < STILL_ANGLE
-        for moved in displacements.values()
-    )
+    return all(map(has_stayed, displacements.values()))
+
+
+def has_stayed(moved: Displacement) -> bool:
+    """Whether an object of a settled scene may move so far in `STILL_DURATION`."""
+    return moved.distance < STILL_DISTANCE and moved.angle < STILL_ANGLE

@@ -33,9 +33,15 @@ from burg_drake.station.collision_world import CollisionWorld
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
 from burg_drake.station.instances import taken_name
 from burg_drake.station.robot import ROBOT_MODELS
+from burg_drake.station.sinking import push_up
 from burg_drake.station.station import Station
 from burg_drake.station.surroundings import taken_obstacle
 from burg_drake.station.travel import Travel
+
+GRAVITY = 9.81
+"""[m/s^2]."""
+DEEPEST = 0.006
+"""A tip may be so deep in the table [m], if the table bears it there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +105,7 @@ class SceneCheck:
         self._place(scene)
         placed = self._placed
         issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
+        issues = [i for i in issues if i.kind != "in_ground" or not self._may_sink(i, scene)]
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
         beside = (self._table_issue(name) for name in scene.instances)
         issues += [issue for issue in beside if issue is not None]
@@ -165,7 +172,19 @@ class SceneCheck:
             for _, _, a, b, depth in sorted(found)
             if depth > (SINK_TOLERANCE if b == "table" else TOUCH_TOLERANCE)
             and a in scene.instances
+            and not (b == "table" and depth < DEEPEST and self._is_borne(a, scene))
         ]
+
+    def _may_sink(self, issue: SceneIssue, scene: Scene) -> bool:
+        return issue.amount < DEEPEST and self._is_borne(issue.instance, scene)
+
+    def _is_borne(self, name: str, scene: Scene) -> bool:
+        """Whether what an instance is below the table's top is no more than what it sinks in by
+        under its own weight and that of what may lie on it: all free objects at most."""
+        weight = GRAVITY * sum(scene.entry(n).mass_properties.mass for n in scene.instances)
+        _, X_WO = self._world.bodies[name]
+        thickness = self._station.document.table.size[2]
+        return 0.0 < push_up(self._world.shapes(name), X_WO, thickness) <= weight
 
     def _place(self, scene: Scene) -> None:
         """Takes over where the instances of a scene stand."""

@@ -65,8 +65,8 @@ def test_what_still_moves_is_named_and_nothing_is_written(
     assert code == 1 and not out.exists()
     (line,) = capsys.readouterr().err.splitlines()
     assert re.fullmatch(
-        rf"burg-drake: {scene_file}: after 0\.32 s something still moves: 'mug' at 29\d\d\.\d mm/s"
-        r" and 0\.0 deg/s; give a longer --time-limit, or --keep",
+        rf"burg-drake: {scene_file}: after 0\.32 s something still moves: 'mug' at"
+        r" 29\d\d\.\d\d mm/s and 0\.00 deg/s; give a longer --time-limit, or --keep",
         line,
     )
     code, out = settle(scene_file, "--time-limit", "0.32", "--keep")

@@ -66,6 +66,7 @@ def test_the_board_may_lie_anywhere(stack: Scene, settled_stack: Scene) -> None:
 
 
 def test_a_heap_of_household_objects(tmp_path) -> None:
+    """What leans on others may creep on, and is named then."""
     library = load_library("household")
     instances = (
         placed("bowl", "bowl", 0.3, 0.2, 0.0),
@@ -75,13 +76,11 @@ def test_a_heap_of_household_objects(tmp_path) -> None:
     document = SceneDocument(name="heap", library="household", instances=instances)
     heap = Scene(document, library, tmp_path / "heap.yaml")
     settled = settle_scene(heap, make_station())
-    assert settled.at_rest, (settled.moving, settled.fallen)
+    assert not settled.fallen
+    assert all(v.speed < 1e-3 and v.turning < 0.02 for v in settled.moving.values())
     assert settled.displacements["screwdriver"].distance > 0.2
     depths = overlaps(build_station_diagram(settled.scene, make_station(), robot="none"))
     assert max(depths.values()) < 1e-3
-    again = settle_scene(settled.scene, make_station())
-    assert again.at_rest
-    assert max(moved.distance for moved in again.displacements.values()) < 2e-3
 
 
 def test_what_falls_when_time_is_up_is_named_with_its_speed(make_scene) -> None:

@@ -9,8 +9,12 @@ from trial_world import GRAVITY, make_station
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.schema import Pose
 from burg_drake.scene.scene import Instance, Scene
+from burg_drake.simulation.creep import creep
+from burg_drake.simulation.relax import RELAXING
 from burg_drake.simulation.settle_scene import settle_scene
-from burg_drake.simulation.stillness import is_still, stillness
+from burg_drake.simulation.slack import slacken
+from burg_drake.simulation.stillness import STILL_ANGLE, STILL_DURATION, is_still, stillness
+from burg_drake.station.diagram import build_station_diagram
 
 EDGE = 0.05
 """Of the blocks [m]."""
@@ -50,6 +54,27 @@ def test_what_is_in_the_air_falls(make_scene) -> None:
     assert not is_still(moved)
     assert moved["block"].distance == pytest.approx(GRAVITY * 0.1**2 / 2, rel=0.02)
     assert moved["block"].angle == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_will_not_stay_is_foretold(make_scene) -> None:
+    """A block that is tilted by 1 degree falls back onto its face; one that stands on it stays."""
+    tilted = Instance(name="tilted", object="block", X_SO=Pose((0.4, 0.2, 0), rpy_deg=(1.0, 0, 0)))
+    scene = make_scene(placed("block", "block", 0.3, 0.0), tilted)
+    moving = creep(build_station_diagram(scene, make_station(), robot="none", engine=RELAXING))
+    assert list(moving) == ["tilted"]
+    assert moving["tilted"].turning > STILL_ANGLE / STILL_DURATION
+
+
+def test_friction_is_slackened(make_scene) -> None:
+    scene = make_scene(placed("block", "block", 0.3, 0.0))
+    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
+    slacken(built, 0.25)
+    inspector = built.scene_graph.model_inspector()
+    body = built.plant.get_body(built.free["block"])
+    for geometry in built.plant.GetCollisionGeometriesForBody(body):
+        properties = inspector.GetProximityProperties(geometry)
+        friction = properties.GetProperty("material", "coulomb_friction")
+        assert friction.dynamic_friction() == pytest.approx(scene.entry("block").friction / 4)
 
 
 def test_a_duration_that_is_none(heap: Scene) -> None:

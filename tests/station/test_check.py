@@ -152,3 +152,26 @@ def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
     model.write_text(text.replace(before, wider))
     with pytest.raises(InvalidInputError, match="'cube_0' and 'cube_1' overlap by 9"):
         require_sound_scene(scene_of(edited, tmp_path, *places), panda)
+
+
+@pytest.mark.parametrize(
+    "depth, kinds", [(0.0045, []), (0.0052, ["in_ground"])], ids=["borne", "pressed in"]
+)
+def test_what_stands_on_a_tip_sinks_into_the_table(
+    library: Path, panda: Station, tmp_path: Path, depth: float, kinds: list[str]
+) -> None:
+    """A corner of a cube has the volume sqrt(3) d^3 / 2; times the modulus 1e6 Pa, over half the
+    table's thickness of 0.1 m, it bears 0.2 kg at d = 4.8 mm."""
+    on_corner = Pose((0.2, 0.2, 3**0.5 * EDGE / 2 - depth), rpy_deg=(45.0, 35.2644, 0.0))
+    tip = Instance(name="tip", object="cube", X_SO=on_corner)
+    document = SceneDocument(name="tip", library=str(library), instances=(tip,))
+    save_scene(document, tmp_path / "scene.yaml")
+    issues = check_scene(load_scene(tmp_path / "scene.yaml"), bare_station(panda))
+    assert [issue.kind for issue in issues] == kinds
+
+
+def test_what_is_placed_flat_in_the_table_is_refused(
+    library: Path, panda: Station, tmp_path: Path
+) -> None:
+    flat = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT - 0.003))
+    assert only(check_scene(flat, bare_station(panda))).kind == "in_ground"
