@@ -174,9 +174,9 @@ def planar(X_SO: Array, X_new: Array) -> Array:
 
 
 def _checked(X_SO: ArrayLike, name: str) -> Array:
-    X = check_pose(X_SO, f"the pose of {name!r}")
+    X = np.array(X_SO, dtype=float)
     if X.shape != (4, 4):
         raise InvalidInputError(f"the pose of {name!r} has shape {X.shape}; expected (4, 4)")
     for axis, value in zip("xyz", X[:3, 3], strict=True):
         require_number(float(value), f"{axis} of {name!r}", -FARTHEST, FARTHEST, "m")
-    return X
+    return check_pose(X, f"the pose of {name!r}")

@@ -11,7 +11,9 @@ from collections.abc import Mapping
 
 from pydrake.systems.analysis import Simulator
 
+from burg_drake.core.frames import Array
 from burg_drake.simulation.displacement import Displacement, displacement
+from burg_drake.simulation.fall import is_below
 from burg_drake.simulation.settle import BodySpeed, body_place, mean_speed
 from burg_drake.simulation.stillness import STILL_DURATION, has_stayed, poses
 from burg_drake.station.diagram import StationDiagram
@@ -51,3 +53,23 @@ def creep(built: StationDiagram) -> Mapping[str, BodySpeed]:
         if not has_stayed(way):  # nor has NaN
             moving[name] = BodySpeed(way.distance / STILL_DURATION, way.angle / STILL_DURATION)
     return moving
+
+
+def let_go(built: StationDiagram, duration: float) -> Mapping[str, Array]:
+    """Where the free objects of a scene are after a while, from where the documents place them.
+
+    Args:
+        built: the scene without a robot.
+        duration: to simulate [s].
+
+    Returns:
+        (4, 4) poses in the world by name, of what is still on the table.
+
+    Raises:
+        RuntimeError, SystemExit: from Drake.
+    """
+    simulator = Simulator(built.diagram)
+    simulator.AdvanceTo(duration)
+    context = built.plant.GetMyContextFromRoot(simulator.get_context())
+    X_WO = poses(built, context)
+    return {n: X_WO[n] for n, i in built.free.items() if not is_below(built, context, i)}

@@ -10,7 +10,7 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE
-from burg_drake.simulation.creep import creep
+from burg_drake.simulation.creep import creep, let_go
 from burg_drake.simulation.displacement import Displacement, displacement
 from burg_drake.simulation.fall import fall
 from burg_drake.simulation.placed_scene import placed_scene
@@ -21,6 +21,7 @@ from burg_drake.station.check import overlaps
 from burg_drake.station.diagram import StationDiagram, build_station_diagram, instance_pose
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.station import Station
+from burg_drake.station.touching import touching
 
 DEFAULT_TIME_LIMIT = 10.0
 """Simulated time allowed [s]."""
@@ -28,9 +29,11 @@ DEFAULT_ENGINE = "screening"
 """How time is stepped while objects fall; they come to rest in steps of their own."""
 RELAXING_TIME = 1.0
 """Time that may be stepped in each round of relaxing [s]."""
-ROUNDS = 3
-"""Of relaxing at most. After each, other objects may touch each other than before, and these are
-compliant in a diagram built anew."""
+LOOSE_TIME = 1.0
+"""Time for which what still creeps after that is let go, in each round [s]."""
+ROUNDS, LOOSE_ROUNDS = 1, 5
+"""Of relaxing, and of letting go, at most. After each, other objects may touch each other than
+before, and these are compliant in a diagram built anew."""
 
 
 @dataclass(frozen=True)
@@ -125,12 +128,17 @@ def _at_rest(
         moving = creep(built)
         if progress is not None:
             progress(0.0, len(moving))
-        if not moving or rounds == ROUNDS:
+        if not moving or rounds == ROUNDS + LOOSE_ROUNDS:
             return scene, moving
         rounds += 1
-        slacken(built)
-        relaxed = relax(built, RELAXING_TIME)
-        scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
+        if rounds <= ROUNDS:
+            slacken(built)
+            relaxed = relax(built, RELAXING_TIME)
+            scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
+        else:
+            X_WO = let_go(built, LOOSE_TIME)
+            beside = touching(built, built.free.values())
+            scene = placed_scene(built, X_WO, exact=[n for n in X_WO if built.free[n] in beside])
 
 
 def _require_above(built: StationDiagram) -> None:
