@@ -177,6 +177,7 @@ def _checked(X_SO: ArrayLike, name: str) -> Array:
     X = np.array(X_SO, dtype=float)
     if X.shape != (4, 4):
         raise InvalidInputError(f"the pose of {name!r} has shape {X.shape}; expected (4, 4)")
-    for axis, value in zip("xyz", X[:3, 3], strict=True):
-        require_number(float(value), f"{axis} of {name!r}", -FARTHEST, FARTHEST, "m")
+    if np.isfinite(X).all():
+        for axis, value in zip("xyz", X[:3, 3], strict=True):
+            require_number(float(value), f"{axis} of {name!r}", -FARTHEST, FARTHEST, "m")
     return check_pose(X, f"the pose of {name!r}")
