@@ -97,6 +97,7 @@ class SimulatedSource(FrameSource):
         """No more frames."""
         if not self._closed.is_set():
             self._closed.set()
+            gc.collect()  # here, what was rendered here: an engine ends in the thread it began in
             self._thread.submit(self._drop)
             self._thread.shutdown()
 
