@@ -5,7 +5,25 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
+import time
 from collections.abc import Iterator
+from typing import NoReturn
+
+LOOK = 0.5
+"""Between two looks of a process that waits for its end [s]."""
+
+
+def wait_for_interrupt() -> NoReturn:
+    """Waits, in the main thread, for Ctrl-C; see `terminated_as_interrupted`.
+
+    The system may deliver a signal in any thread. Python handles it in the main thread, which that
+    does not wake: a wait without end would sleep on.
+
+    Raises:
+        KeyboardInterrupt: that is how it ends.
+    """
+    while True:
+        time.sleep(LOOK)
 
 
 @contextlib.contextmanager

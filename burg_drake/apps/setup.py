@@ -6,11 +6,14 @@ import argparse
 import contextlib
 import os
 import sys
-import threading
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import SCENE_NAMES, add_station, add_verb, port
-from burg_drake.apps.interrupts import deaf_to_interrupts, terminated_as_interrupted
+from burg_drake.apps.interrupts import (
+    deaf_to_interrupts,
+    terminated_as_interrupted,
+    wait_for_interrupt,
+)
 from burg_drake.apps.live import open_in_browser
 
 if TYPE_CHECKING:
@@ -74,7 +77,7 @@ def run_setup(arguments: argparse.Namespace) -> int:
             _tell(door, session)
             if arguments.open:
                 open_in_browser(door.url)
-            threading.Event().wait()
+            wait_for_interrupt()
         except KeyboardInterrupt:
             print(file=sys.stderr)
         finally:

@@ -35,6 +35,8 @@ RATE_OVER = 2.0
 """The rate of frames is counted over the last of these [s]."""
 LASTING = 1.0
 """A pose that comes or goes is an event when it lasts that long [s]."""
+LOOK = 0.5
+"""Between two looks of who waits for the end of a session [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,8 +215,11 @@ class LiveSession:
         Raises:
             BaseException: what ended a thread of the session.
         """
+        end = math.inf if seconds is None else time.monotonic() + seconds
         with self._changed:
-            self._changed.wait_for(lambda: self._is_over(to_end), seconds)
+            # In pieces: an interrupt may have come in another thread, which does not wake this one.
+            while not self._is_over(to_end) and (left := end - time.monotonic()) > 0:
+                self._changed.wait(min(left, LOOK))
         failure = self._failure or self.reader.failure
         if failure is not None:
             raise failure
