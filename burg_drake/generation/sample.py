@@ -79,6 +79,7 @@ class SceneSampler:
         require_possible(recipe, library, station)
         self.recipe, self.library, self.station = recipe, library, station
         self.ingredients = ingredients_of(recipe, library, station)
+        self._content = recipe.content
         self._shapes = ObjectShapes(library)
         self._check = SceneCheck(station, library)
         self._obstacles = boxes_in_scene(station)
@@ -124,7 +125,7 @@ class SceneSampler:
     def _draw(self, number: int, attempt: int, folder: Path) -> tuple[Scene, tuple[str, ...], int]:
         """An attempt before it is settled, what is missing in it, and the tries that it took."""
         recipe = self.recipe
-        rng = rng_from("sampled scene", recipe.content, number, attempt)
+        rng = rng_from("sampled scene", self._content, number, attempt)
         wanted = _chosen(recipe, self.library, self.station, rng)
         laid_out = arrange(
             wanted,

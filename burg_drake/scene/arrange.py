@@ -132,7 +132,7 @@ def arrange(
         return _heap(wanted, shapes, occupied, rng, tries)
     chosen = [(shapes[one.object], draw_pose(one, shapes, rng, poses)) for one in wanted]
     if layout == "packed":
-        places, used = _packed(chosen, board, obstacles, rng)
+        places, used = _packed(chosen, board, obstacles, rng, needs_all)
     else:
         places, used = _scattered(chosen, occupied, rng, layout, tries, needs_all)
     X_SO = [None if place is None else place.X_SO for place in places]
@@ -175,13 +175,15 @@ def _packed(
     board: Board,
     obstacles: Sequence[Array],
     rng: np.random.Generator,
+    needs_all: bool,
 ) -> tuple[list[Standing | None], int]:
     """The densest of several orders; the first two are by size, the others are random."""
     best: list[Standing | None] = [None] * len(chosen)
     value = (-1, 0.0)
     for k in range(ORDERS):
         order = _large_first(chosen) if k < 2 else rng.permutation(len(chosen)).tolist()
-        found = pack(Occupied(board, obstacles), [chosen[i] for i in order], k % 2)
+        objects = [chosen[i] for i in order]
+        found = pack(Occupied(board, obstacles), objects, k % 2, needs_all)
         placed = [place for place in found if place is not None]
         if (len(placed), density(placed)) > value:
             value = (len(placed), density(placed))
@@ -214,7 +216,7 @@ def _heap(
 
 def _large_first(chosen: Sequence[tuple[ObjectShape, int]]) -> list[int]:
     """Numbers of objects, those that cover most of the board first."""
-    size = [np.prod(np.ptp(shape.outline(pose).hull, axis=0)) for shape, pose in chosen]
+    size = [np.prod(np.ptp(shape.outline(pose).hull.corners, axis=0)) for shape, pose in chosen]
     return [int(i) for i in np.argsort(-np.array(size), kind="stable")]
 
 

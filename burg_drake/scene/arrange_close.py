@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from burg_drake.core.frames import Array
 from burg_drake.scene.arrangement import (
+    CERTAIN,
     Occupied,
     Standing,
     random_place,
     travel,
 )
-from burg_drake.scene.polygons import exit_distance, forbidden
+from burg_drake.scene.polygons import exit_distance
 
 CLOSE = (0.002, 0.010)
 """Between shadows that are close to each other [m]: too little for a finger."""
@@ -39,17 +41,39 @@ def place_beside(
     partner = occupied.standing[rng.integers(len(occupied.standing))]
     angle = rng.uniform(0.0, 2.0 * np.pi)
     direction = np.array([np.cos(angle), np.sin(angle)])
-    around = forbidden(partner.shadow, turned.shadow)
-    middle = partner.shadow.mean(axis=0) - turned.shadow.mean(axis=0)
+    around = partner.shadow.forbids(turned.shadow)
+    middle = partner.shadow.middle - turned.shadow.middle
     way = exit_distance(around, middle, direction)
     way += START if touching else rng.uniform(*CLOSE)
-    one = turned.shifted(middle + way * direction)
-    if not occupied.is_free(one, 0.0 if touching else CLOSE[0]):
-        return None
+    place = middle + way * direction
     if touching:
-        back = np.array([*-direction, 0.0])
-        pushed = travel(one.pieces(), occupied.pieces(), back, way)
-        if pushed == way:
-            return None
-        one = one.shifted(-pushed * direction)
+        return _pushed(occupied, partner, turned, place, -direction, way)
+    one = turned.shifted(place)
+    if occupied.in_bounds(one) and occupied.is_free(turned, place, CLOSE[0]):
+        return one
+    return None
+
+
+def _pushed(
+    occupied: Occupied,
+    partner: Standing,
+    turned: Standing,
+    place: Array,
+    direction: Array,
+    limit: float,
+) -> Standing | None:
+    """An object that is pushed from a place (2,) towards its partner along a unit vector (2,) until
+    it touches others; None if the place is not free, it touches nothing within the limit [m], or it
+    ends off the board."""
+    one = turned.shifted(place)
+    least, most = occupied.ways_in_bounds(one, direction)
+    if least > min(most, limit) + CERTAIN or most < -CERTAIN:
+        return None
+    if not occupied.is_free(turned, place, 0.0):
+        return None
+    along = np.array([*direction, 0.0])
+    way = travel(one.pieces, occupied.pieces(partner), along, limit, enough=least - CERTAIN)
+    if way == limit:
+        return None
+    one = one.shifted(way * direction)
     return one if occupied.in_bounds(one) else None

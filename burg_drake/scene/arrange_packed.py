@@ -21,10 +21,11 @@ from burg_drake.scene.polygons import (
     DIRECTIONS,
     area,
     convex_polygon,
-    forbidden,
-    reach,
+    next_ones,
+    previous_ones,
     support_area,
 )
+from burg_drake.scene.shadow import Shadow
 
 APART = 3e-4
 """Between shadows [m], so that rounding of poses lets nothing overlap."""
@@ -35,7 +36,10 @@ SIDES = 3
 
 
 def pack(
-    occupied: Occupied, objects: Sequence[tuple[ObjectShape, int]], quarter: int = 0
+    occupied: Occupied,
+    objects: Sequence[tuple[ObjectShape, int]],
+    quarter: int = 0,
+    needs_all: bool = False,
 ) -> list[Standing | None]:
     """Finds places, one object after the other, and adds them to what stands there.
 
@@ -43,14 +47,15 @@ def pack(
         occupied: the board and what stands there.
         objects: with the numbers of their stable poses.
         quarter: turns of 90 degrees of the first one against the board.
+        needs_all: stop at the first one for which there is no room.
 
     Returns:
         None for those for which there is no room.
     """
-    found: list[Standing | None] = []
-    for shape, pose in objects:
+    found: list[Standing | None] = [None] * len(objects)
+    for i, (shape, pose) in enumerate(objects):
         best, best_area = None, np.inf
-        yaws = _yaws(shape.outline(pose).hull, occupied.standing)
+        yaws = _yaws(shape.outline(pose).hull.corners, occupied.standing)
         for yaw in yaws[:MOST_YAWS] if occupied.standing else yaws[quarter : quarter + 1]:
             turned = standing(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
@@ -58,7 +63,9 @@ def pack(
                 best, best_area = place, place_area
         if best is not None:
             occupied.add(best)
-        found.append(best)
+            found[i] = best
+        elif needs_all:
+            break
     return found
 
 
@@ -66,8 +73,8 @@ def density(placed: Sequence[Standing]) -> float:
     """Share of the convex hull of all shadows that they cover."""
     if not placed:
         return 0.0
-    hull = convex_polygon(np.concatenate([one.shadow for one in placed]))
-    return sum(area(one.shadow) for one in placed) / area(hull)
+    hull = convex_polygon(np.concatenate([one.shadow.corners for one in placed]))
+    return sum(area(one.shadow.corners) for one in placed) / area(hull)
 
 
 def _yaws(shadow: Array, others: Sequence[Standing]) -> list[float]:
@@ -75,7 +82,7 @@ def _yaws(shadow: Array, others: Sequence[Standing]) -> list[float]:
     own = _headings(shadow)[0]
     towards = [k * np.pi / 2.0 for k in range(4)]
     for one in others[::-1]:
-        towards += [heading + np.pi for heading in _headings(one.shadow)]
+        towards += [heading + np.pi for heading in _headings(one.shadow.corners)]
     found: list[float] = []
     for heading in towards:
         yaw = float((heading - own) % (2.0 * np.pi))
@@ -86,14 +93,14 @@ def _yaws(shadow: Array, others: Sequence[Standing]) -> list[float]:
 
 def _headings(polygon: Array) -> Array:
     """Headings of the longest sides of a polygon [rad]."""
-    along = np.roll(polygon, -1, axis=0) - polygon
+    along = next_ones(polygon) - polygon
     longest = np.argsort(-np.hypot(along[:, 0], along[:, 1]), kind="stable")[:SIDES]
     return np.asarray(np.arctan2(along[longest, 1], along[longest, 0]))
 
 
 def _best_place(occupied: Occupied, turned: Standing) -> tuple[Standing | None, float]:
     """The place where the hull of all shadows is smallest, and its area [m^2]."""
-    low, high = -turned.shadow.min(axis=0), occupied.size - turned.shadow.max(axis=0)
+    low, high = -turned.shadow.low, occupied.size - turned.shadow.high
     if (low > high).any():
         return None, np.inf
     there = [one.shadow for one in occupied.standing]
@@ -105,22 +112,22 @@ def _best_place(occupied: Occupied, turned: Standing) -> tuple[Standing | None, 
     points = points[occupied.are_free(turned, points, APART)]
     if not len(points):
         return None, np.inf
-    reaches = reach(turned.shadow) + points @ DIRECTIONS.T
+    reaches = turned.shadow.reach + points @ DIRECTIONS.T
     for shadow in there:
-        reaches = np.maximum(reaches, reach(shadow))
+        reaches = np.maximum(reaches, shadow.reach)
     areas = support_area(reaches)
     best = int(areas.argmin())
     return turned.shifted(points[best]), float(areas[best])
 
 
-def _touching(shadow: Array, there: Sequence[Array], low: Array, high: Array) -> Array:
+def _touching(shadow: Shadow, there: Sequence[Shadow], low: Array, high: Array) -> Array:
     """Places (N, 2) of a shadow's origin at which it touches what is there, once or twice."""
-    around = [_grown(forbidden(other, shadow)) for other in there]
+    around = [_grown(other.forbids(shadow)) for other in there]
     starts = np.concatenate(around)
-    ends = np.concatenate([np.roll(polygon, -1, axis=0) for polygon in around])
+    ends = np.concatenate([next_ones(polygon) for polygon in around])
     frame = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
     starts = np.concatenate([starts, frame])
-    ends = np.concatenate([ends, np.roll(frame, -1, axis=0)])
+    ends = np.concatenate([ends, next_ones(frame)])
     along = ends - starts
     between = starts[None] - starts[:, None]
     turn = along[:, None, 0] * along[None, :, 1] - along[:, None, 1] * along[None, :, 0]
@@ -134,11 +141,10 @@ def _touching(shadow: Array, there: Sequence[Array], low: Array, high: Array) ->
 
 def _grown(polygon: Array) -> Array:
     """A polygon that is larger by `APART` all around."""
-    along = np.roll(polygon, -1, axis=0) - polygon
-    normal = np.column_stack([along[:, 1], -along[:, 0]])
+    along = next_ones(polygon) - polygon
+    normal = np.empty_like(along)
+    normal[:, 0], normal[:, 1] = along[:, 1], -along[:, 0]
     normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
-    before = np.roll(normal, 1, axis=0)
-    return (
-        polygon
-        + APART * 1.001 * (before + normal) / (1.0 + np.sum(before * normal, axis=1))[:, None]
-    )
+    before = previous_ones(normal)
+    cosine = before[:, 0] * normal[:, 0] + before[:, 1] * normal[:, 1]
+    return polygon + APART * 1.001 * (before + normal) / (1.0 + cosine)[:, None]

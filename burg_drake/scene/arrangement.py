@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,16 @@ from burg_drake.core.schema import Pose
 from burg_drake.scene.board import Board
 from burg_drake.scene.layout import PoseChoice
 from burg_drake.scene.object_shapes import ObjectShape, ObjectShapes, Outline
-from burg_drake.scene.polygons import convex_polygon, distances, forbidden
+from burg_drake.scene.polygons import convex_polygon, distances
 from burg_drake.scene.scene import Instance
+from burg_drake.scene.shadow import Shadow
 from burg_drake.scene.sweep import ConvexShapes, ways_to_contact
 
 HEADROOM = 0.005
 """Between an object and what hangs above it [m]."""
+CERTAIN = 1e-9
+"""Boxes around shadows that are apart by so much more than is asked for [m] speak for these,
+however distances are rounded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,28 +59,40 @@ class Arrangement:
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """An object at a place of the board.
+    """An object in a stable pose, at a place of the board.
 
     Attributes:
         shape: of the object.
-        X_SO: (4, 4) pose in the scene frame.
+        pose: number of its stable pose.
+        yaw: by which it is turned about its centre of mass [rad].
+        offset: (2,) of its centre of mass from the board's corner [m].
         outline: what it covers of the board.
     """
 
     shape: ObjectShape
-    X_SO: Array
+    pose: int
+    yaw: float
+    offset: Array
     outline: Outline
 
+    @cached_property
+    def X_SO(self) -> Array:
+        """(4, 4) pose in the scene frame."""
+        X_SO = make_pose(rot_z(self.yaw)) @ self.shape.X_SO(self.pose)
+        X_SO[:2, 3] += self.offset
+        return X_SO
+
     @property
-    def shadow(self) -> Array:
-        """The convex hull (N, 2) of what it covers [m]."""
+    def shadow(self) -> Shadow:
+        """The convex hull of what it covers."""
         return self.outline.hull
 
     def shifted(self, offset: Array) -> Standing:
         """The same one elsewhere: `offset` is (2,) [m]."""
-        X_SO = make_pose(None, (*offset, 0.0)) @ self.X_SO
-        return Standing(self.shape, X_SO, self.outline.placed(offset))
+        outline = self.outline.moved(offset)
+        return Standing(self.shape, self.pose, self.yaw, self.offset + offset, outline)
 
+    @cached_property
     def pieces(self) -> ConvexShapes:
         """What of it touches others, in the scene frame."""
         return self.shape.pieces.moved(self.X_SO)
@@ -84,8 +101,7 @@ class Standing:
 def standing(shape: ObjectShape, pose: int, yaw: float) -> Standing:
     """An object in its k-th stable pose, turned by a yaw [rad] about its centre of mass, which is
     above the board's corner."""
-    X_SO = make_pose(rot_z(yaw)) @ shape.library.entry(shape.name).X_SO(pose)
-    return Standing(shape, X_SO, shape.outline(pose).placed(np.zeros(2), yaw))
+    return Standing(shape, pose, yaw, np.zeros(2), shape.outline(pose).turned(yaw))
 
 
 class Occupied:
@@ -99,47 +115,67 @@ class Occupied:
         self.size = np.array(board.size)
         self.obstacles = [ConvexShapes.of([p], [np.zeros((3, 3))]) for p in obstacles]
         self.standing: list[Standing] = []
-        self._there = []
+        self._there: list[tuple[Shadow, float, float]] = []
         for p in obstacles:
-            hull = convex_polygon(p[:, :2])
-            self._there.append((Outline(hull, hull, float(p[:, 2].max())), float(p[:, 2].min())))
+            low, high = float(p[:, 2].min()), float(p[:, 2].max())
+            self._there.append((Shadow(convex_polygon(p[:, :2])), low, high))
 
     def add(self, one: Standing) -> None:
         """Something stands there from now on."""
         self.standing.append(one)
-        self._there.append((one.outline, 0.0))
+        self._there.append((one.shadow, 0.0, one.outline.height))
 
     def in_bounds(self, one: Standing) -> bool:
         """Whether nothing of it is beyond the board's edge."""
-        return bool((one.shadow >= 0.0).all() and (one.shadow <= self.size).all())
+        shadow = one.shadow
+        return bool((shadow.low >= 0.0).all() and (shadow.high <= self.size).all())
+
+    def ways_in_bounds(self, one: Standing, direction: Array) -> tuple[float, float]:
+        """After which ways along a unit vector (2,) nothing of it may be beyond the board's edge
+        [m]: from the former to the latter, and never if that is less."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            to_low = -one.shadow.low / direction
+            to_high = (self.size - one.shadow.high) / direction
+        ways = np.sort([to_low, to_high], axis=0)
+        return float(ways[0].max()), float(ways[1].min())
 
     def are_free(self, one: Standing, offsets: Array, least: float) -> NDArray[np.bool_]:
         """Whether what it covers, moved by offsets (N, 2) [m], is at least that far [m] from all
         that is there, (N,); what hangs above it and what is below the board is not in the way."""
         free = np.ones(len(offsets), dtype=bool)
-        for there, bottom in self._there:
-            if bottom <= one.outline.height + HEADROOM and there.height >= 0.0 and free.any():
-                around = forbidden(there.hull, one.outline.hull)
-                free[free] = distances(around, offsets[free]) >= least
+        low, high = offsets + one.shadow.low, offsets + one.shadow.high
+        for shadow, bottom, top in self._there:
+            if bottom <= one.outline.height + HEADROOM and top >= 0.0:
+                beside = np.maximum(shadow.low - high, low - shadow.high).max(axis=1)
+                near = np.flatnonzero(free & (beside < least + CERTAIN))
+                if len(near):
+                    free[near] = distances(shadow.forbids(one.shadow), offsets[near]) >= least
         return free
 
-    def is_free(self, one: Standing, least: float) -> bool:
-        """Whether it is at least that far [m] from all that is there."""
-        return bool(self.are_free(one, np.zeros((1, 2)), least)[0])
+    def is_free(self, one: Standing, offset: Array, least: float) -> bool:
+        """The same of one offset (2,)."""
+        return bool(self.are_free(one, offset[None], least)[0])
 
-    def pieces(self) -> list[ConvexShapes]:
-        """What of all that is there touches others, in the scene frame."""
-        return [*self.obstacles, *(one.pieces() for one in self.standing)]
+    def pieces(self, first: Standing) -> list[ConvexShapes]:
+        """What of all that is there touches others, in the scene frame; one of them comes first."""
+        others = (one.pieces for one in self.standing if one is not first)
+        return [first.pieces, *others, *self.obstacles]
 
 
 def travel(
-    moving: ConvexShapes, still: Sequence[ConvexShapes], direction: Array, limit: float
+    moving: ConvexShapes,
+    still: Sequence[ConvexShapes],
+    direction: Array,
+    limit: float,
+    enough: float = -np.inf,
 ) -> float:
     """How far shapes can be moved together along a unit vector (3,), at most `limit`, until they
-    touch others [m]."""
+    touch others [m]; anything shorter than `enough`, once that is known to be too far."""
     for others in still:
-        pairs = np.indices((len(moving), len(others))).reshape(2, -1)
-        ways = ways_to_contact(moving, others, (pairs[0], pairs[1]), direction, limit)
+        if limit < enough:
+            break
+        i, j = np.indices((len(moving), len(others))).reshape(2, -1)
+        ways = ways_to_contact(moving, others, (i, j), direction, limit, enough=enough)
         limit = min(limit, float(ways.min()))
     return limit
 
@@ -179,7 +215,7 @@ def random_place(
     Returns:
         The object there, or None; and the number of places that were looked at.
     """
-    low, high = -one.shadow.min(axis=0), occupied.size - one.shadow.max(axis=0)
+    low, high = -one.shadow.low, occupied.size - one.shadow.high
     if (low > high).any():
         return None, tries
     offsets = rng.uniform(low, high, (tries, 2))

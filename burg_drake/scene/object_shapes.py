@@ -15,6 +15,7 @@ from burg_drake.objects.hulls import convex_hull
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.objects.primitive import primitive_mesh
 from burg_drake.scene.polygons import convex_polygon, turned, without_short_sides
+from burg_drake.scene.shadow import Shadow
 from burg_drake.scene.sweep import ConvexShapes
 from burg_drake.scene.validate import read_vertices
 
@@ -29,19 +30,32 @@ class Outline:
     """What an object covers of the plane that it rests on, its centre of mass above the origin.
 
     Attributes:
-        hull: polygon (N, 2) of its convex hull [m].
-        coarse: polygon (M, 2) around it with fewer corners [m].
+        corners: (N + M, 2) of the convex hull, and of a polygon around it that has fewer [m].
+        count: N.
         height: of its highest point [m].
     """
 
-    hull: Array
-    coarse: Array
+    corners: Array
+    count: int
     height: float
 
-    def placed(self, offset: Array, yaw: float = 0.0) -> Outline:
-        """The same, turned by a yaw [rad] and then moved by an offset (2,) [m]."""
-        hull, coarse = (turned(polygon, yaw) + offset for polygon in (self.hull, self.coarse))
-        return Outline(hull, coarse, self.height)
+    @cached_property
+    def hull(self) -> Shadow:
+        """Its convex hull."""
+        return Shadow(self.corners[: self.count])
+
+    @cached_property
+    def coarse(self) -> Shadow:
+        """A polygon around the hull that has fewer corners."""
+        return Shadow(self.corners[self.count :])
+
+    def turned(self, yaw: float) -> Outline:
+        """The same, turned by a yaw [rad] about the origin."""
+        return Outline(turned(self.corners, yaw), self.count, self.height)
+
+    def moved(self, offset: Array) -> Outline:
+        """The same, moved by an offset (2,) [m]."""
+        return Outline(self.corners + offset, self.count, self.height)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,26 +73,36 @@ class ObjectShape:
     corners: Array
 
     @cached_property
-    def _known(self) -> dict[int, Outline]:
+    def _poses(self) -> dict[int, Array]:
         return {}
+
+    @cached_property
+    def _outlines(self) -> dict[int, Outline]:
+        return {}
+
+    def X_SO(self, pose: int) -> Array:
+        """(4, 4) in a stable pose, its centre of mass above the board's corner."""
+        if pose not in self._poses:
+            self._poses[pose] = self.library.entry(self.name).X_SO(pose)
+        return self._poses[pose]
 
     def outline(self, pose: int) -> Outline:
         """What it covers in a stable pose."""
-        if pose not in self._known:
-            self._known[pose] = self._outline(self.library.entry(self.name).X_SO(pose))
-        return self._known[pose]
+        if pose not in self._outlines:
+            self._outlines[pose] = self._outline(self.X_SO(pose))
+        return self._outlines[pose]
 
     def _outline(self, X_SO: Array) -> Outline:
         corners = transform_points(X_SO, self.corners)
         hull = without_short_sides(convex_polygon(corners[:, :2]), ROUNDED)
         coarse = without_short_sides(hull, COARSE)
-        return Outline(hull, coarse, float(corners[:, 2].max()))
+        return Outline(np.concatenate([hull, coarse]), len(hull), float(corners[:, 2].max()))
 
     @property
     def shadows(self) -> tuple[Array, ...]:
         """The hulls (N, 2) of what it covers, one a stable pose [m]."""
         count = len(self.library.entry(self.name).stable_poses)
-        return tuple(self.outline(pose).hull for pose in range(count))
+        return tuple(self.outline(pose).hull.corners for pose in range(count))
 
     @cached_property
     def pieces(self) -> ConvexShapes:

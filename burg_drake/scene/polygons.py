@@ -6,6 +6,8 @@ apart themselves, at least as far.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import ConvexHull
 
@@ -14,6 +16,40 @@ from burg_drake.core.frames import Array
 _ANGLES = 2.0 * np.pi * np.arange(64) / 64
 DIRECTIONS = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 """Unit vectors (64, 2) all around."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """A polygon as a walk along its sides.
+
+    Attributes:
+        start: (2,) the lowest corner, the left one of two [m].
+        along: (N, 2) the sides from there on [m].
+        heading: (N,) where they lead to, from 0 to 2 pi [rad].
+    """
+
+    start: Array
+    along: Array
+    heading: Array
+
+    @classmethod
+    def of(cls, polygon: Array) -> Sides:
+        """From corners (N, 2)."""
+        first = int(np.lexsort((polygon[:, 0], polygon[:, 1]))[0])
+        corners = np.concatenate((polygon[first:], polygon[:first]))
+        along = next_ones(corners) - corners
+        heading = np.arctan2(along[:, 1], along[:, 0]) % (2.0 * np.pi)
+        return cls(corners[0], along, heading)
+
+
+def next_ones(corners: Array) -> Array:
+    """The corner (N, ...) after each, around a polygon."""
+    return np.concatenate((corners[1:], corners[:1]))
+
+
+def previous_ones(corners: Array) -> Array:
+    """The corner (N, ...) before each, around a polygon."""
+    return np.concatenate((corners[-1:], corners[:-1]))
 
 
 def convex_polygon(points: Array) -> Array:
@@ -25,13 +61,15 @@ def turned(polygon: Array, angle: float) -> Array:
     """A polygon turned counter-clockwise about the origin by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     x, y = polygon[:, 0], polygon[:, 1]
-    return np.column_stack([c * x - s * y, s * x + c * y])
+    around = np.empty_like(polygon)
+    around[:, 0], around[:, 1] = c * x - s * y, s * x + c * y
+    return around
 
 
 def area(polygon: Array) -> float:
     """Area [m^2], by the shoelace formula."""
     x, y = polygon[:, 0], polygon[:, 1]
-    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2.0)
+    return float(np.sum(x * next_ones(y) - y * next_ones(x)) / 2.0)
 
 
 def forbidden(still: Array, moving: Array) -> Array:
@@ -45,11 +83,16 @@ def forbidden(still: Array, moving: Array) -> Array:
         The Minkowski difference (K, 2): the two touch where the origin is on its edge, and are as
         far apart as the origin is from it.
     """
-    one, other = _from_lowest(still), _from_lowest(-moving)
-    sides = np.concatenate([np.roll(p, -1, axis=0) - p for p in (one, other)])
-    heading = np.arctan2(sides[:, 1], sides[:, 0]) % (2.0 * np.pi)
-    sides = sides[np.argsort(heading, kind="stable")]
-    return np.asarray(one[0] + other[0] + np.cumsum(sides, axis=0) - sides)
+    return forbidden_by(Sides.of(still), Sides.of(-moving))
+
+
+def forbidden_by(still: Sides, opposite: Sides) -> Array:
+    """The same of polygons whose sides are known: of the other one, and of the one that is to be
+    placed, turned by half a turn about its origin."""
+    along = np.concatenate((still.along, opposite.along))
+    order = np.argsort(np.concatenate((still.heading, opposite.heading)), kind="stable")
+    along = along[order]
+    return np.asarray(still.start + opposite.start + np.cumsum(along, axis=0) - along)
 
 
 def support_area(reach: Array) -> Array:
@@ -79,8 +122,9 @@ def without_short_sides(polygon: Array, most: float) -> Array:
         most: that it may reach beyond a side that is left out [m].
     """
     while len(polygon) > 3:
-        ends, after = np.roll(polygon, -1, axis=0), np.roll(polygon, -2, axis=0)
-        into, along, out = polygon - np.roll(polygon, 1, axis=0), ends - polygon, after - ends
+        ends = next_ones(polygon)
+        into, along = polygon - previous_ones(polygon), ends - polygon
+        out = next_ones(ends) - ends
         turn = _cross(into, out)
         with np.errstate(divide="ignore", invalid="ignore"):
             tip = polygon + (_cross(along, out) / turn)[:, None] * into
@@ -104,27 +148,21 @@ def distances(polygon: Array, points: Array) -> Array:
 
 def exit_distance(polygon: Array, origin: Array, direction: Array) -> float:
     """How far a point (2,) inside a polygon has to go along a unit direction (2,) to leave it."""
-    along = np.roll(polygon, -1, axis=0) - polygon
-    normal = np.column_stack([along[:, 1], -along[:, 0]])
-    speed = normal @ direction
-    room = np.sum(normal * (polygon - origin), axis=1)
-    return float((room[speed > 0.0] / speed[speed > 0.0]).min())
+    along, to_corner = next_ones(polygon) - polygon, polygon - origin
+    speed = along[:, 1] * direction[0] - along[:, 0] * direction[1]
+    room = along[:, 1] * to_corner[:, 0] - along[:, 0] * to_corner[:, 1]
+    outward = speed > 0.0
+    return float((room[outward] / speed[outward]).min())
 
 
 def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _from_lowest(polygon: Array) -> Array:
-    """The same polygon, beginning with its lowest corner, the left one of two."""
-    first = np.lexsort((polygon[:, 0], polygon[:, 1]))[0]
-    return np.roll(polygon, -int(first), axis=0)
-
-
 def _sides(polygon: Array, points: Array) -> tuple[Array, Array]:
     """Of points (M, 2) and the edges of a polygon (N, 2): how far the points are outside of the
     edges' lines (M, N), and how far beyond the edges' ends, seen along them (M, N) [m]."""
-    along = np.roll(polygon, -1, axis=0) - polygon
+    along = next_ones(polygon) - polygon
     length = np.hypot(along[:, 0], along[:, 1])
     along = along / length[:, None]
     away = points[:, None] - polygon

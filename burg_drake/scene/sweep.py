@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ ACCURACY = 1e-7
 """How far the bounds of a way may be apart at last [m]."""
 STEPS = 200
 """Simplex steps; boxes need about 5, round shapes 15."""
-BLOCK = 128
+BLOCK = 16
 """Pairs that are solved at once."""
 OUTER = 10.0
 """How far the first three points are from the line [m], farther than any shape is."""
@@ -79,10 +80,16 @@ class ConvexShapes:
         """Shapes given in B, expressed in A: `X_AB` is (4, 4)."""
         return ConvexShapes(transform_points(X_AB, self.points), X_AB[:3, :3] @ self.spread)
 
+    @cached_property
+    def _round(self) -> bool:
+        return bool(self.spread.any())
+
     def support(self, shape: Indices, n: Array) -> Array:
         """The points (K, 3) of K shapes that are farthest along vectors n (K, 3)."""
         points, spread = self.points[shape], self.spread[shape]
         corner = np.einsum("kvi,ki->kv", points, n).argmax(axis=1)
+        if not self._round:
+            return np.asarray(points[np.arange(len(n)), corner])
         along = np.einsum("kij,ki->kj", spread, n)
         length = np.sqrt((along * along).sum(axis=1, keepdims=True))
         unit = np.divide(along, length, out=np.zeros_like(along), where=length > 0.0)
@@ -101,6 +108,7 @@ def ways_to_contact(
     direction: Array,
     limit: float,
     offsets: Array | None = None,
+    enough: float = -np.inf,
 ) -> Array:
     """Ways of pairs of shapes, the first one moved, until they touch.
 
@@ -110,6 +118,8 @@ def ways_to_contact(
         direction: (3,) unit vector along which the former go.
         limit: ways that are longer do not count [m].
         offsets: (K, 3) by which the first of each pair starts beside its place; nowhere if None.
+        enough: once a way is known to be shorter than this [m], nothing more is asked: it may still
+            be shorter than what is returned, which is below this, too.
 
     Returns:
         Ways (K,) [m], after which the gap between the two surfaces is at most some 1e-7 m, either
@@ -126,10 +136,11 @@ def ways_to_contact(
     order = order[np.argsort(low[order, 2])]
     ways = np.full(len(shift), np.inf)
     for block in (order[i : i + BLOCK] for i in range(0, len(order), BLOCK)):
-        if low[block[0], 2] > limit:
+        if low[block[0], 2] > limit or limit < enough:
             break
         across = low[block, :2], high[block, :2]
-        ways[block] = _least(a, b, pairs[0][block], pairs[1][block], shift[block], across, limit)
+        i, j = pairs[0][block], pairs[1][block]
+        ways[block] = _least(a, b, i, j, shift[block], across, limit, enough)
         limit = min(limit, float(ways[block].min()))
     return ways
 
@@ -137,9 +148,15 @@ def ways_to_contact(
 def _basis(direction: Array) -> Array:
     """(3, 3) rows: two directions across, and the direction."""
     across = np.eye(3)[np.abs(direction).argmin()]
-    u = np.cross(direction, across)
+    u = _cross(direction, across)
     u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(direction, u), direction])
+    return np.stack([u, _cross(direction, u), direction])
+
+
+def _cross(u: Array, v: Array) -> Array:
+    """Cross product of two vectors (3,): numpy's own takes ten times as long for a single one."""
+    (a, b, c), (d, e, f) = u, v
+    return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
 
 
 def _least(
@@ -150,6 +167,7 @@ def _least(
     shift: Array,
     across: tuple[Array, Array],
     limit: float,
+    enough: float,
 ) -> Array:
     """Ways (K,) of a few pairs along z; infinite above the limit. M reaches from the first to the
     second of `across` (K, 2)."""
@@ -162,34 +180,64 @@ def _least(
     basis = np.repeat(first[None], len(i), axis=0)  # (K, 3 points, 3)
     left = np.arange(len(i))
     for _ in range(STEPS):
-        flat = np.concatenate([basis[..., :2], np.ones((*basis.shape[:2], 1))], axis=2)
-        y = np.linalg.solve(flat, basis[..., 2:])[..., 0]
-        n = np.column_stack([-y[:, :2], np.ones(len(y))])
-        m = scale[left] * n
+        triangles = _Triangles(basis)
+        m = scale[left] * triangles.normal
         w = b.support(j[left], -m) - a.support(i[left], m) - shift[left] - middle[left]
         w = middle[left] + scale[left] * w + ASIDE
-        lower = (n * w).sum(axis=1)
-        share = np.linalg.solve(flat.transpose(0, 2, 1), np.array([0.0, 0.0, 1.0])[:, None])[..., 0]
-        ends = y[:, 2] - lower <= ACCURACY
+        lower = (triangles.normal * w).sum(axis=1)
+        share = triangles.shares(0.0, 0.0)
+        height = (share * basis[..., 2]).sum(axis=1)
         foreign = (np.where(basis[..., 2] == PRICE, share, 0.0) > LEFT).any(axis=1)
+        ends = height - lower <= ACCURACY
         done = ends & ~foreign & (lower >= -ACCURACY)
         ways[left[done]] = lower[done]
         limit = min(limit, float(ways[left].min(initial=np.inf)))
+        short = ~foreign & (height < enough) & (height >= 0.0)  # what is behind is below 0
+        if short.any():
+            ways[left[short]] = height[short]
+            break
         goes_on = ~ends & (lower <= limit)
         if not goes_on.any():
             break
-        w, flat, share = w[goes_on], flat[goes_on], share[goes_on]
+        fall = triangles.shares(w[:, 0], w[:, 1])[goes_on]
         left, basis = left[goes_on], basis[goes_on]
-        basis[np.arange(len(left)), _leaving(flat, share, w)] = w
+        basis[np.arange(len(left)), _leaving(fall, share[goes_on])] = w[goes_on]
     else:
         ways[left] = np.maximum(lower[goes_on], 0.0)
     return np.where(ways <= limit, np.maximum(ways, 0.0), np.inf)
 
 
-def _leaving(flat: Array, share: Array, w: Array) -> Indices:
-    """Which of the three points (K,) makes room for new ones (K, 3): the first one whose share
-    falls to 0 while that of the new one rises."""
-    entering = np.concatenate([w[:, :2], np.ones((len(w), 1))], axis=1)[..., None]
-    fall = np.linalg.solve(flat.transpose(0, 2, 1), entering)[..., 0]
-    ratio = np.where(fall > 1e-9, share / np.where(fall > 1e-9, fall, 1.0), np.inf)
+class _Triangles:
+    """Triangles above the plane across the line.
+
+    Args:
+        corners: (K, 3 corners, 3).
+    """
+
+    def __init__(self, corners: Array) -> None:
+        self._x, self._y = corners[:, 0, 0], corners[:, 0, 1]
+        (self._ax, self._ay, az), (self._bx, self._by, bz) = (
+            (corners[:, k] - corners[:, 0]).T for k in (1, 2)
+        )
+        self._twice_area = self._ax * self._by - self._ay * self._bx
+        rise = np.array([az * self._by - bz * self._ay, self._ax * bz - self._bx * az])
+        self.normal = np.ones((len(corners), 3))
+        """(K, 3) normals of the triangles' planes, 1 along z."""
+        self.normal[:, :2] = -(rise / self._twice_area).T
+
+    def shares(self, x: Array | float, y: Array | float) -> Array:
+        """(K, 3) barycentric coordinates of points in the plane across, by x (K,) and y (K,)."""
+        x, y = x - self._x, y - self._y
+        share = np.empty((len(self._x), 3))
+        share[:, 1] = (x * self._by - y * self._bx) / self._twice_area
+        share[:, 2] = (self._ax * y - self._ay * x) / self._twice_area
+        share[:, 0] = 1.0 - share[:, 1] - share[:, 2]
+        return share
+
+
+def _leaving(fall: Array, share: Array) -> Indices:
+    """Which of the three points (K,) makes room for a new one, whose shares of them are `fall`
+    (K, 3): the first one whose share falls to 0 while that of the new one rises."""
+    falls = fall > 1e-9
+    ratio = np.where(falls, share / np.where(falls, fall, 1.0), np.inf)
     return np.asarray(ratio.argmin(axis=1))

@@ -142,6 +142,30 @@ def test_the_first_contact_of_many_is_the_least(rng: np.random.Generator) -> Non
     assert found.min() == pytest.approx(expected, abs=1e-6)
 
 
+def test_what_is_enough_ends_the_search_and_changes_nothing_else(
+    rng: np.random.Generator,
+) -> None:
+    """Among balls, some of them behind, the least way is known in closed form."""
+    radius, count, sooner = 0.03, 40, 0
+    one, balls = ball(radius), (np.zeros(count, dtype=int), np.arange(count))
+    for _ in range(30):
+        p = rng.uniform((-0.1, -0.1, -1.0), (0.1, 0.1, 1.0), (count, 3))
+        p = p[np.abs(p[:, 2]) > 2.0 * radius]
+        still = ConvexShapes.joined([at(one, tuple(q)) for q in p])
+        pairs = balls[0][: len(p)], balls[1][: len(p)]
+        aside = (p[:, :2] ** 2).sum(axis=1)
+        ahead = (aside < (2.0 * radius) ** 2) & (p[:, 2] > 0.0)
+        ways = p[ahead, 2] - np.sqrt((2.0 * radius) ** 2 - aside[ahead])
+        expected, enough = ways.min(initial=np.inf), rng.uniform(0.0, 0.3)
+        found = ways_to_contact(one, still, pairs, UP, np.inf, enough=enough).min()
+        if expected < enough:
+            assert expected - 2e-6 < found < enough
+            sooner += found > expected + 1e-3
+        else:
+            assert found == pytest.approx(expected, abs=2e-6)
+    assert sooner > 3  # it does end before the way is known
+
+
 def _by_linear_program(p: Array, q: Array, direction: Array) -> float:
     """Way of the hull of p to that of q; infinite if it misses."""
     (A, a), (B, b) = (
