@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Generic, Protocol, TypeVar
 
 from burg_drake.core.errors import BurgError, SimulationError
-from burg_drake.core.processes import cause_of_death, end_with_parent, start_worker
+from burg_drake.core.processes import cause_of_death, start_worker
 
 Result = TypeVar("Result", covariant=True)
 T = TypeVar("T")
@@ -268,7 +268,6 @@ def main(handle: int) -> None:
         handle: file descriptor of this end of the pipe.
     """
     logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
-    end_with_parent()
     connection = Connection(handle)
     try:
         while True:

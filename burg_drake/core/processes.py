@@ -36,7 +36,8 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
     """Starts a process with our import path.
 
     An interrupt from the keyboard reaches the whole group of processes. Workers start with it
-    blocked: the parent alone decides what it means.
+    blocked: the parent alone decides what it means. They end when their parent does, also while
+    they are at work and do not look at their pipe: a parent that is killed cannot end them.
 
     Args:
         module: has a function `main(handle: int)`, called with the file descriptor of its end of
@@ -48,6 +49,7 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
     ours, theirs = Pipe()
     program = (
         f"import sys; sys.path[:] = {sys.path!r};"
+        f" from {__name__} import end_with_parent; end_with_parent({os.getpid()});"
         f" from {module} import main; main({theirs.fileno()})"
     )
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
@@ -65,10 +67,8 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
     return process, ours
 
 
-def end_with_parent() -> None:
-    """Has this worker process end when its parent does, also while it is at work and does not look
-    at its pipe: a parent that is killed cannot end it."""
-    parent = os.getppid()
+def end_with_parent(parent: int) -> None:
+    """Has this process end as soon as its parent, a process identifier, is another one."""
 
     def watch() -> None:
         while os.getppid() == parent:

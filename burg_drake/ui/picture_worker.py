@@ -7,13 +7,11 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from burg_drake.core.errors import BurgError
-from burg_drake.core.processes import end_with_parent
 
 
 def main(handle: int) -> None:
     """Answers requests (folder of a library, object, stable pose, size) until the pipe is closed:
     with a PNG, or with a line that says why there is none."""
-    end_with_parent()
     connection: Connection[Any, Any] = Connection(handle)
     with contextlib.suppress(EOFError, OSError):
         while True:

@@ -64,29 +64,31 @@ def test_there_is_a_processor() -> None:
     assert default_workers() >= 1
 
 
-CHILD = """
+BUSY = """\
+import sys
 import time
-from burg_drake.core.processes import end_with_parent
-end_with_parent()
-print("at work", flush=True)
-time.sleep(60)
-print("left alone", flush=True)
+
+def main(handle):
+    print("at work", file=sys.stderr, flush=True)
+    time.sleep(60)
+    print("left alone", file=sys.stderr, flush=True)
 """
-PARENT = f"""
-import subprocess, sys
-subprocess.Popen([sys.executable, "-c", {CHILD!r}]).wait()
+PARENT = """
+from burg_drake.core.processes import start_worker
+start_worker("busy_worker")[0].wait()
 """
 
 
-def test_a_worker_at_work_ends_with_a_parent_that_is_killed() -> None:
+def test_a_worker_at_work_ends_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "busy_worker.py").write_text(BUSY)
     parent = subprocess.Popen(
         [sys.executable, "-c", PARENT],
-        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
     )
-    assert parent.stdout is not None
-    assert parent.stdout.readline() == "at work\n"
+    assert parent.stderr is not None
+    assert parent.stderr.readline() == "at work\n"
     parent.kill()
-    assert parent.stdout.read() == ""  # to the end of both
+    assert parent.stderr.read() == ""  # to the end of both
     parent.wait()
