@@ -8,18 +8,17 @@ form finding of nets and membranes). Steps are long.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.analysis import Simulator
 
 from burg_drake.core.frames import Array
 from burg_drake.simulation.fall import is_below
-from burg_drake.simulation.neighbours import Neighbours
+from burg_drake.simulation.islands import freeze, islands
 from burg_drake.simulation.settle import BodySpeed, body_place, mean_speed
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.engine import Engine
@@ -45,26 +44,27 @@ class Relaxed:
 
     Attributes:
         X_WO: (4, 4) poses of what is still on the table, by name.
-        alone: those that touched no other.
+        together: those that were not at rest, and touched others.
     """
 
     X_WO: Mapping[str, Array]
-    alone: frozenset[str]
+    together: frozenset[str]
 
 
-def relax(built: StationDiagram, time_limit: float) -> Relaxed:
-    """Steps a scene, from where the documents place everything, until it is calm.
+def relax(built: StationDiagram, moving: Iterable[str], time_limit: float) -> Relaxed:
+    """Steps objects of a scene, from where the documents place everything, until they are calm.
 
     Objects that touch each other come to rest together; once they are, they are left alone.
 
     Args:
         built: the scene without a robot, with `RELAXING` steps.
+        moving: objects that are to come to rest, with all that touches them; others stay.
         time_limit: time that may be stepped [s].
 
     Raises:
         RuntimeError, SystemExit: from Drake.
     """
-    relaxation = _Relaxation(built)
+    relaxation = _Relaxation(built, {built.free[name] for name in moving})
     windows = max(1, round(time_limit / WINDOW_TIME))
     for _ in range(windows):
         if not relaxation.window():
@@ -81,19 +81,16 @@ class _Island:
 
 
 class _Relaxation:
-    def __init__(self, built: StationDiagram) -> None:
+    def __init__(self, built: StationDiagram, loose: Set[BodyIndex]) -> None:
         self._built, self._plant = built, built.plant
         self._simulator = Simulator(built.diagram)
         self._root = self._simulator.get_mutable_context()
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
-        neighbours = Neighbours(built)
-        left = list(built.free.values())
-        self._islands: list[_Island] = []
-        while left:
-            island = neighbours.close_to([left[0]])
-            self._islands.append(_Island([index for index in left if index in island]))
-            left = [index for index in left if index not in island]
-        self._alone = {i.bodies[0] for i in self._islands if len(i.bodies) == 1}
+        found = islands(built)
+        self._islands = [_Island(bodies) for bodies in found if not loose.isdisjoint(bodies)]
+        self._alone = {bodies[0] for bodies in found if len(bodies) == 1}
+        self._loose = {index for island in self._islands for index in island.bodies}
+        freeze(built, self._root, [i for i in built.free.values() if i not in self._loose])
         self._energy = dict.fromkeys(built.free.values(), 0.0)
         self._speed: dict[BodyIndex, BodySpeed] = {}
         self._fallen: set[BodyIndex] = set()
@@ -117,16 +114,15 @@ class _Relaxation:
 
     def result(self) -> Relaxed:
         """Where everything is now."""
-        names = {n: i for n, i in self._built.free.items() if i not in self._fallen}
-        return Relaxed(
-            X_WO={
-                name: self._plant.EvalBodyPoseInWorld(
-                    self._context, self._plant.get_body(index)
-                ).GetAsMatrix4()
-                for name, index in names.items()
-            },
-            alone=frozenset(name for name, index in names.items() if index in self._alone),
-        )
+        built, together = self._built, self._loose - self._alone
+        X_WO = {}
+        for name, index in built.free.items():
+            if index not in self._loose:
+                X_WO[name] = built.X_WO(name)
+            elif index not in self._fallen:
+                body = self._plant.get_body(index)
+                X_WO[name] = body.EvalPoseInWorld(self._context).GetAsMatrix4()
+        return Relaxed(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
 
     def _look(self, island: _Island) -> None:
         """Takes what has fallen out of an island, and freezes it once it is calm."""
@@ -139,7 +135,7 @@ class _Relaxation:
         island.calm = island.calm + 1 if calm else 0
         if island.calm == CALM_WINDOWS:
             self._islands.remove(island)
-            self._freeze(island.bodies)
+            freeze(self._built, self._root, island.bodies)
 
     def _damp(self, body: RigidBody) -> None:
         """Stops a body that has got slower."""
@@ -151,24 +147,6 @@ class _Relaxation:
             self._plant.SetFreeBodySpatialVelocity(self._context, body, STOPPED)
             energy = 0.0
         self._energy[body.index()] = energy
-
-    def _freeze(self, island: list[BodyIndex]) -> None:
-        """Locks bodies, and takes their contacts with each other and with what is fixed out."""
-        bodies = [self._plant.get_body(index) for index in island]
-        for body in bodies:
-            body.Lock(self._context)
-        fixed = [self._built.table, *self._built.fixed.values()]
-        geometries = GeometrySet(
-            [
-                geometry
-                for body in (*bodies, *map(self._plant.get_body, fixed))
-                for geometry in self._plant.GetCollisionGeometriesForBody(body)
-            ]
-        )
-        graph = self._built.scene_graph
-        graph_context = graph.GetMyMutableContextFromRoot(self._root)
-        declaration = CollisionFilterDeclaration().ExcludeWithin(geometries)
-        graph.collision_filter_manager(graph_context).Apply(declaration)
 
 
 def is_slower(speed: BodySpeed, limit: BodySpeed) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.scene.scene import Scene
 from burg_drake.scene.validate import TOUCH_TOLERANCE
-from burg_drake.simulation.creep import creep, let_go
+from burg_drake.simulation.creep import creep
 from burg_drake.simulation.displacement import Displacement, displacement
 from burg_drake.simulation.fall import fall
 from burg_drake.simulation.placed_scene import placed_scene
@@ -29,11 +30,11 @@ DEFAULT_ENGINE = "screening"
 """How time is stepped while objects fall; they come to rest in steps of their own."""
 RELAXING_TIME = 1.0
 """Time that may be stepped in each round of relaxing [s]."""
-LOOSE_TIME = 1.0
-"""Time for which what still creeps after that is let go, in each round [s]."""
-ROUNDS, LOOSE_ROUNDS = 1, 5
-"""Of relaxing, and of letting go, at most. After each, other objects may touch each other than
-before, and these are compliant in a diagram built anew."""
+ROUNDS = 4
+"""After relaxing, of letting go what creeps, at most. After each, other objects may touch each
+other than before, and these are compliant in a diagram built anew."""
+SLOWER = 0.9
+"""What creeps is let go once more if it got slower by this factor, at least."""
 
 
 @dataclass(frozen=True)
@@ -122,23 +123,30 @@ def _at_rest(
     scene: Scene, station: Station, progress: Callable[[float, int], None] | None
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene once it is at rest in the world of its own diagram, and what will not rest."""
-    rounds = 0
-    while True:
+    suspects: frozenset[str] | None = None
+    pace = np.inf
+    for rounds in itertools.count():
         built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
-        moving = creep(built)
+        foretold = creep(built, among=suspects, once=rounds == 0)
         if progress is not None:
-            progress(0.0, len(moving))
-        if not moving or rounds == ROUNDS + LOOSE_ROUNDS:
-            return scene, moving
-        rounds += 1
-        if rounds <= ROUNDS:
+            progress(0.0, len(foretold.moving))
+        if not foretold.moving:
+            break
+        before = scene
+        if rounds == 0:
             slacken(built)
-            relaxed = relax(built, RELAXING_TIME)
-            scene = placed_scene(built, relaxed.X_WO, exact=relaxed.X_WO.keys() - relaxed.alone)
+            relaxed = relax(built, foretold.moving, RELAXING_TIME)
+            scene = placed_scene(built, relaxed.X_WO, exact=relaxed.together)
         else:
-            X_WO = let_go(built, LOOSE_TIME)
             beside = touching(built, built.free.values())
-            scene = placed_scene(built, X_WO, exact=[n for n in X_WO if built.free[n] in beside])
+            exact = [name for name in foretold.doubtful if built.free[name] in beside]
+            scene = placed_scene(built, foretold.X_WO, exact)
+        suspects = foretold.doubtful & scene.instances.keys()
+        goes_on = rounds <= 1 or foretold.pace < SLOWER * pace
+        if rounds == ROUNDS or not goes_on or scene.document == before.document:
+            break
+        pace = foretold.pace
+    return scene, foretold.moving
 
 
 def _require_above(built: StationDiagram) -> None:
