@@ -15,6 +15,7 @@ import numpy as np
 
 from burg_drake.core.content import content_hash, rng_from
 from burg_drake.evaluation.run_document import HASH_DIGITS, software_versions
+from burg_drake.generation.pile import pile
 from burg_drake.generation.rules import broken_rule, require_rules
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.arrange import arrange, choose
@@ -108,7 +109,8 @@ class SceneSampler:
             scene, missing, used = self._draw(number, attempt, folder or Path())
             tries += used
             enough = not missing or (self.recipe.fewer and bool(scene.instances))
-            reason, scene = self._judged(scene) if enough else (NO_ROOM, scene)
+            again = rng_from("dropped again", self._content, number, attempt)
+            reason, scene = self._judged(scene, again) if enough else (NO_ROOM, scene)
             if not reason:
                 scene = self._with_origin(scene, number, attempt)
                 return SampledScene(scene, number, True, missing, attempt, tries, dict(reasons))
@@ -145,12 +147,17 @@ class SceneSampler:
         scene = Scene(document, self.library, folder / f"{name}.yaml")
         return scene, laid_out.missing, laid_out.tries
 
-    def _judged(self, scene: Scene) -> tuple[str, Scene]:
+    def _judged(self, scene: Scene, rng: np.random.Generator) -> tuple[str, Scene]:
         """The first reason to refuse a scene, if any, and the scene at rest."""
         found = self._faults(scene)
         if found:
             return found, scene
-        if self.recipe.settle:
+        if self.recipe.settle and self.recipe.layout == "heap":
+            piled = pile(scene, self.station, self._check, self._shapes, rng)
+            scene = piled.scene
+            if piled.faulty:
+                return self._faults(scene) or MOVING, scene
+        elif self.recipe.settle:
             settled = settle_scene(scene, self.station)
             if settled.fallen or settled.moving:
                 return FALLEN if settled.fallen else MOVING, scene

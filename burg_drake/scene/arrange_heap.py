@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core.frames import Array, make_pose, rotation_from_quaternion
+from burg_drake.core.frames import Array, make_pose, rot_z, rotation_from_quaternion
 from burg_drake.scene.arrangement import Occupied, travel
 from burg_drake.scene.object_shapes import ObjectShape
 
@@ -17,6 +17,10 @@ START_GAP = 0.004
 """Between the hulls of what is dropped, and below the lowest [m]."""
 DRAWS = 6
 """Places of which the lowest is taken."""
+LOW_DRAWS = 30
+"""Places and stable poses of which the lowest is taken, of what is dropped once more."""
+MARGIN = 0.012
+"""From the board's edge, of what is dropped once more [m]."""
 LAYERS = 3.0
 """So many times the spot's area would the objects cover, if they lay as balls do that have their
 size."""
@@ -59,6 +63,34 @@ class Heap:
                 best = X_SO
         if best is not None:
             self._below.append(shape.hull.moved(best))
+        return best
+
+    def stand(self, shape: ObjectShape, X_SO: Array) -> None:
+        """An object is there, at a pose (4, 4) in S."""
+        self._below.append(shape.hull.moved(X_SO))
+
+    def hang_low(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
+        """Hangs an object where its centre of mass gets lowest, anywhere on the board, in one of
+        its stable poses: so it finds what room there is beside a heap.
+
+        Returns:
+            Its pose (4, 4) in S; None if it is larger than the board.
+        """
+        entry, best, lowest = shape.library.entry(shape.name), None, np.inf
+        for _ in range(LOW_DRAWS):
+            pose = int(rng.integers(len(entry.stable_poses)))
+            R_SO = rot_z(rng.uniform(0.0, 2.0 * np.pi)) @ entry.X_SO(pose)[:3, :3]
+            corners = shape.corners @ R_SO.T
+            lower, upper = corners.min(axis=0), corners.max(axis=0)
+            least, most = MARGIN - lower[:2], self._size - MARGIN - upper[:2]
+            if (least > most).any():
+                continue
+            X_SO = self._let_down(shape, R_SO, rng.uniform(least, most), float(lower[2]))
+            height = float((X_SO @ (*entry.mass_properties.center_of_mass, 1.0))[2])
+            if height < lowest:
+                best, lowest = X_SO, height
+        if best is not None:
+            self.stand(shape, best)
         return best
 
     def _let_down(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:

@@ -23,8 +23,9 @@ IN_BOUNDS_TOLERANCE = 1e-4
 TOUCH_TOLERANCE = 1e-3
 """How deep an object may start in another one [m]: it settles within a step."""
 SINK_TOLERANCE = 2.5e-3
-"""How deep an object may be in table or ground [m]: the simulated table yields, and what stands on
-an edge or a tip, as a toy airplane of 570 g on its wing, sinks in by up to 2 mm."""
+"""How deep an object may be in table, ground or a box of the station [m]: they yield in simulation,
+and what stands on an edge or a tip, as a toy airplane of 570 g on its wing, sinks in by up to 2
+mm."""
 HOVER_TOLERANCE = 1e-3
 """How far an object may start above the board [m] before that is worth a word: trials count its
 fall among what was moved."""

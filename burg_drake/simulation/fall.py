@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 
 from burg_drake.core.frames import Array
 from burg_drake.simulation.crowd import crowded
+from burg_drake.simulation.islands import freeze
 from burg_drake.simulation.settle import BodySpeed, RestCriterion, settle
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.touching import soften
@@ -49,6 +50,8 @@ def fall(
     built: StationDiagram,
     time_limit: float,
     progress: Callable[[float, int], None] | None = None,
+    *,
+    held: Collection[BodyIndex] = (),
 ) -> Fall:
     """Simulates until all objects are slow, or time is up.
 
@@ -57,6 +60,7 @@ def fall(
         time_limit: simulated time allowed [s].
         progress: called now and then with the simulated time since the last call [s] and how many
             objects still move.
+        held: free bodies that stay where they are.
 
     Raises:
         RuntimeError, SystemExit: from Drake, or a pose is not finite.
@@ -64,7 +68,8 @@ def fall(
     soften(built, crowded(built))
     simulator = Simulator(built.diagram)
     context = built.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    names = {index: name for name, index in built.free.items()}
+    freeze(built, simulator.get_mutable_context(), held)
+    names = {index: name for name, index in built.free.items() if index not in held}
     fallen: set[str] = set()
     while True:
         now = simulator.get_context().get_time()

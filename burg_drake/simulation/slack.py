@@ -8,8 +8,11 @@ tolerance.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pydrake.geometry import ProximityProperties, RoleAssign
 from pydrake.multibody.plant import CoulombFriction
+from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.station.diagram import StationDiagram
 
@@ -24,10 +27,21 @@ def slacken(built: StationDiagram, share: float = SHARE) -> None:
         built: a diagram.
         share: of the coefficients that is left.
     """
+    bodies = [built.table, *built.free.values(), *built.fixed.values()]
+    slacken_bodies(built, dict.fromkeys(bodies, share))
+
+
+def slacken_bodies(built: StationDiagram, shares: Mapping[BodyIndex, float]) -> None:
+    """Lowers the coefficients of friction of some bodies, in all Contexts that are created from now
+    on.
+
+    Args:
+        built: a diagram.
+        shares: of a body's coefficients that are left.
+    """
     graph, source = built.diagram.mutable_scene_graph(), built.plant.get_source_id()
     inspector = graph.model_inspector()
-    bodies = [built.table, *built.free.values(), *built.fixed.values()]
-    for index in bodies:
+    for index, share in shares.items():
         for geometry in built.plant.GetCollisionGeometriesForBody(built.plant.get_body(index)):
             properties = ProximityProperties(inspector.GetProximityProperties(geometry))
             friction = properties.GetProperty("material", "coulomb_friction")

@@ -165,12 +165,13 @@ class SceneCheck:
         among, fixed = self._world.overlaps()
         rank = {name: i for i, name in enumerate(self._world.bodies)}
         of_fixed = {name: len(rank) + i for i, name in enumerate(self._world.fixed)}
+        yielding = {"table", *self._station.document.background}
         found = [(rank[a], rank[b], a, b, depth) for (a, b), depth in among.items()]
         found += [(rank[a], of_fixed[b], a, b, depth) for (a, b), depth in fixed.items()]
         return [
             (a, b, depth)
             for _, _, a, b, depth in sorted(found)
-            if depth > (SINK_TOLERANCE if b == "table" else TOUCH_TOLERANCE)
+            if depth > (SINK_TOLERANCE if b in yielding else TOUCH_TOLERANCE)
             and a in scene.instances
             and not (b == "table" and depth < DEEPEST and self._is_borne(a, scene))
         ]
