@@ -59,7 +59,7 @@ SAMPLED: dict[Layout, int] = {
     "close": 6,
     "touching": 6,
     "packed": 8,
-    "heap": 9,
+    "heap": 7,
 }
 """Objects of a sampled scene by layout."""
 

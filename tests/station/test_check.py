@@ -81,6 +81,16 @@ def test_obstacle_of_the_station(library: Path, panda: Station, tmp_path: Path) 
     assert issue.message == "'cube_0' and 'wall' overlap by 5.0 mm; move them apart"
 
 
+def test_what_leans_on_a_box_of_the_station_may_sink_into_it_as_into_the_table(
+    library: Path, panda: Station, tmp_path: Path
+) -> None:
+    scene = scene_of(library, tmp_path, (0.215, 0.2, HEIGHT))
+    for depth, fine in ((2.4e-3, True), (2.6e-3, False)):
+        wall = Obstacle(X_WB=Pose((0.255 - depth, 0.2, 0.1)), size=(0.02, 0.3, 0.2))
+        issues = check_scene(scene, bare_station(panda, background={"wall": wall}))
+        assert (issues == ()) is fine, issues
+
+
 def test_buried_is_said_once(library: Path, panda: Station, tmp_path: Path) -> None:
     issue = only(check_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT - 0.01)), panda))
     assert issue.kind == "in_ground"

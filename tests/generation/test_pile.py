@@ -1,0 +1,42 @@
+"""Heaps: what ends where it may not is dropped once more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core.schema import Pose
+from burg_drake.generation.pile import pile
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.board import Board
+from burg_drake.scene.object_shapes import ObjectShapes
+from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.stillness import stillness
+from burg_drake.station.scene_check import SceneCheck
+from burg_drake.station.station import Station
+
+BESIDE = -0.12
+"""x in S of what hangs beside the board, above the table [m]."""
+
+
+def test_what_falls_beside_the_board_is_dropped_once_more(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    placed = {"box": (0.2, 0.15, 0.05), "can": (BESIDE, 0.15, 0.05)}
+    instances = tuple(Instance(object=name, X_SO=Pose(p)) for name, p in placed.items())
+    document = SceneDocument(
+        name="heap", library="household", board=Board(size=(0.42, 0.297)), instances=instances
+    )
+    scene = Scene(document, household, Path("heap.yaml"))
+    check = SceneCheck(tabletop, household)
+    assert {i.instance for i in check.issues(scene) if i.kind == "out_of_bounds"} == {"can"}
+
+    piled = pile(scene, tabletop, check, ObjectShapes(household), np.random.default_rng(0))
+
+    assert piled.drops >= 1 and piled.faulty == ()
+    assert list(piled.scene.instances) == ["box", "can"]
+    assert piled.scene.X_SO("can")[0, 3] > 0.0
+    assert not [issue for issue in check.issues(piled.scene) if issue.is_error]
+    for moved in stillness(piled.scene, tabletop, duration=1.0).values():
+        assert moved.distance < 5e-4 and moved.angle < np.deg2rad(0.1)
