@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from pydrake.multibody.math import SpatialVelocity
@@ -52,6 +51,7 @@ def fall(
     progress: Callable[[float, int], None] | None = None,
     *,
     held: Collection[BodyIndex] = (),
+    before_poll: Callable[[Context, Collection[BodyIndex]], None] | None = None,
 ) -> Fall:
     """Simulates until all objects are slow, or time is up.
 
@@ -61,6 +61,8 @@ def fall(
         progress: called now and then with the simulated time since the last call [s] and how many
             objects still move.
         held: free bodies that stay where they are.
+        before_poll: called now and then with the plant's Context, whose velocities it may change,
+            and what falls.
 
     Raises:
         RuntimeError, SystemExit: from Drake, or a pose is not finite.
@@ -74,13 +76,19 @@ def fall(
     while True:
         now = simulator.get_context().get_time()
         watched = [index for index, name in names.items() if name not in fallen]
+
+        def intervene(watched: list[BodyIndex] = watched) -> None:
+            _brake(built, context, watched, SLOW.poll)
+            if before_poll is not None:
+                before_poll(context, watched)
+
         settled = settle(
             simulator,
             built.plant,
             watched,
             min(STRETCH, time_limit - now),
             SLOW,
-            before_poll=partial(_brake, built, context, watched, SLOW.poll),
+            before_poll=intervene,
         )
         for index in settled.moving:
             if is_below(built, context, index):

@@ -8,13 +8,14 @@ form finding of nets and membranes). Steps are long.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Callable, Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
 
 from burg_drake.core.frames import Array
 from burg_drake.simulation.fall import is_below
@@ -51,7 +52,12 @@ class Relaxed:
     together: frozenset[str]
 
 
-def relax(built: StationDiagram, moving: Iterable[str], time_limit: float) -> Relaxed:
+def relax(
+    built: StationDiagram,
+    moving: Iterable[str],
+    time_limit: float,
+    before_window: Callable[[Context, Collection[BodyIndex]], None] | None = None,
+) -> Relaxed:
     """Steps objects of a scene, from where the documents place everything, until they are calm.
 
     Objects that touch each other come to rest together; once they are, they are left alone.
@@ -60,6 +66,8 @@ def relax(built: StationDiagram, moving: Iterable[str], time_limit: float) -> Re
         built: the scene without a robot, with `RELAXING` steps.
         moving: objects that are to come to rest, with all that touches them; others stay.
         time_limit: time that may be stepped [s].
+        before_window: called every 0.1 s with the plant's Context, whose velocities it may change,
+            and what is awake.
 
     Raises:
         RuntimeError, SystemExit: from Drake.
@@ -67,6 +75,8 @@ def relax(built: StationDiagram, moving: Iterable[str], time_limit: float) -> Re
     relaxation = _Relaxation(built, {built.free[name] for name in moving})
     windows = max(1, round(time_limit / WINDOW_TIME))
     for _ in range(windows):
+        if before_window is not None:
+            before_window(relaxation.context, relaxation.awake)
         if not relaxation.window():
             break
     return relaxation.result()
@@ -85,7 +95,7 @@ class _Relaxation:
         self._built, self._plant = built, built.plant
         self._simulator = Simulator(built.diagram)
         self._root = self._simulator.get_mutable_context()
-        self._context = self._plant.GetMyMutableContextFromRoot(self._root)
+        self.context = self._plant.GetMyMutableContextFromRoot(self._root)
         found = islands(built)
         self._islands = [_Island(bodies) for bodies in found if not loose.isdisjoint(bodies)]
         self._alone = {bodies[0] for bodies in found if len(bodies) == 1}
@@ -96,17 +106,22 @@ class _Relaxation:
         self._fallen: set[BodyIndex] = set()
         self._steps = 0
 
+    @property
+    def awake(self) -> list[BodyIndex]:
+        """Bodies that are not calm yet."""
+        return [index for island in self._islands for index in island.bodies]
+
     def window(self) -> int:
         """Steps on; returns how many islands are not calm yet."""
-        awake = [self._plant.get_body(index) for island in self._islands for index in island.bodies]
-        before = {body.index(): body_place(body, self._context) for body in awake}
+        awake = [self._plant.get_body(index) for index in self.awake]
+        before = {body.index(): body_place(body, self.context) for body in awake}
         for _ in range(WINDOW):
             self._steps += 1
             self._simulator.AdvanceTo(self._steps * RELAXING.time_step)
             for body in awake:
                 self._damp(body)
         for body in awake:
-            place = body_place(body, self._context)
+            place = body_place(body, self.context)
             self._speed[body.index()] = mean_speed(before[body.index()], place, WINDOW_TIME)
         for island in list(self._islands):
             self._look(island)
@@ -121,15 +136,15 @@ class _Relaxation:
                 X_WO[name] = built.X_WO(name)
             elif index not in self._fallen:
                 body = self._plant.get_body(index)
-                X_WO[name] = body.EvalPoseInWorld(self._context).GetAsMatrix4()
+                X_WO[name] = body.EvalPoseInWorld(self.context).GetAsMatrix4()
         return Relaxed(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
 
     def _look(self, island: _Island) -> None:
         """Takes what has fallen out of an island, and freezes it once it is calm."""
-        for index in [i for i in island.bodies if is_below(self._built, self._context, i)]:
+        for index in [i for i in island.bodies if is_below(self._built, self.context, i)]:
             island.bodies.remove(index)
             self._fallen.add(index)
-            self._plant.get_body(index).Lock(self._context)
+            self._plant.get_body(index).Lock(self.context)
         limit = CALM if self._alone.issuperset(island.bodies) else GROUP_CALM
         calm = all(is_slower(self._speed[index], limit) for index in island.bodies)
         island.calm = island.calm + 1 if calm else 0
@@ -139,12 +154,12 @@ class _Relaxation:
 
     def _damp(self, body: RigidBody) -> None:
         """Stops a body that has got slower."""
-        V_WO = self._plant.EvalBodySpatialVelocityInWorld(self._context, body)
-        R_WO = self._plant.EvalBodyPoseInWorld(self._context, body).rotation()
+        V_WO = self._plant.EvalBodySpatialVelocityInWorld(self.context, body)
+        R_WO = self._plant.EvalBodyPoseInWorld(self.context, body).rotation()
         M_OO_W = body.default_spatial_inertia().ReExpress(R_WO)
         energy = 0.5 * float((M_OO_W * V_WO).dot(V_WO))
         if energy < self._energy[body.index()]:
-            self._plant.SetFreeBodySpatialVelocity(self._context, body, STOPPED)
+            self._plant.SetFreeBodySpatialVelocity(self.context, body, STOPPED)
             energy = 0.0
         self._energy[body.index()] = energy
 

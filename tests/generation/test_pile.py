@@ -16,11 +16,11 @@ from burg_drake.simulation.stillness import stillness
 from burg_drake.station.scene_check import SceneCheck
 from burg_drake.station.station import Station
 
-BESIDE = -0.12
-"""x in S of what hangs beside the board, above the table [m]."""
+BESIDE = -3.0
+"""x in S of what hangs beside the table [m]."""
 
 
-def test_what_falls_beside_the_board_is_dropped_once_more(
+def test_what_falls_off_the_table_is_dropped_once_more(
     household: ObjectLibrary, tabletop: Station
 ) -> None:
     placed = {"box": (0.2, 0.15, 0.05), "can": (BESIDE, 0.15, 0.05)}

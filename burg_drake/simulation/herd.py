@@ -1,0 +1,64 @@
+"""Keeps objects on the board while they fall or come to rest.
+
+What gets beyond the edge is sent back as fast as it has to be to slide that far. Walls would be
+simpler, but things come to lean at walls, and fall over once these are gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import Context
+
+from burg_drake.core.frames import inverse, transform_points
+from burg_drake.scene.object_shapes import ObjectShapes
+from burg_drake.station.diagram import StationDiagram
+
+SLACK = 0.001
+"""By which an object may be further out than the margin [m]."""
+BRAKING = 10.0
+"""Objects that slide are braked by this [m/s^2], at a coefficient of friction of about 1."""
+SPEED_LIMIT = 1.0
+"""At which objects are sent back [m/s]."""
+
+
+class Herd:
+    """Sends bodies back that get beyond the edge of the board."""
+
+    def __init__(self, built: StationDiagram, shapes: ObjectShapes, margin: float) -> None:
+        """
+        Args:
+            built: a diagram.
+            shapes: of the library's objects.
+            margin: that objects keep from the edge [m].
+        """
+        scene = built.scene
+        self._plant = built.plant
+        self._corners = {
+            index: shapes[scene.instances[name].object].corners
+            for name, index in built.free.items()
+        }
+        self._X_WS = built.station.document.X_WS.matrix()
+        self._X_SW = inverse(self._X_WS)
+        self._least, self._most = np.full(2, margin), np.array(scene.board.size) - margin
+
+    def drive(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
+        """Gives some bodies the speed that takes them back, in the plant's Context."""
+        for index in bodies:
+            body = self._plant.get_body(index)
+            X_WO = self._plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+            p_S = transform_points(self._X_SW @ X_WO, self._corners[index])[:, :2]
+            inwards = np.maximum(0.0, self._least - p_S.min(axis=0))
+            outwards = np.maximum(0.0, p_S.max(axis=0) - self._most)
+            way = np.append(inwards - outwards, 0.0)
+            distance = np.linalg.norm(way)
+            if distance > SLACK and not body.is_locked(context):
+                direction = self._X_WS[:3, :3] @ way / distance
+                V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, body)
+                wanted = min(SPEED_LIMIT, np.sqrt(2.0 * BRAKING * distance))
+                lacking = max(0.0, wanted - direction @ V_WO.translational())
+                faster = SpatialVelocity(np.zeros(3), lacking * direction)
+                self._plant.SetFreeBodySpatialVelocity(context, body, V_WO + faster)
