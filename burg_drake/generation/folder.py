@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.files import atomic_write, open_regular, remove_unfinished, writable_folder
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.generation.sample import SampledScene
 from burg_drake.scene.origin import Ingredients
-from burg_drake.scene.scene import save_scene
+from burg_drake.scene.scene import SceneDocument, save_scene
 
 RECIPE_FILE = "recipe.yaml"
 TABLE_FILE = "scenes.csv"
@@ -114,7 +114,7 @@ class SceneFolder:
         Raises:
             InvalidInputError: it cannot be written to, another process is writing it, it holds
                 scenes that are made with other things, or something that is none of this.
-            DocumentError: its recipe is damaged.
+            DocumentError: its recipe or a scene is damaged.
         """
         self.path = writable_folder(path)
         self._lock = os.open(self.path, os.O_RDONLY)
@@ -154,6 +154,9 @@ class SceneFolder:
         self.rows = {
             n: row for n, row in self.rows.items() if not row.accepted or self.file(n).is_file()
         }
+        for number, row in self.rows.items():
+            if row.accepted:
+                _require_sound(self.file(number))
         self.sort()
 
     def file(self, number: int) -> Path:
@@ -183,7 +186,7 @@ class SceneFolder:
         """Writes the table in the order of the scenes."""
         rows = [self.rows[number].text() for number in sorted(self.rows)]
         text = ",".join(COLUMNS) + "\n" + "".join(rows)
-        if not self._table.is_file() or self._table.read_text(encoding="utf-8") != text:
+        if not self._table.is_file() or self._table.read_bytes() != text.encode():
             atomic_write(self._table, text)
 
     def __enter__(self) -> SceneFolder:
@@ -196,6 +199,13 @@ class SceneFolder:
         trace: TracebackType | None,
     ) -> None:
         os.close(self._lock)
+
+
+def _require_sound(path: Path) -> None:
+    try:
+        load_document(path, SceneDocument)
+    except DocumentError as error:
+        raise DocumentError(f"{error}; mend it, or delete it and it is made again") from error
 
 
 def read_table(path: Path) -> list[Row]:

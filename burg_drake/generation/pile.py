@@ -33,8 +33,11 @@ DROPS = 10
 """So often is something dropped once more, at most."""
 SLACKS = (0.25, 0.15, 0.1)
 """Shares of friction that are left while an object relaxes: the first time, and when it creeps."""
+MARGIN, MARGIN_SHARE = 0.03, 0.07
+"""At first objects are kept so far within the board's edge [m], or by such a share of its shorter
+side: when they relax, they still shift."""
 EDGE = 0.003
-"""What relaxes is kept so far within the board's edge [m]."""
+"""What relaxes, or is dropped once more, is kept so far within the board's edge [m]."""
 RELAXING_TIME = 1.0
 """Time that may be stepped in each round of relaxing [s]."""
 
@@ -75,17 +78,20 @@ def pile(
     """
     ground = _Ground(station, check, shapes)
     falling: Collection[str] = scene.instances
+    margin = min(MARGIN, MARGIN_SHARE * min(scene.board.size))
     for drops in range(DROPS + 1):
         try:
-            landed = _with_lost(land(scene, station, falling, shapes), scene)
-            scene, faulty = ground.rested(landed)
+            landed = land(scene, station, falling, shapes, margin)
+            lost = scene.instances.keys() - landed.instances.keys()
+            scene = _with_lost(landed, scene)
+            scene, faulty = (scene, lost) if lost else ground.rested(scene)
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             raise SimulationError(
                 f"{scene.path}: the heap cannot be simulated: {' '.join(str(error).split())}"
             ) from error
         if not faulty or drops == DROPS:
             break
-        scene, falling = ground.hung_again(scene, faulty, rng), faulty
+        scene, falling, margin = ground.hung_again(scene, faulty, rng), faulty, EDGE
     return Piled(scene, tuple(sorted(faulty)), drops)
 
 
@@ -138,7 +144,7 @@ class _Ground:
         """A scene whose objects have come to rest with shares of their friction."""
         built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING)
         slacken_bodies(built, {built.free[name]: share for name, share in slack.items()})
-        herd = Herd(built, self.shapes, EDGE)
+        herd = Herd(built, self.shapes, margin=EDGE, share=1.0)  # what gets slower is stopped
         relaxed = relax(built, moving, RELAXING_TIME, before_window=herd.drive)
         return _with_lost(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 

@@ -17,23 +17,26 @@ from burg_drake.core.frames import inverse, transform_points
 from burg_drake.scene.object_shapes import ObjectShapes
 from burg_drake.station.diagram import StationDiagram
 
-SLACK = 0.001
-"""By which an object may be further out than the margin [m]."""
-BRAKING = 10.0
-"""Objects that slide are braked by this [m/s^2], at a coefficient of friction of about 1."""
-SPEED_LIMIT = 1.0
-"""At which objects are sent back [m/s]."""
+TOLERANCE = 0.001
+"""An object may be so much further out than the margin [m]."""
+FRICTION = 0.3
+"""Coefficient of friction between the board and most objects; what slides is braked by it."""
+GRAVITY = 9.81
+"""[m/s^2]."""
 
 
 class Herd:
     """Sends bodies back that get beyond the edge of the board."""
 
-    def __init__(self, built: StationDiagram, shapes: ObjectShapes, margin: float) -> None:
+    def __init__(
+        self, built: StationDiagram, shapes: ObjectShapes, *, margin: float, share: float
+    ) -> None:
         """
         Args:
             built: a diagram.
             shapes: of the library's objects.
             margin: that objects keep from the edge [m].
+            share: of friction that is left.
         """
         scene = built.scene
         self._plant = built.plant
@@ -44,21 +47,28 @@ class Herd:
         self._X_WS = built.station.document.X_WS.matrix()
         self._X_SW = inverse(self._X_WS)
         self._least, self._most = np.full(2, margin), np.array(scene.board.size) - margin
+        self._braking = share * FRICTION * GRAVITY
 
     def drive(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
-        """Gives some bodies the speed that takes them back, in the plant's Context."""
+        """Gives those that are too far out the speed at which they slide back.
+
+        Args:
+            context: the plant's; its velocities change.
+            bodies: free ones; those that are locked stay where they are.
+        """
         for index in bodies:
             body = self._plant.get_body(index)
-            X_WO = self._plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
-            p_S = transform_points(self._X_SW @ X_WO, self._corners[index])[:, :2]
+            X_WO = self._plant.EvalBodyPoseInWorld(context, body)
+            p_S = transform_points(self._X_SW @ X_WO.GetAsMatrix4(), self._corners[index])[:, :2]
             inwards = np.maximum(0.0, self._least - p_S.min(axis=0))
             outwards = np.maximum(0.0, p_S.max(axis=0) - self._most)
             way = np.append(inwards - outwards, 0.0)
             distance = np.linalg.norm(way)
-            if distance > SLACK and not body.is_locked(context):
+            if distance > TOLERANCE and not body.is_locked(context):
                 direction = self._X_WS[:3, :3] @ way / distance
                 V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, body)
-                wanted = min(SPEED_LIMIT, np.sqrt(2.0 * BRAKING * distance))
-                lacking = max(0.0, wanted - direction @ V_WO.translational())
+                V_WOcm = V_WO.Shift(X_WO.rotation() @ body.default_com())
+                wanted = np.sqrt(2.0 * self._braking * distance)
+                lacking = max(0.0, wanted - direction @ V_WOcm.translational())
                 faster = SpatialVelocity(np.zeros(3), lacking * direction)
                 self._plant.SetFreeBodySpatialVelocity(context, body, V_WO + faster)

@@ -28,13 +28,15 @@ LANDING_TIME = 2.0
 """Simulated at most [s]."""
 FRICTION = 0.25
 """Share of friction that is left while something falls."""
-MARGIN = 0.03
-"""What falls is kept so far within the board's edge [m]: what rests may still shift ..."""
-MARGIN_SHARE = 0.07
-"""... or by such a share of the shorter side."""
 
 
-def land(scene: Scene, station: Station, falling: Collection[str], shapes: ObjectShapes) -> Scene:
+def land(
+    scene: Scene,
+    station: Station,
+    falling: Collection[str],
+    shapes: ObjectShapes,
+    margin: float,
+) -> Scene:
     """The scene once some objects have fallen, without those that fell off the table.
 
     Args:
@@ -42,13 +44,14 @@ def land(scene: Scene, station: Station, falling: Collection[str], shapes: Objec
         station: table, pose of the board and obstacles.
         falling: names of what falls; all else stays where it is.
         shapes: of the library's objects.
+        margin: what falls is kept so far within the board's edge [m].
 
     Raises:
         RuntimeError, SystemExit: from Drake.
     """
     if len(falling) == len(scene.instances):
-        scene = _fallen(scene, station, falling, shapes, TUMBLING, TUMBLING_TIME)
-    return _fallen(scene, station, falling, shapes, LANDING, LANDING_TIME)
+        scene = _fallen(scene, station, falling, shapes, margin, TUMBLING, TUMBLING_TIME)
+    return _fallen(scene, station, falling, shapes, margin, LANDING, LANDING_TIME)
 
 
 def _fallen(
@@ -56,13 +59,14 @@ def _fallen(
     station: Station,
     falling: Collection[str],
     shapes: ObjectShapes,
+    margin: float,
     engine: Engine,
     time_limit: float,
 ) -> Scene:
+    """The scene after a stage of falling."""
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     slacken(built, FRICTION)
     held = [index for name, index in built.free.items() if name not in falling]
-    margin = min(MARGIN, MARGIN_SHARE * min(scene.board.size))
-    herd = Herd(built, shapes, margin)
+    herd = Herd(built, shapes, margin=margin, share=FRICTION)
     end = fall(built, time_limit, held=held, before_poll=herd.drive)
     return placed_scene(built, end.X_WO)

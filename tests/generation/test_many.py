@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.generation.many import SampledFolder, sample_scenes
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.board import Board
@@ -78,6 +78,20 @@ def test_what_is_there_is_not_sampled_again(
     assert contents(whole) == before
     more: SampledFolder = sample_scenes(RECIPE, household, tabletop, whole, 13)
     assert more.new == (12,)
+
+
+def test_damaged_files(whole: Path, household: ObjectLibrary, tabletop: Station) -> None:
+    """A table is made again from what is there; a scene that someone may have edited is not."""
+    before = contents(whole)
+    (whole / "scenes.csv").write_bytes(b"\x87\x00\xff" * 50)
+    sample_scenes(RECIPE, household, tabletop, whole, 12)
+    assert contents(whole) == before
+    scene = min(whole.glob("scene_*.yaml"))
+    text = scene.read_bytes()
+    scene.write_bytes(b"")
+    with pytest.raises(DocumentError, match=f"{scene.name}: .*empty.*; mend it, or delete it"):
+        sample_scenes(RECIPE, household, tabletop, whole, 12)
+    scene.write_bytes(text)
 
 
 def test_another_recipe_is_refused(

@@ -14,11 +14,12 @@ from burg_drake.objects.library import load_library
 from burg_drake.scene.object_shapes import ObjectShapes
 from burg_drake.scene.scene import Instance, Scene, SceneDocument
 from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.land import MARGIN, land
+from burg_drake.simulation.land import land
 from burg_drake.simulation.settle_scene import settle_scene
 from burg_drake.station.check import overlaps
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.engine import ENGINES
+from burg_drake.station.station import load_station
 
 EDGE = 0.05
 """Of the blocks [m]; they stand on their origins."""
@@ -85,6 +86,16 @@ def test_a_heap_of_household_objects(tmp_path) -> None:
     assert max(depths.values()) < 1e-3
 
 
+def test_what_only_seems_to_creep_at_first_is_at_rest(tmp_path) -> None:
+    """A can that has come to rest: of its pose only the rounded digits are not in equilibrium."""
+    pose = {"rpy_deg": (90.8228, 85.2632, 121.3462)}
+    can = placed("can", "can", 0.356232, 0.087259, 0.03361, **pose)
+    document = SceneDocument(name="can", library="household", instances=(can,))
+    scene = Scene(document, load_library("household"), tmp_path / "can.yaml")
+    settled = settle_scene(scene, load_station("panda_tabletop"))
+    assert settled.at_rest and settled.scene.instances["can"] == can
+
+
 def test_what_falls_when_time_is_up_is_named_with_its_speed(make_scene) -> None:
     """The mean speed of the last 40 ms is that of free fall at their middle."""
     scene = make_scene(("block", 0.2, 0.2, 0.0), placed("high", "ball", 0.4, 0.2, 1.0))
@@ -116,10 +127,18 @@ def test_what_lands_is_kept_on_the_board(make_scene) -> None:
     )
     width = scene.board.size[0]
     assert settle_scene(scene, make_station()).scene.X_SO("ball")[0, 3] > width
-    landed = land(scene, make_station(), ["ball"], ObjectShapes(scene.library))
+    landed = land(scene, make_station(), ["ball"], ObjectShapes(scene.library), 0.03)
     center = (landed.X_SO("ball") @ (0.0, 0.0, 0.03, 1.0))[0]  # of the ball, whose radius is 30 mm
-    assert 0.53 < center < width - MARGIN - 0.03 + 0.003
+    assert 0.53 < center < width - 0.03 - 0.03 + 0.003
     assert landed.instances["block"] == scene.instances["block"]  # to the last digit
+
+
+def test_what_sinks_into_the_table_is_let_go_unless_it_is_deep(make_scene) -> None:
+    settled = settle_scene(make_scene(placed("low", "block", 0.3, 0.2, -0.002)), make_station())
+    assert settled.at_rest
+    assert settled.scene.X_SO("low")[2, 3] == pytest.approx(0.0, abs=2e-4)
+    with pytest.raises(InvalidInputError, match="'low' and 'table' overlap by"):
+        settle_scene(make_scene(placed("low", "block", 0.3, 0.2, -0.008)), make_station())
 
 
 def test_background_stays_and_carries(make_scene) -> None:
