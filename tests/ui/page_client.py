@@ -16,6 +16,7 @@ import viser
 import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
 
 from burg_drake.ui.door import Door
 
@@ -46,8 +47,8 @@ def coming_in(door: Door) -> ClientConnection:
     """A connection as a page has it."""
     return connect(
         f"ws://127.0.0.1:{door.port}/",
-        origin=f"http://127.0.0.1:{door.port}",
-        subprotocols=[f"viser-v{viser.__version__}"],
+        origin=Origin(f"http://127.0.0.1:{door.port}"),
+        subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
         max_size=None,
         compression=None,
     )
@@ -103,6 +104,10 @@ class PageClient:
     def value(self, folder: str, label: str) -> Any:
         """What stands in a field of a folder."""
         return self._control(folder, label)["value"]
+
+    def options(self, folder: str, label: str) -> list[str]:
+        """What a field offers."""
+        return list(self._control(folder, label)["options"])
 
     def shown(self, folder: str, label: str) -> bool:
         """Whether a field can be seen."""

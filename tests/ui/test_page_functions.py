@@ -115,8 +115,9 @@ def test_the_board_has_the_size_that_was_chosen(
     assert saved() == (0.594, 0.42)
     client.give(BOARD, "Lies", "upright")
     until(lambda: session.view.document.board.size == (0.42, 0.594), "A2 upright")
+    assert page.actions.queue.idle(PATIENCE)
     busy = threading.Event()  # what is chosen meanwhile waits, and is not lost
-    page.actions.ask(busy.wait)
+    page.actions.ask(lambda: busy.wait(PATIENCE))
     page.actions.ask(page._refresh, patient=True)
     client.give(BOARD, "Lies", "across")
     until(lambda: page._board_panel._way.value == "across", "the choice has arrived")
@@ -302,8 +303,8 @@ def test_a_scene_that_cannot_be_opened_leaves_the_open_one(
     assert before.path is not None
     text = before.path.read_text()
     before.path.with_name("strange.yaml").write_text(text.replace("object: mug", "object: mugg"))
-    session.refresh()
-    until(lambda: client.value("Load", "Scene"), "scenes")
+    session.select(())
+    until(lambda: "strange" in client.options("Load", "Scene"), "it is offered")
     client.give("Load", "Scene", "strange")
     client.click("Load", "Load scene")
     until(lambda: client.told, "a word")
