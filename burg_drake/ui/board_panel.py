@@ -28,9 +28,7 @@ class BoardPanel:
         self._own = False
         with gui.add_folder("Board"):
             self._size = actions.chosen(gui.add_dropdown("Size", (*BOARD_SIZES, OWN)), self._choose)
-            self._way = actions.chosen(
-                gui.add_dropdown("Lies", (ACROSS, UPRIGHT)), lambda way: self._choose(None)
-            )
+            self._way = actions.chosen(gui.add_dropdown("Lies", (ACROSS, UPRIGHT)), self._turn)
             self._extents = actions.typed(
                 gui.add_vector2(
                     "Width, depth [mm]",
@@ -53,13 +51,17 @@ class BoardPanel:
         self._extents.handle.visible = self._own
         self._extents.show(tuple(round(1e3 * side, 3) for side in size))
 
-    def _choose(self, name: str | None) -> None:
-        name = name or self._size.value
+    def _choose(self, name: str) -> None:
         self._own = name == OWN
         if self._own:
             self.show(self._actions.session.view)
             return
-        self._set(board_size(name, upright=self._way.value == UPRIGHT))
+        width, depth = self._actions.session.view.document.board.size
+        self._set(board_size(name, upright=depth > width))
+
+    def _turn(self, way: str) -> None:
+        short, long = sorted(self._actions.session.view.document.board.size)
+        self._set((short, long) if way == UPRIGHT else (long, short))
 
     def _resize(self, extents_mm: tuple[float, float]) -> None:
         width, depth = (round(1e-3 * side, 6) for side in extents_mm)

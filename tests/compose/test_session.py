@@ -12,7 +12,7 @@ from burg_drake import load_scene
 from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename, amending
 from burg_drake.compose.journal import journal_path, recover
 from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.generation.sample import sample_scene
 from burg_drake.scene.recipe import SceneRecipe
@@ -170,3 +170,34 @@ def test_what_is_not_moved_keeps_its_digits(station: Station, tmp_path: Path) ->
         session.save()
     assert "[0.12345678901, 0.2, 0.06]" in path.read_text()
     assert "[0.6, 0.0, 0.0, 0.8]" in path.read_text()
+
+
+def test_a_scene_with_unknown_objects_is_refused_and_the_open_one_stays(
+    session: ComposeSession,
+) -> None:
+    session.do(AddObject("mug"))
+    kept = session.save("breakfast")
+    assert kept.path is not None
+    right = kept.path.read_text()
+    wrong = right.replace("object: mug", "object: mugg")
+    strange = kept.path.with_name("strange.yaml")
+    strange.write_text(wrong)
+    told = r"strange.yaml: instances\[0\]: .*'mugg'.*mug"
+    for refused in (
+        lambda: session.load("strange"),
+        lambda: ComposeSession.open(strange, session.station),
+    ):
+        with pytest.raises(UnknownNameError, match=told):
+            refused()
+    assert session.view.document == kept.document and session.view.path == kept.path
+    assert not strange.with_name(".strange.yaml.journal").exists()
+    strange.write_text(right)  # it is not left locked
+    with ComposeSession.open(strange, session.station) as other:
+        assert list(other.view.instances) == ["mug"]
+
+    kept.path.write_text(wrong)  # the open one itself
+    with pytest.raises(UnknownNameError, match=r"breakfast.yaml: instances\[0\]: .*'mugg'"):
+        session.load()
+    assert session.view.document == kept.document and session.view.undo_label == "add mug"
+    assert list(session.do(AddObject("can")).instances) == ["mug", "can"]
+    assert session.save(overwrite=True).saved

@@ -12,28 +12,17 @@ from typing import Any
 import msgspec
 import pytest
 import viser
-import zstandard
 from viser._messages import FileTransferStartUpload, Message, ShareUrlRequest
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from burg_drake.ui import guarded_viser
 from burg_drake.ui.door import Door, serve
 from burg_drake.ui.incoming import BURST, LARGEST_MESSAGE, RATE
 from burg_drake.ui.uploads import ALL_UPLOADS, LARGEST_UPLOAD
+from tests.ui.page_client import CAMERA, coming_in, send, unpacked
 
 TIMEOUT = 60.0
-CAMERA = {
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (0.0, 0.0, 1.0),
-    "fov": 1.0,
-    "near": 0.01,
-    "far": 10.0,
-    "image_height": 480,
-    "image_width": 640,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 1.0, 0.0),
-}
 
 
 @pytest.fixture(scope="module")
@@ -53,20 +42,6 @@ def client(door: Door) -> Iterator[ClientConnection]:
     with coming_in(door) as client:
         send(client, "ViewerCameraMessage", **CAMERA)
         yield client
-
-
-def coming_in(door: Door) -> ClientConnection:
-    return connect(
-        f"ws://127.0.0.1:{door.port}/",
-        origin=f"http://127.0.0.1:{door.port}",
-        subprotocols=[f"viser-v{viser.__version__}"],
-        max_size=None,
-        compression=None,
-    )
-
-
-def send(client: ClientConnection, kind: str, **fields: Any) -> None:
-    client.send(msgspec.msgpack.encode({"type": kind, **fields}))
 
 
 def announce(client: ClientConnection, button: viser.GuiUploadButtonHandle, **fields: Any) -> None:
@@ -182,13 +157,6 @@ def wait_for(client: ClientConnection, key: str) -> None:
     taken = msgspec.msgpack.encode("transfer_uuid") + msgspec.msgpack.encode(key)
     while taken not in unpacked(client.recv(timeout=TIMEOUT)):
         pass
-
-
-def unpacked(raw: str | bytes) -> bytes:
-    """The messages of viser in MessagePack."""
-    assert isinstance(raw, bytes)
-    size = int.from_bytes(raw[8:16], "little")
-    return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
 
 
 def test_new_pages_hear_of_no_old_uploads(door: Door, button, client: ClientConnection) -> None:

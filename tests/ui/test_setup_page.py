@@ -3,8 +3,7 @@ file that it writes."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,23 +13,16 @@ import pytest
 import yaml
 
 from burg_drake.compose.moving import Move
+from burg_drake.compose.placing import AddObject
 from burg_drake.compose.session import ComposeSession
 from burg_drake.compose.view import View
 from burg_drake.station.station import load_station
 from burg_drake.ui.door import Door, serve
 from burg_drake.ui.pointer import Eye
 from burg_drake.ui.setup_page import SetupPage
+from tests.ui.page_client import until
 
-PATIENCE = 60.0
 ONE_TRY = 3.0
-
-
-def until(true: Callable[[], Any], what: str, patience: float = PATIENCE) -> None:
-    """Waits for a state."""
-    end = time.monotonic() + patience
-    while not true():
-        assert time.monotonic() < end, f"waited in vain: {what}"
-        time.sleep(0.02)
 
 
 @dataclass
@@ -218,3 +210,60 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
         setup.tab.get_by_text("recovered what was not saved").wait_for()
         setup.tab.get_by_text("1 ok").wait_for()
         page.close()
+
+
+def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> None:
+    setup.session.do(AddObject("box", position=(0.1, 0.1)))
+    setup.session.do(AddObject("can", position=(0.3, 0.2)))
+    setup.session.select(())
+    setup.open()
+    keys, mouse = setup.tab.keyboard, setup.tab.mouse
+
+    def select(name: str, selection: tuple[str, ...]) -> None:
+        """Clicks an object until it is drawn, and takes the click."""
+        before = setup.view.selection
+        for _ in range(20):
+            mouse.click(*setup.on_screen(setup.middle(name)))
+            try:
+                until(lambda: setup.view.selection != before, f"click on {name}", ONE_TRY)
+                break
+            except AssertionError:
+                continue
+        assert setup.view.selection == selection
+
+    select("box", ("box",))
+    keys.down("Control")
+    select("can", ("box", "can"))
+    select("box", ("can",))
+    keys.up("Control")
+    mouse.click(*setup.on_screen((0.05, 0.25, 0.0)))
+    until(lambda: not setup.view.selection, "nothing is selected beside objects")
+    keys.down("Shift")
+    mouse.move(*setup.on_screen((0.02, 0.28, 0.0)))
+    mouse.down()
+    mouse.move(*setup.on_screen((0.4, 0.02, 0.0)), steps=4)
+    mouse.up()
+    keys.up("Shift")
+    until(lambda: setup.view.selection == ("box", "can"), "all in a rectangle")
+
+    keys.press("Control+d")
+    until(lambda: setup.view.selection == ("box_2", "can_2"), "copies")
+    keys.press("Delete")
+    until(lambda: list(setup.view.instances) == ["box", "can"], "no copies")
+    keys.press("Control+a")
+    until(lambda: setup.view.selection == ("box", "can"), "all")
+    keys.press("Escape")
+    until(lambda: not setup.view.selection, "none")
+
+    setup.session.select(("can",))
+    setup.session.restrict_movement(False)
+    start = setup.view.X_SO("can")
+    keys.press("ArrowRight")
+    keys.press("Shift+ArrowUp")
+    offset = np.array([0.005, 0.001, 0.0])
+    until(
+        lambda: np.allclose(setup.view.X_SO("can")[:3, 3], start[:3, 3] + offset, atol=2e-6),
+        "moved by keys",
+    )
+    keys.press("h")
+    setup.tab.get_by_role("dialog").get_by_text("Ctrl+click").wait_for()

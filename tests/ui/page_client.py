@@ -1,0 +1,206 @@
+"""A page without a browser: it sends what viser's page sends, and keeps what it is told to show.
+
+It costs next to nothing where a real browser draws every frame in software.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
+
+from burg_drake.ui.door import Door
+
+PATIENCE = 60.0
+"""For what a page has to say, on a busy machine [s]."""
+CAMERA = {
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (0.0, 0.0, 1.0),
+    "fov": 1.0,
+    "near": 0.01,
+    "far": 10.0,
+    "image_height": 480,
+    "image_width": 640,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 1.0, 0.0),
+}
+
+
+def until(true: Callable[[], Any], what: str, patience: float = PATIENCE) -> None:
+    """Waits for a state."""
+    end = time.monotonic() + patience
+    while not true():
+        assert time.monotonic() < end, f"waited in vain: {what}"
+        time.sleep(0.02)
+
+
+def coming_in(door: Door) -> ClientConnection:
+    """A connection as a page has it."""
+    return connect(
+        f"ws://127.0.0.1:{door.port}/",
+        origin=Origin(f"http://127.0.0.1:{door.port}"),
+        subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+        max_size=None,
+        compression=None,
+    )
+
+
+def send(connection: ClientConnection, kind: str, **fields: Any) -> None:
+    """Sends a message of viser's."""
+    connection.send(msgspec.msgpack.encode({"type": kind, **fields}))
+
+
+def unpacked(raw: str | bytes) -> bytes:
+    """What viser sent, in MessagePack."""
+    assert isinstance(raw, bytes)
+    size = int.from_bytes(raw[8:16], "little")
+    return zstandard.ZstdDecompressor().decompress(raw[16 : 16 + size])
+
+
+class PageClient:
+    """A page that is open.
+
+    Args:
+        door: of the page.
+
+    Attributes:
+        nodes: properties of what is in the scene, by its name; `visible` and `position` as well.
+        told: titles and lines of notifications, and titles of dialogs.
+    """
+
+    def __init__(self, door: Door) -> None:
+        self.nodes: dict[str, dict[str, Any]] = {}
+        self.told: list[str] = []
+        self._controls: dict[str, dict[str, Any]] = {}
+        self._commands: dict[tuple[str, str | None], str] = {}
+        self._complete = threading.Event()
+        self._connection = coming_in(door)
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+        send(self._connection, "ViewerCameraMessage", **CAMERA)
+        assert self._complete.wait(PATIENCE)
+
+    def __enter__(self) -> PageClient:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._connection.close()
+        self._thread.join(PATIENCE)
+
+    def value(self, folder: str, label: str) -> Any:
+        """What stands in a field of a folder."""
+        return self._control(folder, label)["value"]
+
+    def options(self, folder: str, label: str) -> list[str]:
+        """What a field offers."""
+        return list(self._control(folder, label)["options"])
+
+    def shown(self, folder: str, label: str) -> bool:
+        """Whether a field can be seen."""
+        return bool(self._control(folder, label)["visible"])
+
+    def text(self, folder: str) -> str:
+        """The HTML of a folder."""
+        inside = [c for c in list(self._controls.values()) if self._folder(c) == folder]
+        return "".join(control.get("content", "") for control in inside)
+
+    def give(self, folder: str, label: str, value: Any) -> None:
+        """Chooses or types a value."""
+        control = self._control(folder, label)
+        control["value"] = value
+        send(self._connection, "GuiUpdateMessage", uuid=control["uuid"], updates={"value": value})
+
+    def click(self, folder: str, label: str) -> None:
+        """Presses a button."""
+        self.give(folder, label, True)
+
+    def press(self, key: str, modifier: str | None = None) -> None:
+        """Presses a key, as viser calls it."""
+        send(self._connection, "CommandTriggerMessage", uuid=self._commands[key, modifier])
+
+    def upload(self, folder: str, label: str, name: str, content: bytes) -> None:
+        """Gives a file to a button that asks for one."""
+        ids = {
+            "source_component_uuid": self._control(folder, label)["uuid"],
+            "transfer_uuid": name,
+        }
+        send(
+            self._connection,
+            "FileTransferStartUpload",
+            **ids,
+            filename=name,
+            mime_type="image/png",
+            size_bytes=len(content),
+            part_count=1,
+        )
+        send(self._connection, "FileTransferPart", **ids, part_index=0, content=content)
+
+    def drag_handles(self, name: str, phase: str, **pose: Any) -> None:
+        """Drags transform controls: `Start`, `Update` with `wxyz` and `position`, `End`."""
+        kind = "" if phase == "Update" else "Drag"
+        send(self._connection, f"TransformControls{kind}{phase}Message", name=name, **pose)
+
+    def _control(self, folder: str, label: str) -> dict[str, Any]:
+        found = [
+            control
+            for control in list(self._controls.values())
+            if control.get("label") == label and self._folder(control) == folder
+        ]
+        assert len(found) == 1, f"{len(found)} controls {label!r} in {folder!r}"
+        return found[0]
+
+    def _folder(self, control: dict[str, Any]) -> str:
+        """The name of the folder around a control; that of a folder without one is around it."""
+        around = self._controls.get(control.get("container_uuid", ""), {})
+        if not around:
+            return ""
+        return str(around.get("label") or self._folder(around))
+
+    def _listen(self) -> None:
+        try:
+            for raw in self._connection:
+                for message in msgspec.msgpack.decode(unpacked(raw))["messages"]:
+                    self._take(message)
+        except ConnectionClosed:
+            pass
+
+    def _take(self, message: dict[str, Any]) -> None:
+        kind, name = message["type"], message.get("name", "")
+        if kind == "ReplayDoneMessage":
+            self._complete.set()
+        elif kind == "NotificationShowMessage":
+            props = message["props"]
+            self.told.append(f"{props['title']}: {props['body']}")
+        elif kind == "GuiModalMessage":
+            self.told.append(message["title"])
+        elif kind == "RegisterCommandMessage":
+            props = message["props"]
+            self._commands[props["hotkey"], props["modifier"]] = message["uuid"]
+        elif kind == "GuiUpdateMessage":
+            self._controls[message["uuid"]].update(message["updates"])
+        elif kind == "GuiRemoveMessage":
+            self._controls.pop(message["uuid"], None)
+        elif kind == "RemoveSceneNodeMessage":
+            self.nodes.pop(name, None)
+        elif kind == "SceneNodeUpdateMessage":
+            self.nodes[name].update(message["updates"])
+        elif kind in ("SetSceneNodeVisibilityMessage", "SetPositionMessage"):
+            self.nodes.setdefault(name, {}).update(message)
+        elif kind.startswith("Gui") and "uuid" in message:
+            self._controls[message["uuid"]] = {**message, **message.get("props", {})}
+        elif name and "props" in message:
+            self.nodes[name] = dict(message["props"])

@@ -1,0 +1,314 @@
+"""What the setup page can do, function by function, on a page that no browser draws."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from burg_drake import load_scene
+from burg_drake.compose import AddObject, ComposeSession, Move, SetBoard
+from burg_drake.core.frames import make_pose, quaternion_from_rotation, rot_z
+from burg_drake.scene.scene import Board
+from burg_drake.scene.validate import validate_scene
+from burg_drake.station.station import load_station
+from burg_drake.ui.board_view import sheet_picture
+from burg_drake.ui.door import Door, serve
+from burg_drake.ui.object_pictures import ObjectPictures
+from burg_drake.ui.setup_page import SetupPage
+from burg_drake.ui.status_colors import LOOKS
+from tests.ui.page_client import PATIENCE, PageClient, until
+
+FILL, BOARD, DISPLAY, GRASPS = "Random configuration", "Board", "Display", "Grasps"
+REACH, BACKDROP = "Reach", "Real board"
+FREE = "x, y, yaw only"
+
+
+@pytest.fixture(scope="module")
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage, Door]]:
+    """A page for all tests, without the library's pictures, which take a process of their own."""
+    folder = tmp_path_factory.mktemp("scenes")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ObjectPictures, "get", lambda self, name, stable_pose=None: None)
+        session = ComposeSession.open("household", load_station("panda_tabletop"), folder=folder)
+        with session, serve(port=0) as door:
+            page = SetupPage(door.server, session)
+            yield page, door
+            page.close()
+
+
+@pytest.fixture
+def page(opened: tuple[SetupPage, Door]) -> SetupPage:
+    """The page on a new scene."""
+    page, _ = opened
+    page.actions.session.new("household", discard=True)
+    page.actions.session.restrict_movement(True)
+    assert page.actions.queue.idle(PATIENCE)
+    return page
+
+
+@pytest.fixture
+def session(page: SetupPage) -> ComposeSession:
+    return page.actions.session
+
+
+@pytest.fixture
+def client(page: SetupPage, opened: tuple[SetupPage, Door]) -> Iterator[PageClient]:
+    with PageClient(opened[1]) as client:
+        yield client
+
+
+def test_a_random_configuration_is_one_step(session: ComposeSession, client: PageClient) -> None:
+    empty = session.do(SetBoard(Board()))
+    client.give(FILL, "Objects", 4)
+    client.give(FILL, "Layout", "close")
+    client.click(FILL, "Shuffle")
+    until(lambda: session.view.instances, "objects on the board")
+    filled = session.view
+    assert len(filled.instances) == 4 and set(filled.status.values()) == {"ok"}
+    path = session.save("filled").path
+    assert path is not None
+    scene = load_scene(path)
+    assert scene.document == session.view.document
+    assert validate_scene(scene) == ()
+    until(lambda: client.value(FILL, "Seed") == 2, "the seed of the next one")
+    until(lambda: all(f"/objects/{n}" in client.nodes for n in filled.instances), "all are shown")
+
+    client.give(FILL, "Objects", 0)
+    client.give(FILL, "Layout", "random")
+    client.click(FILL, "Shuffle")
+    until(lambda: session.view.document != scene.document, "other places")
+    assert set(session.view.instances) == set(scene.instances)
+    client.press("Z", "cmd/ctrl")
+    until(lambda: session.view.document == scene.document, "the places before")
+    client.press("Z", "cmd/ctrl")
+    until(lambda: not session.view.instances, "an empty board")
+    assert session.view.document.instances == empty.document.instances
+    assert session.view.undo_label == "change board"
+    until(lambda: not any(n.startswith("/outlines/") for n in list(client.nodes)), "none is shown")
+
+    client.give(FILL, "Objects", 60)
+    client.click(FILL, "Shuffle")
+    until(lambda: client.told, "a word")
+    assert "That cannot be done: 60 different objects are asked for" in client.told[0]
+    assert not session.view.instances
+
+
+def test_the_board_has_the_size_that_was_chosen(
+    page: SetupPage, session: ComposeSession, client: PageClient
+) -> None:
+    until(lambda: client.value(BOARD, "Size") == "A3", "the size of a new scene")
+
+    def saved() -> tuple[float, float]:
+        path = session.save("board", overwrite=True).path
+        assert path is not None
+        return load_scene(path).board.size
+
+    client.give(BOARD, "Size", "A2")
+    until(lambda: session.view.document.board.size == (0.594, 0.42), "A2")
+    assert saved() == (0.594, 0.42)
+    client.give(BOARD, "Lies", "upright")
+    until(lambda: session.view.document.board.size == (0.42, 0.594), "A2 upright")
+    assert page.actions.queue.idle(PATIENCE)
+    busy = threading.Event()  # what is chosen meanwhile waits, and is not lost
+    page.actions.ask(lambda: busy.wait(PATIENCE))
+    page.actions.ask(page._refresh, patient=True)
+    client.give(BOARD, "Lies", "across")
+    until(lambda: page._board_panel._way.value == "across", "the choice has arrived")
+    busy.set()
+    until(lambda: session.view.document.board.size == (0.594, 0.42), "A2 across")
+
+    client.give(BOARD, "Size", "own size")
+    until(lambda: client.shown(BOARD, "Width, depth [mm]"), "fields for one's own size")
+    assert client.value(BOARD, "Width, depth [mm]") == [594.0, 420.0]
+    client.give(BOARD, "Width, depth [mm]", [500.0, 312.5])
+    client.press("enter", "alt+shift")
+    until(lambda: session.view.document.board.size == (0.5, 0.3125), "one's own size")
+    assert saved() == (0.5, 0.3125)
+    client.press("Z", "cmd/ctrl")
+    until(lambda: session.view.document.board.size == (0.594, 0.42), "undone")
+    client.give(BOARD, "Size", "A4")
+    until(lambda: session.view.document.board.size == (0.297, 0.21), "A4")
+    until(lambda: not client.shown(BOARD, "Width, depth [mm]"), "no fields")
+
+
+def test_objects_have_the_colours_that_were_chosen(
+    session: ComposeSession, client: PageClient
+) -> None:
+    names = ("box", "can", "mug")
+    session.do(SetBoard(Board()))
+    for name in names:
+        session.do(AddObject(name))
+    onto = session.view.X_SO("can")
+    onto[:2, 3] = session.view.X_SO("box")[:2, 3]
+    session.do(Move({"can": onto}))
+    assert session.view.status == {"box": "collision", "can": "collision", "mug": "ok"}
+
+    def colors() -> list[tuple[int, ...] | None]:
+        """Of what can be seen; None for objects as they look."""
+        seen = []
+        for name in names:
+            look = client.nodes.get(f"/objects/{name}/look", {})
+            tint = client.nodes.get(f"/objects/{name}/tint", {})
+            if look.get("visible") is not (not tint.get("visible")):
+                return []  # not drawn yet, or twice
+            seen.append(None if look["visible"] else tuple(tint["color"]))
+        return seen
+
+    until(lambda: colors() == [None] * 3, "as they look")
+    client.give(DISPLAY, "Objects", "by status")
+    red, green = LOOKS["collision"].color, LOOKS["ok"].color
+    until(lambda: colors() == [red, red, green], "by status")
+    session.undo()
+    until(lambda: colors() == [green] * 3, "apart")
+    client.press("C")
+    until(lambda: len(set(colors()) - {red, green, None}) == 3, "a colour each")
+    assert client.value(DISPLAY, "Objects") == "random"
+    client.press("C")
+    until(lambda: colors() == [None] * 3, "as they look")
+
+
+def test_grasps_are_counted_again_after_a_move(session: ComposeSession, client: PageClient) -> None:
+    session.do(AddObject("can", position=(0.12, 0.15)))
+    session.do(AddObject("mug", position=(0.3, 0.15)))
+
+    def counted() -> bool:
+        view = session.view
+        return view.grasps_revision == view.revision and "Counting" not in client.text(GRASPS)
+
+    client.give(GRASPS, "Count grasps", True)
+    until(counted, "counts")
+    apart = session.view.grasps
+    assert set(apart) == {"can", "mug"} and "can" not in apart["mug"].in_the_way
+    assert apart["mug"].reachable is not None and 0 < apart["mug"].reachable <= apart["mug"].clear
+    session.do(Move({"can": session.view.X_SO("mug") @ make_pose(p_AB=(0.0, -0.09, 0.0))}))
+    until(lambda: "Counting" in client.text(GRASPS), "they are counted anew")
+    until(counted, "counts beside the mug")
+    beside = session.view.grasps
+    assert beside["mug"].in_the_way["can"] > 0 and beside["mug"].clear < apart["mug"].clear
+    blocked = f"can {beside['mug'].in_the_way['can']}"
+    until(lambda: blocked in client.text(GRASPS), "what is in the way of the mug")
+    client.give(GRASPS, "Count grasps", False)
+    until(lambda: client.text(GRASPS) == "", "no counts")
+
+
+def test_reach_is_laid_on_the_board_and_taken_away(
+    session: ComposeSession, client: PageClient
+) -> None:
+    layer = "/layers/reach"
+    session.do(SetBoard(Board(size=(0.2, 0.15))))
+    assert not client.shown(REACH, "Height [mm]")
+    client.give(REACH, "Arm's reach", True)
+    until(lambda: layer in client.nodes, "a layer")
+    sheet = client.nodes[layer]
+    assert (sheet["render_width"], sheet["render_height"]) == (0.2, 0.15)
+    until(lambda: "reaches 100% of the board" in client.text(REACH), "how much is reached")
+    client.give(REACH, "Height [mm]", 950.0)
+    client.press("enter", "alt+shift")
+    until(lambda: "reaches 0% of the board" in client.text(REACH), "nothing is reached up there")
+    assert layer in client.nodes
+    client.give(REACH, "Arm's reach", False)
+    until(lambda: layer not in client.nodes, "no layer")
+    until(lambda: client.text(REACH) == "", "no words")
+
+
+def test_a_photo_of_the_board_is_laid_under_the_objects(
+    session: ComposeSession, client: PageClient
+) -> None:
+    layer = "/layers/backdrop"
+    board = session.view.document.board
+    sheet = sheet_picture(board)
+    height, width = sheet.shape[:2]
+    edges = np.array([[0, 0], [width, 0], [width, height], [0, height]], dtype=np.float32)
+    corners = np.array([[300, 250], [1100, 180], [1200, 720], [180, 800]], dtype=np.float32)
+    H = cv2.getPerspectiveTransform(edges, corners)
+    photo = cv2.warpPerspective(sheet, H, (1400, 950), flags=cv2.INTER_AREA, borderValue=(90,) * 3)
+    _, png = cv2.imencode(".png", photo)
+    client.upload(BACKDROP, "Photo of the board", "photo.png", png.tobytes())
+    until(lambda: layer in client.nodes, "the photo")
+    laid = client.nodes[layer]
+    assert laid["render_width"] >= board.size[0] and laid["render_height"] >= board.size[1]
+    assert f"photo.png: {len(board.layout.ids)} markers, off by 0." in client.text(BACKDROP)
+
+    def alpha() -> int:
+        data = client.nodes.get(layer, {}).get("_data", b"")
+        return int(np.array(Image.open(io.BytesIO(data)))[..., 3].max()) if data else -1
+
+    assert alpha() == round(0.8 * 255)
+    client.give(BACKDROP, "Opacity", 0.4)
+    until(lambda: alpha() == round(0.4 * 255), "a fainter photo")
+    client.upload(BACKDROP, "Photo of the board", "note.png", b"no picture")
+    until(lambda: client.told, "a word")
+    assert "note.png is not an image that can be read; give PNG or JPEG" in client.told[0]
+    assert layer in client.nodes
+    client.click(BACKDROP, "Remove the picture")
+    until(lambda: layer not in client.nodes, "no photo")
+
+
+def test_handles_move_and_tilt_what_is_free(session: ComposeSession, client: PageClient) -> None:
+    session.do(AddObject("box", position=(0.15, 0.15)))
+    start = session.do(AddObject("can", position=(0.3, 0.15)))
+    assert "/gizmo" not in client.nodes
+    client.give("", FREE, False)
+    until(lambda: client.nodes.get("/gizmo", {}).get("visible"), "handles")
+    session.select(["box", "can"])
+    middle = np.mean([_middle(session, name) for name in ("box", "can")], axis=0)
+    until(lambda: np.allclose(client.nodes["/gizmo"]["position"], middle), "between the two")
+
+    R = rot_z(0.5) @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    X_SG = make_pose(R, middle + np.array([0.02, 0.01, 0.2]))
+    pose = {
+        "wxyz": quaternion_from_rotation(R).tolist(),
+        "position": X_SG[:3, 3].tolist(),
+    }
+    client.drag_handles("/gizmo", "Start")
+    client.drag_handles("/gizmo", "Update", **pose)
+    until(lambda: session.view.dragging == ("box", "can"), "both are held")
+    until(lambda: session.view.X_SO("can")[2, 3] > 0.1, "lifted")
+    client.press("escape")
+    until(lambda: not session.view.dragging, "put back")
+    assert session.view.document == start.document
+
+    client.drag_handles("/gizmo", "End")
+    until(lambda: np.allclose(client.nodes["/gizmo"]["position"], middle), "handles are back")
+    client.drag_handles("/gizmo", "Start")
+    client.drag_handles("/gizmo", "Update", **pose)
+    client.drag_handles("/gizmo", "End")
+    until(lambda: session.view.undo_label == "move box and can", "one step")
+    for name in ("box", "can"):
+        expected = X_SG @ make_pose(p_AB=-middle) @ start.X_SO(name)
+        np.testing.assert_allclose(session.view.X_SO(name), expected, atol=2e-5)
+    assert session.undo().document == start.document
+    client.give("", FREE, True)
+    until(lambda: not client.nodes["/gizmo"]["visible"], "no handles")
+
+
+def _middle(session: ComposeSession, name: str) -> np.ndarray:
+    """(3,) of an instance's bounds in S [m]."""
+    entry, X_SO = session.view.state.entry(name), session.view.X_SO(name)
+    return X_SO[:3, :3] @ np.add(entry.lower, entry.upper) / 2.0 + X_SO[:3, 3]
+
+
+def test_a_scene_that_cannot_be_opened_leaves_the_open_one(
+    session: ComposeSession, client: PageClient, tmp_path: Path
+) -> None:
+    session.do(AddObject("mug"))
+    before = session.save("breakfast")
+    assert before.path is not None
+    text = before.path.read_text()
+    before.path.with_name("strange.yaml").write_text(text.replace("object: mug", "object: mugg"))
+    session.select(())
+    until(lambda: "strange" in client.options("Load", "Scene"), "it is offered")
+    client.give("Load", "Scene", "strange")
+    client.click("Load", "Load scene")
+    until(lambda: client.told, "a word")
+    assert "strange.yaml: instances[0]: " in client.told[0] and "'mugg'" in client.told[0]
+    assert session.view.document == before.document and session.view.path == before.path
+    session.do(AddObject("can"))
+    assert session.save().saved
