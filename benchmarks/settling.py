@@ -60,7 +60,7 @@ def main() -> None:
         drifts: list[tuple[float, float]] = []
         for seed in seeds:
             scene = lay_out(library, shapes, station, layout, count, board, seed)
-            settled, rests, cpu = settle(kind, seed, scene, station, shapes)
+            settled, rests, cpu = settle(kind, seed, layout, scene, station, shapes)
             times.append(cpu)
             rested += rests
             if seed < arguments.drift:
@@ -108,14 +108,14 @@ def lay_out(
 
 
 def settle(
-    kind: str, seed: int, scene: Scene, station: Station, shapes: ObjectShapes
+    kind: str, seed: int, layout: Layout, scene: Scene, station: Station, shapes: ObjectShapes
 ) -> tuple[Scene, bool, float]:
     """Settles a scene and prints what came of it; whether it rests, and the CPU time [s]."""
     check = SceneCheck(station, scene.library)
     check.issues(scene)  # reads the objects' shapes, once a library
     spent.clear()
     start = time.process_time()
-    if "of ten" in kind:
+    if layout == "heap":
         piled = piling.pile(scene, station, check, shapes, np.random.default_rng(seed))
         scene, rests = piled.scene, not piled.faulty
         remarks = [f"amiss: {', '.join(piled.faulty)}"] if piled.faulty else []

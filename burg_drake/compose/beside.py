@@ -115,6 +115,7 @@ class BesideEditor(Editor):
                 return
             if found.error is not None:
                 self.notify(f"grasps cannot be counted: {found.error}")
+                self._grasps = ({}, found.revision)  # nobody waits for more
             elif found.complete:
                 self._grasps = (found.counts, found.revision)
             else:

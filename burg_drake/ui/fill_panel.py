@@ -49,7 +49,7 @@ class FillPanel:
 
     def _shuffle(self) -> None:
         seed = self._seed.value
+        self._seed.value = min(seed + 1, LARGEST_SEED)  # also if there is no room this time
         self._actions.session.do(
             RandomConfiguration(seed, self._count.value or None, self._layout.value)
         )
-        self._seed.value = min(seed + 1, LARGEST_SEED)

@@ -251,7 +251,9 @@ def test_a_photo_of_the_board_is_laid_under_the_objects(
     until(lambda: layer not in client.nodes, "no photo")
 
 
-def test_handles_move_and_tilt_what_is_free(session: ComposeSession, client: PageClient) -> None:
+def test_handles_move_and_tilt_what_is_free(
+    page: SetupPage, session: ComposeSession, client: PageClient
+) -> None:
     session.do(AddObject("box", position=(0.15, 0.15)))
     start = session.do(AddObject("can", position=(0.3, 0.15)))
     assert "/gizmo" not in client.nodes
@@ -276,7 +278,9 @@ def test_handles_move_and_tilt_what_is_free(session: ComposeSession, client: Pag
     assert session.view.document == start.document
 
     client.drag_handles("/gizmo", "End")
-    until(lambda: np.allclose(client.nodes["/gizmo"]["position"], middle), "handles are back")
+    handles = page._gizmo._handle  # the page that dragged them is told where they are only then
+    assert handles is not None
+    until(lambda: np.allclose(handles.position, middle), "handles are back")
     client.drag_handles("/gizmo", "Start")
     client.drag_handles("/gizmo", "Update", **pose)
     client.drag_handles("/gizmo", "End")
