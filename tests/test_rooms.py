@@ -28,6 +28,7 @@ ROOMS = [
     "visualization",
     "evaluation",
     "generation",
+    "experiment",
     "compose",
     "ui",
     "apps",

@@ -78,7 +78,7 @@ def run_stats(arguments: argparse.Namespace) -> int:
     """Prints the figures of one set or two."""
     from burg_drake.apps.grasp_tables import print_comparison, print_ranking, print_summary
     from burg_drake.evaluation.grasp_input import read_input
-    from burg_drake.grasping.comparison import compare, summarize
+    from burg_drake.grasping.comparison import compare_grasps, summarize
     from burg_drake.grasping.ranking import rank_by
 
     if arguments.json is not None:
@@ -92,7 +92,9 @@ def run_stats(arguments: argparse.Namespace) -> int:
     _check_frames(paths, sets)
     summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]
     rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
-    comparison = compare(sets[0].grasps, sets[1].grasps, tolerance) if len(sets) == 2 else None
+    comparison = (
+        compare_grasps(sets[0].grasps, sets[1].grasps, tolerance) if len(sets) == 2 else None
+    )
     for k, path in enumerate(paths):
         print_summary(path, summaries[k], sets[k].notes, sets[k].frame)
         if rankings:

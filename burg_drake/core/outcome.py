@@ -107,3 +107,47 @@ _PLANNED = (
 """Whether the arm can move there, straight in, back and up."""
 UNTRIED = ("", Outcome.REACHABLE.value)
 """Texts in a column of outcomes that tell nothing of a trial."""
+
+
+class RealOutcome(StrEnum):
+    """How a trial on the robot ended: the simulator's vocabulary, as far as a person or a robot can
+    see it, and what only reality has."""
+
+    LIFTED = "lifted"
+    LIFTED_DISTURBED = "lifted_disturbed"
+    SLIPPED = "slipped"
+    DROPPED = "dropped"
+    CLOSED_EMPTY = "closed_empty"
+    ONE_FINGER = "one_finger"
+    NO_CONTACT = "no_contact"
+    BLOCKED = "blocked"
+    COLLISION_TARGET = "collision_target"
+    COLLISION_TABLE = "collision_table"
+    COLLISION_CLUTTER = "collision_clutter"
+    COLLISION_BACKGROUND = "collision_background"
+    HAND_COLLISION_APPROACH = "hand_collision_approach"
+    HAND_COLLISION_RETREAT = "hand_collision_retreat"
+    HAND_COLLISION_LIFT = "hand_collision_lift"
+    NO_IK = "no_ik"
+    JOINT_LIMIT = "joint_limit"
+    ARM_COLLISION = "arm_collision"
+    APPROACH_LINE = "approach_line"
+    RETREAT_LINE = "retreat_line"
+    LIFT_LINE = "lift_line"
+    NO_PATH = "no_path"
+    PROTECTIVE_STOP = "protective_stop"
+    """The robot stopped itself on its way: an execution that failed."""
+    NOT_ATTEMPTED = "not_attempted"
+    """Nobody tried; tells nothing of the grasp."""
+    PERCEPTION_FAILED = "perception_failed"
+    """The scene was not seen well enough to try; tells nothing of the grasp."""
+
+    @property
+    def attempted(self) -> bool:
+        """Whether it tells anything of the grasp."""
+        return self not in (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
+
+    @property
+    def held(self) -> bool:
+        """The target was lifted and is held, whatever happened to the others."""
+        return self in (RealOutcome.LIFTED, RealOutcome.LIFTED_DISTURBED)

@@ -170,7 +170,7 @@ def summarize(grasps: GraspSet, *, lever: float = LEVER) -> SetSummary:
     )
 
 
-def compare(
+def compare_grasps(
     reference: GraspSet, grasps: GraspSet, tolerance: Tolerance | None = None
 ) -> Comparison:
     """Holds a set of grasps against a reference.

@@ -29,7 +29,7 @@ from burg_drake.evaluation.probes import RobustnessSettings
 from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_view
 from burg_drake.evaluation.summary import Group, StageCost, Summary
 from burg_drake.evaluation.summary_tables import SummaryView
-from burg_drake.grasping.comparison import compare, summarize
+from burg_drake.grasping.comparison import compare_grasps, summarize
 from burg_drake.grasping.pose_search import Tolerance
 from burg_drake.grasping.ranking import rank_by
 from burg_drake.objects.library import load_library
@@ -101,7 +101,7 @@ COUNTS = {NAME: Counter({Outcome.REACHABLE: MANY, Outcome.NO_IK: MANY}), "mug": 
 TABLES = {
     "numbers": numbers,
     "summary": lambda: summary_table(NAME, summarize(grasps(0), lever=0.05)),
-    "comparison": lambda: comparison_table(compare(grasps(0), grasps(1), Tolerance())),
+    "comparison": lambda: comparison_table(compare_grasps(grasps(0), grasps(1), Tolerance())),
     "ranking": lambda: ranking_table(rank_by(grasps(0), "label")),
     "library": library,
     "robustness": robustness,

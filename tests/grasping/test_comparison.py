@@ -10,7 +10,7 @@ from grasp_samples import about, crowded_grasps
 
 from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.comparison import QUANTILES, compare, distribution, summarize
+from burg_drake.grasping.comparison import QUANTILES, compare_grasps, distribution, summarize
 from burg_drake.grasping.coverage import Share, coverage, precision
 from burg_drake.grasping.pose_search import Tolerance
 from burg_drake.grasping.similarity import DISTANCE_VERSION
@@ -84,7 +84,7 @@ def test_comparison_by_hand() -> None:
     b = GraspSet.concatenate(
         [b.select([0, 1, 2, 3]), GraspSet.create(b.X_OG[4] @ about("y", 5.0), object="mug")]
     )
-    comparison = compare(a, b, Tolerance(translation=0.02, angle=math.radians(4.0)))
+    comparison = compare_grasps(a, b, Tolerance(translation=0.02, angle=math.radians(4.0)))
     mug = comparison.objects["mug"]
     assert mug.coverage == Share(2, 3)
     assert mug.precision == Share(2, 4)
@@ -109,7 +109,7 @@ def test_comparison_by_hand() -> None:
 def test_a_comparison_is_coverage_and_precision() -> None:
     a = GraspSet.create(crowded_grasps(300, 2), object="mug")
     b = GraspSet.create(crowded_grasps(40, 3), object="mug")
-    there, back = compare(a, b), compare(b, a)
+    there, back = compare_grasps(a, b), compare_grasps(b, a)
     assert there.overall.coverage == coverage(a, b).overall == back.overall.precision
     assert there.overall.precision == precision(b, a).overall == back.overall.coverage
     assert there.overall.to_grasps == back.overall.to_reference
@@ -118,7 +118,7 @@ def test_a_comparison_is_coverage_and_precision() -> None:
 
 def test_a_set_and_itself() -> None:
     a = GraspSet.create(crowded_grasps(50, 4), object="mug")
-    comparison = compare(a, a)
+    comparison = compare_grasps(a, a)
     assert comparison.overall.coverage == comparison.overall.precision == Share(50, 50)
     assert comparison.overall.to_grasps.quantiles[-1] == 0.0
     assert comparison.shared_ids == 50
@@ -127,5 +127,5 @@ def test_a_set_and_itself() -> None:
 def test_empty_sets() -> None:
     none, some = line(), line(0.0)
     assert summarize(none).objects == {}
-    assert compare(none, none).overall.coverage == Share(0, 0)
-    assert compare(some, none).objects["mug"].coverage == Share(0, 1)
+    assert compare_grasps(none, none).overall.coverage == Share(0, 0)
+    assert compare_grasps(some, none).objects["mug"].coverage == Share(0, 1)

@@ -1,0 +1,1 @@
+"""Simulated and real outcomes held against each other."""
