@@ -15,8 +15,8 @@ from burg_drake.core.schema import Pose, load_document, save_document
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.run_document import Input
 
-SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and others
-by hand, or with burg-drake trials record and trials serve."""
+SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the
+rest by hand, or with burg-drake trials record and burg-drake trials serve."""
 Success = Literal["lifted", "held"]
 """What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)."""
 Balance = Literal["outcome", "stage", "margin", "probability", "none"]
