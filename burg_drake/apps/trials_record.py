@@ -100,6 +100,8 @@ def run_record(arguments: argparse.Namespace) -> int:
     if check is not None and found:
         entry["placement"] = object_places(check)
     recorded = book.record(trial.number, correct=arguments.correct, again=arguments.again, **entry)
+    if arguments.photo and not (arguments.intrinsics or arguments.placement):
+        print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
     if check is not None and not found:
         print(

@@ -55,6 +55,18 @@ TURN = 0.01
 """Time between two attempts to get the lock [s]."""
 
 
+class TrialChanged(InvalidInputError):
+    """A trial is not what it was taken for.
+
+    Attributes:
+        trial: as it is.
+    """
+
+    def __init__(self, message: str, trial: RealTrial) -> None:
+        super().__init__(message)
+        self.trial = trial
+
+
 class TrialBook:
     """A trials file on disk.
 
@@ -97,6 +109,7 @@ class TrialBook:
         *,
         correct: bool = False,
         again: bool = False,
+        expected: RealTrial | None = None,
         **entry: Any,
     ) -> RealTrial:
         """Enters what is known of a trial; all else in the file stays as it is, byte for byte.
@@ -107,6 +120,7 @@ class TrialBook:
             number: of the trial; `next` for the first one without an outcome.
             correct: the entry replaces what contradicts it.
             again: the trial was carried out once more: the entry replaces all that there is.
+            expected: only if the trial still is this one, and nobody has changed it meanwhile.
             entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and nothing
                 else is said), `operator`, `note`, `photo`, `placement`, `robot`, a `RobotReport`
                 or its fields that are known.
@@ -116,12 +130,17 @@ class TrialBook:
 
         Raises:
             UnknownNameError: there is no such field.
+            TrialChanged: it is not as expected.
             InvalidInputError: there is no such trial, or no such outcome; the trial has another
                 entry already; or the file cannot be written.
         """
         given = _checked(entry)
 
         def change(trial: RealTrial) -> RealTrial:
+            if expected is not None and trial != expected:
+                raise TrialChanged(
+                    f"{self.path}: trial {trial.number} was changed meanwhile", trial
+                )
             self.require_open(trial, given, correct=correct, again=again)
             base = replace(trial, **EMPTY) if again else trial
             new = replace(base, **_merged(base, given))
