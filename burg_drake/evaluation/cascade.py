@@ -27,7 +27,7 @@ from burg_drake.core.resources import PACKAGE_URI
 from burg_drake.evaluation.candidate_files import by_names
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.candidates import Candidate, Candidates, given_candidates
-from burg_drake.evaluation.executors import judge_all
+from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.instance_names import chosen_instances, on_chosen
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
@@ -77,6 +77,7 @@ def evaluate(
     engine: Engine | str = ENGINES["standard"],
     seed: int = 0,
     workers: int | None = None,
+    executor: Executor | None = None,
     table: TableFormat = "csv",
     mode: Mode | None = None,
     motion: GraspMotion | None = None,
@@ -109,6 +110,8 @@ def evaluate(
         engine: how trials are stepped; an engine or the name of a preset.
         seed: of the sampling.
         workers: number of processes; as many as there are processors if None.
+        executor: judges in place of processes of this machine, such as those of a cluster;
+            `workers` is not given then.
         table: format of the results file.
         mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
             execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
@@ -139,9 +142,10 @@ def evaluate(
     if grasps is not None:
         grasps = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
         grasps = on_chosen(scene, grasps, only)
-    workers = default_workers() if workers is None else workers
-    if workers < 1:
-        raise InvalidInputError(f"workers is {workers}; give 1 or more")
+    if executor is None:
+        executor = LocalExecutor(default_workers() if workers is None else workers)
+    elif workers is not None:
+        raise InvalidInputError("give workers or an executor, not both")
     require_writer(table)
     folder = Path(out)
     require_run_folder(folder)
@@ -182,7 +186,7 @@ def evaluate(
         make_judge = StationJudgeFactory(scene, station, engine, mode, motion)
         remove_unfinished(folder)
         left = _open_grasps(run, retry_failed)
-        run = _judge(run, left, make_judge, journal, workers, reporter)
+        run = _judge(run, left, make_judge, journal, executor, reporter)
         return _finish(run, table)
 
 
@@ -294,7 +298,7 @@ def _judge(
     open_grasps: list[Candidate],
     make_judge: StationJudgeFactory,
     journal: Journal,
-    workers: int,
+    executor: Executor,
     reporter: Reporter,
 ) -> Run:
     """Judges what is left and keeps each verdict at once; returns the run as it is then."""
@@ -305,12 +309,15 @@ def _judge(
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
-    stretch = Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
+    stretch = Stretch(
+        started=datetime.now(UTC).isoformat(timespec="seconds"), workers=executor.workers
+    )
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = time.monotonic()
     try:
-        with closing(judge_all(open_grasps, make_judge, workers=workers)) as judged:
-            for candidate, verdict in judged:
+        job = Job(run.document.hash, make_judge, open_grasps)
+        with closing(executor.judge([job])) as judged:
+            for _, candidate, verdict in judged:
                 journal.append(candidate.id, verdict)
                 done += 1
                 pace.step(outcome=verdict.outcome)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from burg_drake.evaluation.cluster.bundle import (
     Bundle,
@@ -45,15 +47,33 @@ class BundledJudgeFactory:
 
 
 def recipe_of(make_judge: Callable[[], Judge]) -> tuple[Recipe, Bundle | None]:
-    """Recipe and bundle for a judge; what is no `StationJudgeFactory` needs no bundle.
+    """Recipe and bundle for a judge; where there is no `StationJudgeFactory`, no bundle is needed.
 
     Raises:
         BurgError: see `make_bundle`.
     """
-    if not isinstance(make_judge, StationJudgeFactory):
-        return Recipe(pickle.dumps(make_judge)), None
-    bundle = make_bundle(make_judge.scene, make_judge.station)
-    factory = BundledJudgeFactory(
-        replace(bundle, data=b""), make_judge.engine, make_judge.mode, make_judge.motion
-    )
-    return Recipe(pickle.dumps(factory), bundle.name), bundle
+    buffer = io.BytesIO()
+    packer = _Packer(buffer)
+    packer.dump(make_judge)
+    bundle = packer.bundle
+    return Recipe(buffer.getvalue(), bundle.name if bundle else ""), bundle
+
+
+class _Packer(pickle.Pickler):
+    """Puts a `BundledJudgeFactory` in the place of a `StationJudgeFactory`, wherever that is in
+    what it pickles.
+
+    Attributes:
+        bundle: scene and station of that factory.
+    """
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file)
+        self.bundle: Bundle | None = None
+
+    def persistent_id(self, value: Any) -> BundledJudgeFactory | None:
+        if not isinstance(value, StationJudgeFactory):
+            return None
+        self.bundle = make_bundle(value.scene, value.station)
+        hashes = replace(self.bundle, data=b"")
+        return BundledJudgeFactory(hashes, value.engine, value.mode, value.motion)

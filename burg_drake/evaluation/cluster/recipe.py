@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import pickle
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,18 +21,27 @@ class Pickled:
 
     Attributes:
         make_judge: a factory, pickled.
-        folder: takes the place of the factory's attribute of that name, if given.
+        folder: of the bundle, which what is pickled apart in the factory is told; None if it has
+            nothing of the kind.
     """
 
     make_judge: bytes
     folder: Path | None = None
 
     def __call__(self) -> Judge:
-        factory: Any = pickle.loads(self.make_judge)
-        if self.folder is not None:
-            factory = replace(factory, folder=self.folder)
-        judge: Judge = factory()
-        return judge
+        factory: Callable[[], Judge] = _Unpacker(self.make_judge, self.folder).load()
+        return factory()
+
+
+class _Unpacker(pickle.Unpickler):
+    """The counterpart of `bundled_judge._Packer`."""
+
+    def __init__(self, data: bytes, folder: Path | None) -> None:
+        super().__init__(io.BytesIO(data))
+        self._folder = folder
+
+    def persistent_load(self, value: Any) -> Any:
+        return replace(value, folder=self._folder)
 
 
 @dataclass(frozen=True)
