@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from burg_drake.core.frames import Array
 from burg_drake.visualization.flat_view import FlatView, path_data
 
-TONES = 4
+TONES = 6
 """Even tones from the darkest, 0, to the lightest."""
 LIGHT = np.array([-0.45, -0.75, -0.48])
 """Where the light comes from, in the camera frame: above, to the left, in front."""

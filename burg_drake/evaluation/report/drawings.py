@@ -23,8 +23,8 @@ from burg_drake.visualization.palette import GROUPS
 from burg_drake.visualization.portrait import best_yaw, camera_rotation
 from burg_drake.visualization.shaded_outline import Solid, footprint, shaded_outline
 
-SCENE_WIDTH = 640.0
-SCENE_ELEVATION = float(np.deg2rad(42.0))
+SCENE_WIDTH = 480.0
+SCENE_ELEVATION = float(np.deg2rad(56.0))
 ELEVATION = float(np.deg2rad(30.0))
 """By which the cameras look down: over a whole scene, and at one object [rad]."""
 PANEL = 220.0

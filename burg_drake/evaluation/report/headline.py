@@ -8,7 +8,7 @@ from burg_drake.core.figures import count, percent
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.report.html_page import tiles
 from burg_drake.evaluation.report.markup import Child, Html, element
-from burg_drake.evaluation.report.outcomes import STOPPED, label
+from burg_drake.evaluation.report.outcomes import STOPPED
 from burg_drake.evaluation.summary import Group, Summary
 
 INTERVALS = (
@@ -20,10 +20,10 @@ INTERVALS = (
 def headline(summary: Summary) -> Html:
     """Sentences with figures and intervals, and the same figures large."""
     sentences = [_success(summary), _cascade(summary), _spread(summary.objects)]
-    first, *rest = [sentence for sentence in sentences if sentence]
+    first, *rest = [text.replace(" %", "\u00a0%") for text in sentences if text]
     return element(
         "div",
-        element("p", element("b", first), *(f" {sentence}" for sentence in rest), class_="lead"),
+        element("p", element("b", first), *(f" {text}" for text in rest), class_="lead"),
         tiles(_tiles(summary)),
         element("p", INTERVALS, class_="note") if summary.total.judged else None,
     )
@@ -92,7 +92,7 @@ def _spread(objects: Sequence[Group]) -> str:
         return ""
     shares = [group.lifted / group.executed for group in tried]
     if min(shares) == max(shares):
-        return f"Success when executed is the same on all objects: {percent(shares[0])}."
+        return f"On each object that was tried it is {percent(shares[0])}."
     low, high = (tried[shares.index(pick(shares))] for pick in (min, max))
     return (
         f"By object, success when executed is between {percent(min(shares))} ({low.name}:"
@@ -106,29 +106,23 @@ def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
     screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a way"
     disturbed = total.held - total.lifted
     extra = f"; {count(disturbed)} more disturbed others" if disturbed else ""
-    of_all = "of executed", percent(total.lifted / total.executed) if total.executed else "-"
     objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
-    worst = _worst(summary)
     return [
         ("Grasps judged", count(total.judged), objects),
         ("Executed", count(total.executed), screened),
         ("Lifted", count(total.lifted), f"of {count(total.executed)} executed{extra}"),
         (
             "Success when executed",
-            of_all[1],
+            percent(total.lifted / total.executed) if total.executed else "-",
             f"{interval_text(total.lifted, total.executed)} (95 % interval)"
             if total.executed
             else "nothing executed",
         ),
-        ("Most frequent loss", worst[0], worst[1]),
+        (
+            "Success of all",
+            percent(total.lifted / total.judged) if total.judged else "-",
+            f"{interval_text(total.lifted, total.judged)} (95 % interval)"
+            if total.judged
+            else "nothing judged",
+        ),
     ]
-
-
-def _worst(summary: Summary) -> tuple[str, str]:
-    """What stops most grasps, and how many."""
-    outcomes = summary.total.outcomes
-    lost = [(outcomes[o], label(o)) for part in STOPPED.values() for o in part if outcomes[o]]
-    if not lost:
-        return "none", "every judged grasp lifted" if summary.total.judged else ""
-    number, name = max(lost, key=lambda pair: pair[0])
-    return count(number), name

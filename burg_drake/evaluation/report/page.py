@@ -18,7 +18,7 @@ from burg_drake.evaluation.report.cascade import cascade_section
 from burg_drake.evaluation.report.causes import causes_section
 from burg_drake.evaluation.report.grasps import best_section, failure_section
 from burg_drake.evaluation.report.headline import headline
-from burg_drake.evaluation.report.html_page import header, html_page
+from burg_drake.evaluation.report.html_page import closer, header, html_page
 from burg_drake.evaluation.report.margins import further_margins, margin_section
 from burg_drake.evaluation.report.markup import Html, element
 from burg_drake.evaluation.report.outcome_groups import group_indices
@@ -60,15 +60,17 @@ def report_page(run: Run) -> str:
         reachability_section(run),
         execution_section(summary, columns),
         repeat_section(run),
-        best_section(run),
-        count_section(summary),
-        arm_section(summary, columns),
-        collision_section(columns),
-        disturbed_section(columns, disturbance),
-        further_margins(columns, groups),
-        failure_section(run),
-        cost_section(summary),
-        provenance(run),
+        closer(
+            best_section(run),
+            count_section(summary),
+            arm_section(summary, columns),
+            collision_section(columns),
+            disturbed_section(columns, disturbance),
+            further_margins(columns, groups),
+            failure_section(run),
+            cost_section(summary),
+            provenance(run),
+        ),
     )
 
 
