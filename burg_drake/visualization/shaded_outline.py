@@ -22,7 +22,7 @@ LIGHT = np.array([-0.45, -0.75, -0.48])
 """Where the light comes from, in the camera frame: above, to the left, in front."""
 DETAIL = 3
 """Pixels a SVG unit, in which contours are found."""
-SMOOTHING = 7
+SMOOTHING = 9
 """Width of the filter that mends jagged borders of tones [pixel]; odd."""
 TOLERANCE = 0.9
 """By which a contour may be simplified [pixel]."""
