@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.short_lifts import ShortLifts, short_lifts
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 from burg_drake.evaluation.trial import PUSHED
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.campaign import Campaign
 
 ARM_STAGES = (Stage.REACHABLE.value, Stage.PLANNED.value)
 """Counts of the funnel that a run without the arm does not have."""
@@ -164,6 +167,7 @@ class Summary:
         pushes: what the arm's approaches pushed; None where no arm executed anything.
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
         notes: what is missing, and why, one sentence each; see `run_notes`.
+        scenes: by scene, in a run over many, in their order.
     """
 
     objects: tuple[Group, ...]
@@ -173,6 +177,7 @@ class Summary:
     pushes: Pushes | None = None
     lifts: ShortLifts | None = None
     notes: tuple[str, ...] = ()
+    scenes: tuple[Group, ...] = ()
 
     @property
     def steps(self) -> list[str]:
@@ -180,14 +185,18 @@ class Summary:
         return [n for n in self.total.funnel if self.mode != "hand" or n not in ARM_STAGES]
 
 
-def summarize(run: Run) -> Summary:
-    """Counts what a run has found so far."""
+def summarize(run: Run | Campaign) -> Summary:
+    """Counts what a run, of one scene or of many, has found so far."""
+    if not isinstance(run, Run):
+        from burg_drake.evaluation.campaign_summary import summarize_campaign
+
+        return summarize_campaign(run)
     columns, document = run.results, run.document
     outcome = member_codes(columns["outcome"], OUTCOMES)
     stage = member_codes(columns["stage"], ALL_STAGES)
     mine = {name: columns["object"] == name for name in document.grasps.objects}
     sampling = document.grasps
-    costs = [_stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
+    costs = [stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
     if sampling.origin == "sampled" and sampling.count:
         costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
     return Summary(
@@ -239,7 +248,8 @@ def _counter(members: tuple[Any, ...], codes: np.ndarray) -> Counter[Any]:
     return Counter({member: n for member, n in zip(members, counts, strict=True) if n})
 
 
-def _stage_cost(columns: Columns, stage: Stage) -> StageCost:
+def stage_cost(columns: Columns, stage: Stage) -> StageCost:
+    """CPU time of a stage, from its column."""
     cpu = columns[CPU_COLUMNS[stage]]
     cpu = cpu[np.isfinite(cpu)]
     median = float(np.median(cpu)) if len(cpu) else math.nan
