@@ -21,9 +21,12 @@ LIFTED = INDEX[Outcome.LIFTED]
 
 def group_indices(outcomes: NDArray[np.str_]) -> NDArray[np.int8]:
     """Index into `GROUPS` (N,) of each outcome (N,); one pass an outcome, not one a row."""
-    known = list(INDEX)
-    groups = np.array([INDEX[outcome] for outcome in known], dtype=np.int8)
-    return np.asarray(groups[member_codes(outcomes, known)], dtype=np.int8)
+    return groups_of_codes(member_codes(outcomes, tuple(Outcome)))
+
+
+def groups_of_codes(outcomes: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Index into `GROUPS` (N,) of outcomes that are given by their places in `Outcome`."""
+    return np.array([INDEX[outcome] for outcome in Outcome], dtype=np.int8)[outcomes]
 
 
 def present(groups: NDArray[np.int8]) -> list[int]:

@@ -85,11 +85,16 @@ def _about(run: Run) -> str:
 
 
 def _notice(run: Run) -> Html | None:
-    judged, total = len(run.results["id"]), len(run.candidates)
-    if judged == total:
-        return None
-    text = (
-        f"This run is not complete: {judged} of {total} grasps are judged. The command under “How"
-        " to repeat it” goes on with it."
-    )
-    return element("p", text, class_="notice")
+    judged, mine = len(run.results["id"]), len(run.mine)
+    parts = []
+    if run.document.shard:
+        parts.append(
+            f"This is share {run.document.shard} of a run, {mine} of its {len(run.candidates)}"
+            " grasps; others have the rest."
+        )
+    if judged < mine:
+        parts.append(
+            f"This run is not complete: {judged} of {mine} grasps are judged. The command under"
+            " “How to repeat it” goes on with it."
+        )
+    return element("p", " ".join(parts), class_="notice") if parts else None
