@@ -35,6 +35,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.core.errors": ["BurgError"],
         "burg_drake.core.grasps": ["GraspSet"],
         "burg_drake.core.outcome": ["Outcome", "RealOutcome", "Stage"],
+        "burg_drake.evaluation.campaign": ["Campaign", "load_campaign"],
         "burg_drake.evaluation.candidate_files": ["read_grasps"],
         "burg_drake.evaluation.cascade": ["evaluate"],
         "burg_drake.evaluation.grasp_counts": ["GraspCount", "count_grasps"],
