@@ -138,8 +138,9 @@ def require_unused(path: str | Path) -> None:
     trials = load_trials(path).trials if path.exists() else ()
     filled = sum(bool(entered(trial)) for trial in trials)
     if filled or recorded:
+        count = max(filled, len({entry.number for entry in recorded}))
         raise InvalidInputError(
-            f"{path} has entries for {max(filled, len({e.number for e in recorded}))} trials;"
+            f"{path} has entries for {count} {'trial' if count == 1 else 'trials'};"
             " choose another -o, or move it and its journal away"
         )
 
