@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from burg_drake.core.frames import Array
 from burg_drake.experiment.comparison.measures import Figure, share
 from burg_drake.experiment.comparison.ordered import Ordered
 from burg_drake.experiment.comparison.ranking import ranking
+
+T = TypeVar("T")
 
 MOST_BINS, TRIALS_A_BIN = 10, 10
 FINEST = 2000
@@ -141,7 +143,7 @@ def _bins(trials: Ordered, sign: float, weighted: bool) -> list[Bin]:
     total = trials.count.sum()
     first = trials.parts(int(np.clip(total // TRIALS_A_BIN, 1, MOST_BINS)))
     bins = []
-    for start, end in zip(first, [*first[1:], len(trials.value)], strict=True):
+    for start, end in zip(first, [*first[1:], len(trials.value)][: len(first)], strict=True):
         part = slice(start, end)
         ends = sorted(sign * trials.value[[start, end - 1]])
         count, good = trials.count[part].sum(), trials.good[part].sum()
@@ -179,6 +181,6 @@ def _isotonic(trials: Ordered, sign: float) -> list[Step]:
     return steps
 
 
-def _along[T](rows: list[T], falling: bool) -> tuple[T, ...]:
+def _along(rows: list[T], falling: bool) -> tuple[T, ...]:
     """Rows by increasing number."""
     return tuple(reversed(rows)) if falling else tuple(rows)

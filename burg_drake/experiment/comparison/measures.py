@@ -55,9 +55,9 @@ def share(successes: float, trials: float, reason: str = "no trials") -> Figure:
     """
     if trials <= 0:
         return Figure.undefined(reason)
+    successes, trials = float(successes), float(trials)
     value = min(1.0, successes / trials)
-    exact = successes in (0, trials)  # what wilson_interval knows of whole counts
-    low, high = wilson_interval(successes if exact else value * trials, trials)  # type: ignore[arg-type]
+    low, high = wilson_interval(successes, trials)
     return Figure.between(value, low, high)
 
 

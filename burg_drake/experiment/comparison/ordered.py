@@ -38,18 +38,18 @@ class Ordered:
             weight: (N,) what each stands for; 1 if None.
         """
         order = np.argsort(values)
-        ordered, well = values[order], good[order].astype(float)
+        ordered = values[order]
         first = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(ordered)])
+        edges = np.r_[first, len(ordered)]
 
         def sums(column: Array) -> Array:
-            return np.add.reduceat(column, first) if len(first) else np.zeros(0)
+            return np.diff(np.r_[0.0, np.cumsum(column)][edges])
 
-        count, well_count = sums(np.ones(len(ordered))), sums(well)
+        count, well = np.diff(edges).astype(float), sums(good[order])
         if weight is None:
-            return cls(ordered[first], count, well_count, count, well_count, count, well_count)
-        w = weight[order]
-        weights = (sums(w), sums(w * well), sums(w * w), sums(w * w * well))
-        return cls(ordered[first], count, well_count, *weights)
+            return cls(ordered[first], count, well, count, well, count, well)
+        w, g = weight[order], good[order]
+        return cls(ordered[first], count, well, sums(w), sums(w * g), sums(w * w), sums(w * w * g))
 
     def parts(self, number: int) -> Array:
         """Index of the first row of each of `number` parts with about equally many trials; fewer
