@@ -19,6 +19,7 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    compare,
     evaluate,
     frames,
     grasps,
@@ -56,6 +57,7 @@ VERBS = (
     robustness,
     replay,
     report,
+    compare,
     station,
     hand,
     frames,
