@@ -1,20 +1,19 @@
-"""The runs whose grasps a trials file names: scene, station and grasp of each trial."""
+"""What the trials of a file are carried out on: scene, station and grasp of each."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.results import load_runs
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet, load_trials
+from burg_drake.experiment.trials.sources import load_sources
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
@@ -24,12 +23,10 @@ class TriedScene:
     """What the trials of a run are carried out on.
 
     Attributes:
-        key: of the run in the trials file.
         run: on the disk.
         scene, station: as they were judged.
     """
 
-    key: str
     run: Run
     scene: Scene
     station: Station
@@ -41,50 +38,39 @@ class TriedScene:
 
 
 class TriedRuns:
-    """The runs of a trials file, loaded when they are first asked for.
+    """The runs of a trials file.
 
     Args:
         path: of the trials file.
+        moved: folders of runs in place of those in the file, by key.
 
     Attributes:
         path: as given.
         sheet: the file's contents when it was opened.
 
     Raises:
-        DocumentError: the file does not fit the schema.
+        BurgError: the file does not fit the schema or has no trials; a run or a grasp is gone, or
+            not the one that was planned with.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, moved: Mapping[str, str | Path] | None = None) -> None:
         self.path = Path(path)
         self.sheet: TrialSheet = load_trials(path)
-        self._tried: dict[str, TriedScene] = {}
         if not self.sheet.trials:
             raise InvalidInputError(f"{path} has no trials; burg-drake trials plan makes some")
+        used = {trial.run: None for trial in self.sheet.trials}
+        runs = load_sources(self.sheet, path, moved=moved, only=used)
+        self._tried = {
+            key: TriedScene(run, run.scene(), run.station()) for key, run in runs.items()
+        }
 
     def of(self, trial: RealTrial) -> TriedScene:
-        """What a trial is carried out on.
-
-        Raises:
-            InvalidInputError: the run is gone, is another one, or its library has changed.
-        """
-        if trial.run not in self._tried:
-            self._tried[trial.run] = self._load(trial)
+        """What a trial is carried out on."""
         return self._tried[trial.run]
 
     def candidate(self, trial: RealTrial) -> Candidate:
-        """The grasp of a trial.
-
-        Raises:
-            InvalidInputError: the run does not have it.
-        """
-        tried = self.of(trial)
-        found = tried.candidates.get(trial.grasp)
-        if found is None:
-            raise InvalidInputError(
-                f"{self.path}: trial {trial.number}: run {tried.run.path} has no grasp"
-                f" {trial.grasp!r}; the file is of another run"
-            )
-        return found
+        """The grasp of a trial."""
+        return self.of(trial).candidates[trial.grasp]
 
     def X_SG(self, trial: RealTrial) -> Array:
         """(4, 4) the grasp of a trial on the board."""
@@ -96,24 +82,10 @@ class TriedRuns:
         width = self.candidate(trial).width
         return float(self.of(trial).station.hand.opening[1]) if math.isnan(width) else width
 
-    def blocks(self) -> dict[int, tuple[RealTrial, ...]]:
-        """The trials in their order, by block."""
-        ordered = sorted(self.sheet.trials, key=lambda trial: trial.number)
-        numbers = np.unique([trial.block for trial in ordered]).tolist()
-        return {n: tuple(t for t in ordered if t.block == n) for n in numbers}
 
-    def _load(self, trial: RealTrial) -> TriedScene:
-        source = self.sheet.runs.get(trial.run)
-        where = f"{self.path}: trial {trial.number}"
-        if source is None:
-            known = ", ".join(self.sheet.runs) or "none"
-            raise InvalidInputError(f"{where}: there is no run {trial.run!r}; runs: {known}")
-        folder = self.path.absolute().parent / source.path
-        runs = load_runs(folder)
-        run = next((run for run in runs if run.document.hash == source.hash), None)
-        if run is None:
-            there = ", ".join(run.document.hash for run in runs)
-            raise InvalidInputError(
-                f"{where}: {folder} holds run {there}, the file is of run {source.hash}"
-            )
-        return TriedScene(trial.run, run, run.scene(), run.station())
+def in_blocks(sheet: TrialSheet) -> dict[int, tuple[RealTrial, ...]]:
+    """The trials of a sheet in their order, by block."""
+    blocks: dict[int, list[RealTrial]] = {}
+    for trial in sorted(sheet.trials, key=lambda trial: trial.number):
+        blocks.setdefault(trial.block, []).append(trial)
+    return {block: tuple(trials) for block, trials in blocks.items()}

@@ -17,8 +17,8 @@ from burg_drake.objects.rays import RayCaster
 from burg_drake.visualization.camera_aim import looking
 from burg_drake.visualization.portrait import fit_camera
 
-HALF_VIEW = 0.24
-"""Tangent of half the vertical angle of view: little perspective."""
+HALF_VIEW, NARROW = 0.24, 0.06
+"""Tangents of half the vertical angle of view: little perspective, and hardly any from above."""
 FILL = 0.86
 """Share of a picture that is filled."""
 AZIMUTHS = np.deg2rad(np.array([0.0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180]))
@@ -49,10 +49,10 @@ class Subject:
     hand: Array
 
 
-def pinhole(size: tuple[int, int]) -> Intrinsics:
-    """The camera of all pictures."""
+def pinhole(size: tuple[int, int], half_view: float = HALF_VIEW) -> Intrinsics:
+    """A camera by its image size and the tangent of half its vertical angle of view."""
     width, height = size
-    focal = height / 2.0 / HALF_VIEW
+    focal = height / 2.0 / half_view
     center = ((width - 1) / 2.0, (height - 1) / 2.0)
     return Intrinsics(width=width, height=height, focal=(focal, focal), center=center)
 
@@ -82,17 +82,17 @@ def grasp_viewpoint(
 
 def fitted(points: Array, forward: Array, size: tuple[int, int]) -> Viewpoint:
     """The nearest viewpoint in a direction that has all points (N, 3) in view."""
-    intrinsics = pinhole(size)
-    R_SC = looking(forward)
-    half = FILL * HALF_VIEW * np.array([size[0] / size[1], 1.0])
-    return Viewpoint(make_pose(R_SC, fit_camera(points, R_SC, half)), intrinsics)
+    return _nearest(points, looking(forward), size, HALF_VIEW)
 
 
 def above(points: Array, size: tuple[int, int]) -> Viewpoint:
     """From straight above; the board's far edge is at the top of the picture."""
-    R_SC = np.diag([1.0, -1.0, -1.0])
-    half = FILL * HALF_VIEW * np.array([size[0] / size[1], 1.0])
-    return Viewpoint(make_pose(R_SC, fit_camera(points, R_SC, half)), pinhole(size))
+    return _nearest(points, np.diag([1.0, -1.0, -1.0]), size, NARROW)
+
+
+def _nearest(points: Array, R_SC: Array, size: tuple[int, int], half_view: float) -> Viewpoint:
+    half = FILL * half_view * np.array([size[0] / size[1], 1.0])
+    return Viewpoint(make_pose(R_SC, fit_camera(points, R_SC, half)), pinhole(size, half_view))
 
 
 def _score(
