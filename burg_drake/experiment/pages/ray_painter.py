@@ -1,5 +1,5 @@
-"""Paints by rays (embree), where Drake's renderer lacks its system libraries: plain shaded surfaces,
-each object in a colour of its own."""
+"""Paints by rays (embree), where Drake's renderer lacks its system libraries: plain shaded
+surfaces, each object in a colour of its own."""
 
 from __future__ import annotations
 

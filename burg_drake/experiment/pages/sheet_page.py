@@ -24,14 +24,14 @@ from burg_drake.scene.scene import Scene
 from burg_drake.visualization.markup import Html, element, join
 
 HOW = (
-    "Carry out the trials in the order of their numbers. Each block has one scene: set it up as its"
-    " pictures show it, on its printed board, and set it up again after every trial.",
+    "Carry out the trials in the order of their numbers. Each block has one scene: set it up on its"
+    " printed board as its pictures show it, and set it up again after every trial.",
     "Tick one box a trial, when the robot has ended its motion. If none fits, write what happened"
     " behind “other”.",
-    "Look at the picture before the trial: the hand is where the robot will close it, and the object"
-    " to be gripped has an orange rim. Do not correct the scene or the robot for it.",
-    "A trial that was spoiled, by a person or an object that fell before, is “not attempted”; go on,"
-    " and repeat it at the end if there is time.",
+    "Look at the picture before the trial: the hand is where the robot will close it, and the"
+    " object to be gripped has an orange rim. Do not correct the scene or the robot for it.",
+    "A trial that was spoiled, by a person or an object that fell before, is “not attempted”; go"
+    " on, and repeat it at the end if there is time.",
 )
 
 
@@ -162,7 +162,7 @@ def _places(scene: Scene) -> Html:
         X_SO, thing = scene.X_SO(name), scene.instance(name).object
         surface = scene.library.surface(thing)
         p_SQ = transform_points(X_SO, np.asarray(surface.vertices))
-        x, y, z = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2.0
+        x, y, _ = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2.0
         turn = math.degrees(math.atan2(X_SO[1, 0], X_SO[0, 0]))
         height = p_SQ[:, 2].max()
         cells = (1e3 * x, 1e3 * y, turn, 1e3 * height)
@@ -179,7 +179,10 @@ def _places(scene: Scene) -> Html:
 
 def _printout(scene: Scene, address: str | None) -> Html:
     width, height = (round(1e3 * side) for side in scene.board.size)
-    board = f"The board, {width} x {height} mm, shows where everything stands; x and y are of the middle of each object. "
+    board = (
+        f"The board, {width} x {height} mm, shows where everything stands; x and y are those of the"
+        " middle of each object. "
+    )
     if address:
         link = element("a", address, href=address)
         return element("p", board, "Print it at 100 %: ", link, ".", class_="print")
