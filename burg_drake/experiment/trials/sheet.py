@@ -311,10 +311,9 @@ def _require_known(name: str, known: Iterable[str], what: str, *place: str | int
 
 def _require_time(text: str, name: str) -> None:
     try:
-        known = not text or datetime.fromisoformat(text)
-    except ValueError:
-        known = False
-    if not known:
+        if text:
+            datetime.fromisoformat(text)
+    except ValueError as error:
         raise FieldError(
             f"{name} is {quoted(text)}; write it as in 2026-05-04T16:30:00+02:00", name
-        )
+        ) from error

@@ -1,4 +1,4 @@
-"""The runs behind a sheet of trials: found again, and found to be the ones that were planned with."""
+"""The runs behind a sheet of trials: found again, and known to be those that it was made of."""
 
 from __future__ import annotations
 
