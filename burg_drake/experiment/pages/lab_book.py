@@ -15,6 +15,7 @@ from typing import Any
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.outcome import RealOutcome
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.pages.words import (
     SHORT_LIST,
@@ -26,7 +27,6 @@ from burg_drake.experiment.pages.words import (
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.entries import entered
 from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
-from burg_drake.core.outcome import RealOutcome
 
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""
@@ -120,9 +120,7 @@ class LabBook:
             first = trial.outcome is None
             return self.book.record(entry.number, correct=not first or not entry.outcome, **values)
 
-    def photographed(
-        self, number: int, photo: str, placement: dict[str, ObjectPlace]
-    ) -> RealTrial:
+    def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
         """Enters what was seen before a trial.
 
         Raises:
