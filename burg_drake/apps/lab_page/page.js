@@ -6,7 +6,7 @@ const seen = () => (document.hidden
   ? new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }))
   : Promise.resolve());
 const SETTLE = 600;  // after a trial comes up, clicks on outcomes are ignored for so long [ms]
-const QUICK = 3;     // checks that take longer are not made one after the other [s]
+const QUICK = 5;     // checks that take longer are not made one after the other [s]
 
 let plan = null;
 let outbox = null;
@@ -363,7 +363,7 @@ async function showFrames() {
   let number = 0, epoch = 0;
   for (;;) {
     await seen();
-    if (view !== "camera") { await sleep(200); continue; }
+    if (view !== "camera" || (camera && camera.checking)) { await sleep(200); continue; }
     try {
       const answer = await fetch(`frame.jpg?epoch=${epoch}&after=${number}`);
       if (answer.status === 200) {
