@@ -33,6 +33,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -56,6 +57,7 @@ VERBS = (
     robustness,
     replay,
     report,
+    trials,
     station,
     hand,
     frames,

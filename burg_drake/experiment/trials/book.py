@@ -75,6 +75,14 @@ class TrialBook:
         """What the file holds now; see `load_trials`."""
         return self._read()[1]
 
+    def trial(self, number: int | Literal["next"]) -> RealTrial:
+        """The trial of a number, or the first one without an outcome.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._chosen(self.sheet(), number)
+
     def entries(self) -> list[Entry]:
         """All that was ever recorded, in order."""
         return read_entries(journal_path(self.path))
@@ -114,11 +122,9 @@ class TrialBook:
         given = _checked(entry)
 
         def change(trial: RealTrial) -> RealTrial:
+            self.require_open(trial, given, correct=correct, again=again)
             base = replace(trial, **EMPTY) if again else trial
-            values = _merged(base, given)
-            if not correct:
-                self._require_new(base, values)
-            new = replace(base, **values)
+            new = replace(base, **_merged(base, given))
             if new.outcome is not None and "time" not in given:
                 same = not again and new.outcome is trial.outcome and trial.time
                 new = replace(new, time=trial.time if same else _now())
@@ -162,8 +168,27 @@ class TrialBook:
         lost = [found.values for found in self.lacking() if found.number == trial.number]
         return with_values(trial, lost[0]) if lost else trial
 
-    def _require_new(self, trial: RealTrial, given: Mapping[str, Any]) -> None:
-        """Refuses what contradicts an entry."""
+    def require_open(
+        self,
+        trial: RealTrial,
+        entry: Mapping[str, Any],
+        *,
+        correct: bool = False,
+        again: bool = False,
+    ) -> None:
+        """Refuses an entry that contradicts one that is there, unless it is to replace it.
+
+        Args:
+            trial: as it is.
+            entry, correct, again: as for `record`.
+
+        Raises:
+            UnknownNameError: there is no such field.
+            InvalidInputError: it contradicts, or cannot be read.
+        """
+        given = _merged(trial, _checked(entry))
+        if correct or again:
+            return
         for name, value in given.items():
             present = getattr(trial, name)
             if present != EMPTY[name] and not _includes(value, present):

@@ -60,6 +60,13 @@ def load_sources(
     return found
 
 
+def load_run_of(
+    sheet: TrialSheet, path: str | Path, key: str, *, moved: Moved | None = None
+) -> Run:
+    """One run of a sheet, without a look at its grasps; see `load_sources`."""
+    return _load(key, sheet.runs[key], Path(path), moved or {})
+
+
 def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
     """The row of the results of each trial's grasp, in the order of `sheet.trials`.
 
