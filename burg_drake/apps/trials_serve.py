@@ -17,6 +17,7 @@ from burg_drake.apps.arguments import (
     print_scale,
 )
 from burg_drake.apps.interrupts import terminated_as_interrupted, wait_for_interrupt
+from burg_drake.apps.trials_arguments import add_moved, add_sheet
 
 if TYPE_CHECKING:
     from burg_drake.cameras.intrinsics import Intrinsics
@@ -41,7 +42,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake trials serve trials.yaml --camera 0 --intrinsics camera.yaml",
         "burg-drake trials serve trials.yaml --camera sim:panda_tabletop/board",
     )
-    parser.add_argument("trials", metavar="TRIALS", help="trials file (.yaml)")
+    add_sheet(parser)
+    add_moved(parser)
     parser.add_argument(
         "--port", type=port, metavar="N", help="where the page is served (default: first free)"
     )
@@ -83,7 +85,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
     from burg_drake.experiment.pages.picture_shelf import PictureShelf
     from burg_drake.experiment.pages.tried_runs import TriedRuns
 
-    runs = TriedRuns(arguments.trials)
+    runs = TriedRuns(arguments.trials, dict(arguments.moved))
     lab = LabBook(runs, show_simulated=arguments.show_simulated)
     with terminated_as_interrupted(), contextlib.ExitStack() as closing:
         camera = _camera(arguments, lab) if arguments.camera else None

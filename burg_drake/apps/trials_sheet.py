@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_verb
+from burg_drake.apps.trials_arguments import add_moved, add_sheet
 
 if TYPE_CHECKING:
     from burg_drake.experiment.pages.tried_runs import TriedRuns
@@ -26,7 +27,8 @@ def add_to(verbs: Any) -> None:
         "The page needs nothing else and prints on A4 and letter. The printed board of each scene",
         "is written beside it, as sheet_SCENE.pdf.",
     )
-    parser.add_argument("trials", metavar="TRIALS", help="trials file (.yaml)")
+    add_sheet(parser)
+    add_moved(parser)
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help="page to write")
     parser.add_argument(
         "--show-simulated",
@@ -44,7 +46,7 @@ def run_sheet(arguments: argparse.Namespace) -> int:
     from burg_drake.experiment.pages.tried_runs import TriedRuns
 
     require_writable(arguments.output)
-    runs = TriedRuns(arguments.trials)
+    runs = TriedRuns(arguments.trials, dict(arguments.moved))
     page = Path(arguments.output)
     printouts = {} if arguments.no_printouts else _printouts(runs, page)
     options = SheetOptions(show_simulated=arguments.show_simulated, printouts=printouts)

@@ -9,7 +9,7 @@ as often as it likes; else somebody else was faster, and the browser is told.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -117,8 +117,8 @@ class LabBook:
                 raise EntryConflict(
                     f"trial {entry.number} was changed meanwhile: it has {what}{who}", trial
                 )
-            first = trial.outcome is None
-            return self.book.record(entry.number, correct=not first or not entry.outcome, **values)
+            empty = all(getattr(trial, name) in ("", None) for name in OPERATOR_FIELDS)
+            return self.book.record(entry.number, correct=not empty, **values)
 
     def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
         """Enters what was seen before a trial.
@@ -127,12 +127,19 @@ class LabBook:
             BurgError: as for `enter`; the trial has an outcome already.
         """
         with self._lock:
-            trial = self.sheet().trial(number)
-            if trial.outcome is not None:
-                raise InvalidInputError(
-                    f"trial {number} is carried out already; its picture was not replaced"
-                )
+            self.require_open(number)
             return self.book.record(number, correct=True, photo=photo, placement=placement)
+
+    def require_open(self, number: int) -> None:
+        """Refuses a photo of what was before a trial that is over.
+
+        Raises:
+            InvalidInputError: the trial has an outcome; or there is none of that number.
+        """
+        if self.sheet().trial(number).outcome is not None:
+            raise InvalidInputError(
+                f"trial {number} is carried out already; photo and placement were not kept"
+            )
 
     def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
         """Whether the entry is in the file, or was until something else was entered."""
@@ -140,7 +147,7 @@ class LabBook:
             return True
         if state_of(trial) == entry.replaces or entry.outcome is None:
             return False
-        wanted = entered(_with(trial, values))
+        wanted = entered(replace(trial, **values))
         return any(
             past.is_of(trial)
             and all(past.after.get(name) == wanted.get(name) for name in OPERATOR_FIELDS)
@@ -178,12 +185,6 @@ def _values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
         "note": entry.note,
         "robot": robot,
     }
-
-
-def _with(trial: RealTrial, values: dict[str, Any]) -> RealTrial:
-    from dataclasses import replace
-
-    return replace(trial, **values)
 
 
 def plan_of(sheet: TrialSheet) -> str:

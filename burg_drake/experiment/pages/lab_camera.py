@@ -4,6 +4,7 @@ far its objects stand from their places."""
 from __future__ import annotations
 
 import math
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from typing import Any
 
 from burg_drake.cameras.event_log import EventLog
 from burg_drake.cameras.frame_source import FrameSource
+from burg_drake.cameras.image_file import write_image
 from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.live_session import LiveSession
 from burg_drake.cameras.overlay_style import OverlayStyle
@@ -21,9 +23,8 @@ from burg_drake.cameras.picture import Picture
 from burg_drake.cameras.placement_document import Placement, PlacementCheck
 from burg_drake.cameras.session import Session, Sight, pose_line
 from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.schema import Pose
 from burg_drake.experiment.pages.lab_book import LabBook
-from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial
+from burg_drake.experiment.trials.evidence import keep_evidence, object_places
 from burg_drake.scene.scene import Scene
 
 IDLE_AFTER = 5.0
@@ -181,61 +182,13 @@ class LabCamera:
 
     def _keep(self, number: int, sight: Sight, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
-        trials = Path(self._lab.runs.path)
-        photo = photo_path(trials, number, self._lab.sheet().trial(number))
-        save_photo(sight, photo)
-        name = photo.relative_to(trials.parent).as_posix()
-        self._lab.photographed(number, name, places_of(check))
-
-
-def photo_path(trials: Path, number: int, trial: RealTrial) -> Path:
-    """Where the next photo of a trial goes; earlier ones stay, as a trial may name them."""
-    folder = trials.with_name(f"{trials.stem}_photos")
-    taken = len(list(folder.glob(f"trial_{number:03d}*.png"))) if folder.is_dir() else 0
-    while (path := folder / f"trial_{number:03d}{f'_{taken + 1}' if taken else ''}.png").exists():
-        taken += 1
-    return path
-
-
-def save_photo(sight: Sight, path: Path) -> None:
-    """Writes the frame as a PNG, whole or not at all.
-
-    Raises:
-        InvalidInputError: it cannot be written.
-    """
-    import cv2
-    import numpy as np
-
-    from burg_drake.core.files import atomic_write
-
-    _, data = cv2.imencode(".png", np.ascontiguousarray(sight.frame.image[..., ::-1]))
-    atomic_write(path, data.tobytes())
-
-
-def places_of(check: PlacementCheck) -> dict[str, ObjectPlace]:
-    """Where the objects stand, as trials files have it."""
-    return {name: _place(placed) for name, placed in check.instances.items()}
-
-
-def _place(placed: Placement) -> ObjectPlace:
-    off, sd = placed.displacement, placed.displacement_sd
-    turn, turn_sd = placed.angle, placed.angle_sd
-    return ObjectPlace(
-        status=placed.status,
-        offset_mm=None if off is None else (_mm(off[0]), _mm(off[1])),
-        offset_sd_mm=None if sd is None else (_mm(sd[0]), _mm(sd[1])),
-        turn_deg=None if turn is None else round(math.degrees(turn), 3),
-        turn_sd_deg=None if turn_sd is None else round(math.degrees(turn_sd), 3),
-        X_SO=None if placed.measured is None else _pose(placed.measured),
-    )
-
-
-def _pose(pose: Pose) -> Pose:
-    return Pose.from_matrix(pose.matrix(), quaternion=True)
-
-
-def _mm(length: float) -> float:
-    return round(1e3 * length, 3)
+        path = self._lab.runs.path
+        self._lab.require_open(number)
+        with tempfile.TemporaryDirectory() as folder:
+            photo = Path(folder) / "photo.png"
+            write_image(photo, sight.frame.image)
+            name = keep_evidence(path, number, photo=photo, check=check)
+        self._lab.photographed(number, name, object_places(check))
 
 
 def place_row(placed: Placement) -> dict[str, Any]:
@@ -250,6 +203,6 @@ def place_row(placed: Placement) -> dict[str, Any]:
         "status": placed.status,
         "reason": placed.reason,
         "within": within,
-        "mm": None if off is None else 1e3 * off,
-        "deg": None if turn is None else math.degrees(turn),
+        "mm": None if off is None else round(1e3 * off, 2),
+        "deg": None if turn is None else round(math.degrees(turn), 2) + 0.0,
     }
