@@ -52,6 +52,8 @@ PATIENCE = 1.0
 """How long a request for a picture of the camera waits for a newer one [s]."""
 RENDERING = 20.0
 """How long a request for a picture of a grasp waits until it is made [s]."""
+POLL = 0.05
+"""Between two looks of whether to stop serving [s]."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
 PAGES = {
@@ -131,7 +133,8 @@ class LabServer(ThreadingHTTPServer):
 
     def start(self) -> None:
         """Serves in a thread of its own."""
-        threading.Thread(target=self.serve_forever, name="lab server", daemon=True).start()
+        serving = partial(self.serve_forever, poll_interval=POLL)
+        threading.Thread(target=serving, name="lab server", daemon=True).start()
 
     def close(self) -> None:
         """Stops serving; requests that are being answered end soon."""

@@ -98,8 +98,7 @@ class LabCamera:
             view, self._view = self._view, None
             if view is not None:
                 view.live.close()
-            if self._check is not None:
-                self._check.join()  # OpenCV must not be at work when Python ends
+            self.wait_for_check()  # OpenCV must not be at work when Python ends
 
     def next_picture(self, epoch: int, after: int, seconds: float) -> tuple[int, Picture] | None:
         """The newest picture, as soon as it is another one than that of this epoch and number."""
@@ -145,6 +144,11 @@ class LabCamera:
                 daemon=True,
             )
             self._check.start()
+
+    def wait_for_check(self, seconds: float | None = None) -> None:
+        """Until the placement check that is at work, if any, is done."""
+        if self._check is not None:
+            self._check.join(seconds)
 
     def status(self) -> dict[str, Any]:
         """What the page shows beside the picture."""

@@ -109,9 +109,9 @@ class PictureShelf:
     def _make(self, pictures: TrialPictures, name: str) -> dict[str, bytes]:
         kind, _, number = name.partition("/")
         if kind == "grasp":
-            return {name: pictures.grasp(self._trials[int(number)], GRASP_SIZE).jpeg}
+            return {name: pictures.grasp(self._trials[int(number)], GRASP_SIZE)}
         above, front = pictures.setup(self._blocks[int(number)], SETUP_SIZE)
-        return {f"above/{number}": above.jpeg, f"front/{number}": front.jpeg}
+        return {f"above/{number}": above, f"front/{number}": front}
 
     def _keep(self, made: dict[str, bytes]) -> None:
         with self._changed:

@@ -129,12 +129,11 @@ def _block(
     which = f"trial {first}" if len(trials) == 1 else f"trials {first} to {last}"
     seen = pictures.setup(trials[0])
     figures = [
-        _figure(picture.jpeg, f"{scene.name} {where}", where)
+        _figure(picture, f"{scene.name} {where}", where)
         for picture, where in zip(seen, ("from above", "from the front"), strict=True)
     ]
     cards = [
-        trial_card(trial, runs, pictures.grasp(trial).jpeg, options.show_simulated)
-        for trial in trials
+        trial_card(trial, runs, pictures.grasp(trial), options.show_simulated) for trial in trials
     ]
     top = element(
         "div",

@@ -6,7 +6,6 @@ alone, so that they are the same each time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from burg_drake.core.frames import Array, inverse, transform_points
 from burg_drake.experiment.pages.bodies import GROUND, PlacedBody, SceneBodies, stock
 from burg_drake.experiment.pages.highlight import jpeg, shaded, with_names, with_target
-from burg_drake.experiment.pages.painting import Painter, Viewpoint
+from burg_drake.experiment.pages.painting import Painter, Painting, Viewpoint
 from burg_drake.experiment.pages.ray_painter import RayPainter
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.pages.viewpoints import (
@@ -34,19 +33,6 @@ SETUP_SIZE = (760, 500)
 """Of the pictures of a set-up [pixel]."""
 FRONT = np.deg2rad(33.0)
 """By which the picture from the front looks down [rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class GraspPicture:
-    """The picture of a grasp.
-
-    Attributes:
-        jpeg: the file.
-        view: from where it was taken.
-    """
-
-    jpeg: bytes
-    view: Viewpoint
 
 
 class TrialPictures:
@@ -77,31 +63,33 @@ class TrialPictures:
 
             self._painter = VtkPainter(stock(shown))
 
-    def grasp(self, trial: RealTrial, size: tuple[int, int] = SIZE) -> GraspPicture:
-        """The hand at a trial's grasp among the objects; the target has a rim."""
+    def look(
+        self, trial: RealTrial, size: tuple[int, int] = SIZE
+    ) -> tuple[Painting, tuple[PlacedBody, ...], Viewpoint]:
+        """The hand at a trial's grasp among the objects, what of it each pixel shows, and from
+        where."""
         scenery, X_SG = self._scenes[trial.run], self.runs.X_SG(trial)
         width = self.runs.width(trial)
         view = scenery.viewpoint(trial.instance, X_SG, width, size)
         placed = scenery.with_hand(X_SG, width)
         painting = self._painter.paint(placed, view)
-        painting = shaded(painting, placed, view, [*scenery.hulls, *_hulls(scenery, X_SG)])
-        return GraspPicture(jpeg(with_target(painting, placed, trial.instance)), view)
+        hulls = [*scenery.hulls, scenery.bodies.corners(X_SG)]
+        return shaded(painting, placed, view, hulls), placed, view
 
-    def setup(
-        self, trial: RealTrial, size: tuple[int, int] = SETUP_SIZE
-    ) -> tuple[GraspPicture, GraspPicture]:
-        """The scene of a trial without a hand, from above and from the front."""
+    def grasp(self, trial: RealTrial, size: tuple[int, int] = SIZE) -> bytes:
+        """JPEG of the hand at a trial's grasp among the objects; the target has a rim."""
+        painting, placed, _ = self.look(trial, size)
+        return jpeg(with_target(painting, placed, trial.instance))
+
+    def setup(self, trial: RealTrial, size: tuple[int, int] = SETUP_SIZE) -> tuple[bytes, bytes]:
+        """JPEGs of the scene of a trial without a hand, from above and from the front."""
         scenery = self._scenes[trial.run]
-        views = (
-            above(scenery.corners, size),
-            fitted(scenery.corners, direction(0.0, FRONT), size),
-        )
+        standing = scenery.bodies.standing
+        front = fitted(scenery.corners, direction(0.0, FRONT), size)
         pictures = []
-        for view in views:
-            painting = self._painter.paint(scenery.bodies.standing, view)
-            painting = shaded(painting, scenery.bodies.standing, view, scenery.hulls)
-            image = with_names(painting, scenery.bodies.standing)
-            pictures.append(GraspPicture(jpeg(image), view))
+        for view in (above(scenery.corners, size), front):
+            painting = shaded(self._painter.paint(standing, view), standing, view, scenery.hulls)
+            pictures.append(jpeg(with_names(painting, standing)))
         return pictures[0], pictures[1]
 
 
@@ -151,8 +139,3 @@ class _Scenery:
         """The open hand, in the frame of the grasp."""
         vertices, faces, _ = RayPainter().joined(self.bodies.hand(np.eye(4), np.nan))
         return RayCaster(vertices, faces)
-
-
-def _hulls(scenery: _Scenery, X_SG: Array) -> list[Array]:
-    """Roughly the hand, for its shadow."""
-    return [scenery.bodies.corners(X_SG)]
