@@ -50,7 +50,7 @@ class _Question:
 
 def rejudge(
     sheet: TrialSheet,
-    folder: str | Path,
+    path: str | Path,
     out: str | Path,
     *,
     runs: Mapping[str, Run] | None = None,
@@ -66,7 +66,7 @@ def rejudge(
 
     Args:
         sheet: the trials.
-        folder: of their file, from which the sheet's paths start.
+        path: their file, from whose folder the sheet's paths start.
         out: folder for the answers; made if need be.
         runs: the sheet's runs by key, if they are at hand.
         executor: who judges; as many processes as there are processors if None.
@@ -78,16 +78,16 @@ def rejudge(
             the folder cannot be written.
         UnknownNameError: a grasp is not in its run.
     """
-    runs = source_runs(sheet, folder) if runs is None else runs
+    runs = source_runs(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     skipped = {trial.number: why for trial in sheet.trials if (why := why_skipped(trial))}
     asked = _questions([t for t in sheet.trials if t.number not in skipped], runs)
-    path = writable_folder(out)
-    with Reporter(progress) as reporter, Journal(path / JOURNAL_FILE) as journal:
-        remove_unfinished(path)
+    folder = writable_folder(out)
+    with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
+        remove_unfinished(folder)
         known = {
             id: verdict
-            for id, verdict in read_journal(path / JOURNAL_FILE).items()
+            for id, verdict in read_journal(folder / JOURNAL_FILE).items()
             if not verdict.is_open(retry_failed=retry_failed)
         }
         known |= _judge(asked, known, executor, journal, reporter)
@@ -97,7 +97,7 @@ def rejudge(
         else one.trial
         for one in asked
     )
-    found = Rejudging(path=path, success=sheet.selection.success, trials=trials, skipped=skipped)
+    found = Rejudging(path=folder, success=sheet.selection.success, trials=trials, skipped=skipped)
     write_rejudging(found)
     return found
 

@@ -10,23 +10,23 @@ from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.trials.sheet import TrialSheet
 
 
-def source_runs(sheet: TrialSheet, folder: str | Path) -> dict[str, Run]:
+def source_runs(sheet: TrialSheet, path: str | Path) -> dict[str, Run]:
     """The runs of a sheet by key.
 
     Args:
         sheet: the trials.
-        folder: of their file.
+        path: their file.
 
     Raises:
         InvalidInputError: a run is not where the sheet says, or is another one.
     """
     found = {}
     for key, source in sheet.runs.items():
-        path = Path(folder) / source.path
-        runs = {run.document.hash: run for run in load_runs(path)}
+        folder = Path(path).parent / source.path
+        runs = {run.document.hash: run for run in load_runs(folder)}
         if source.hash not in runs:
             raise InvalidInputError(
-                f"{path} holds run {', '.join(runs)}; the trials are of run {source.hash}"
+                f"{folder} holds run {', '.join(runs)}; the trials are of run {source.hash}"
                 f" (runs.{key}): write its folder into the trials file"
             )
         found[key] = runs[source.hash]

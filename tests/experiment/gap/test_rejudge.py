@@ -18,6 +18,7 @@ from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.experiment.gap.measured import measured_scene, upright
@@ -116,14 +117,14 @@ def unseen() -> ObjectPlace:
 @pytest.fixture(scope="module")
 def found(run: Run, sheet: TrialSheet) -> Rejudging:
     out = run.path.parent / "again"
-    return rejudge(sheet, ".", out, executor=LocalExecutor(2), progress=False)
+    return rejudge(sheet, "trials.yaml", out, executor=LocalExecutor(2), progress=False)
 
 
 def test_each_trial_is_judged_where_its_objects_stood(run: Run, found: Rejudging) -> None:
     as_planned, away, within, other_away = found.trials
     planned = run.verdicts[run.candidates.id[0]]
     assert as_planned.verdict is not None and away.verdict is not None
-    assert replace(as_planned.verdict, cpu={}) == replace(planned, cpu={})
+    assert differences(planned, as_planned.verdict) == []
     assert as_planned.notes == () and as_planned.outcome is Outcome.LIFTED
     assert away.verdict.outcome.value in MISSED
     assert within.outcome is None and "overlap" in within.why_not
@@ -163,10 +164,10 @@ def test_reality_slipped_and_only_the_displaced_scene_says_so(found: Rejudging) 
 def test_the_folder_goes_on_and_tells_all(run: Run, sheet: TrialSheet, found: Rejudging) -> None:
     journal = found.path / "journal.jsonl"
     before = journal.read_bytes()
-    again = rejudge(sheet, ".", found.path, executor=Nobody(), progress=False)  # type: ignore[arg-type]
+    again = rejudge(sheet, "trials.yaml", found.path, executor=Nobody(), progress=False)  # type: ignore[arg-type]
     assert journal.read_bytes() == before and again.causes == found.causes
     journal.write_bytes(before[: before.rindex(b"\n", 0, -1) + 20])  # killed within the last line
-    whole = rejudge(sheet, ".", found.path, executor=LocalExecutor(1), progress=False)
+    whole = rejudge(sheet, "trials.yaml", found.path, executor=LocalExecutor(1), progress=False)
     assert len(journal.read_bytes().splitlines()) == 3 and whole.causes == found.causes
     told = json.loads((found.path / "rejudged.json").read_text())
     assert told["causes"]["placement"] == 1 and told["judged"] == 3
@@ -196,7 +197,7 @@ class Nobody:
 def test_a_run_that_is_gone_or_another_one_is_refused(run: Run, sheet: TrialSheet) -> None:
     other = replace(sheet, runs={"a": replace(sheet.runs["a"], hash="0123")})
     with pytest.raises(InvalidInputError, match=r"the trials are of run 0123 \(runs.a\)"):
-        rejudge(other, ".", run.path.parent / "never", progress=False)
+        rejudge(other, "trials.yaml", run.path.parent / "never", progress=False)
     assert not (run.path.parent / "never").exists()
 
 
