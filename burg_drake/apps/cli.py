@@ -19,6 +19,7 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    compare,
     evaluate,
     frames,
     gap,
@@ -58,6 +59,7 @@ VERBS = (
     gap,
     replay,
     report,
+    compare,
     station,
     hand,
     frames,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import Columns
+from burg_drake.evaluation.table import TEXT, Columns
 
 
 def load_runs(path: str | Path) -> list[Run]:
@@ -35,4 +37,11 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
     """
     tables = [run.results for run in load_runs(path)]
     wanted = names or list(dict.fromkeys(name for table in tables for name in table))
-    return {name: np.concatenate([table[name] for table in tables]) for name in wanted}
+    return {name: np.concatenate([_column(table, name) for table in tables]) for name in wanted}
+
+
+def _column(table: Columns, name: str) -> NDArray[Any]:
+    if name in table:
+        return table[name]
+    missing = "" if name in TEXT else np.nan
+    return np.full(len(table["id"]), missing)

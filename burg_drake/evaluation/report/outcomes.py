@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from burg_drake.core.figures import duration, figure, percent
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.report.charts import Part, funnel, interval_mark, legend, stacked_bar
-from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
+from burg_drake.evaluation.report.charts import Part, interval_mark, legend, stacked_bar
+from burg_drake.evaluation.report.markup import Child, Html, element, folded, join, section, table
 from burg_drake.evaluation.report.style import STYLES
 from burg_drake.evaluation.summary import Group, Summary
 from burg_drake.visualization.palette import GROUPS
@@ -33,7 +33,7 @@ def objects_section(summary: Summary) -> Html:
     return section(
         "Outcomes by object",
         "What became of all grasps. The share counts only grasps whose trial was executed.",
-        table(head, rows, numbers=(1, 3)),
+        table(head, rows, numbers=(1, 3), style="stacking"),
         legend([(STYLES[g.name], g.name) for g in present]),
         *(element("p", note, class_="notice") for note in summary.notes),
         *([element("p", str(summary.lifts))] if summary.lifts else []),
@@ -57,26 +57,9 @@ def _object_row(group: Group, style: str) -> Html:
         element("td", group.judged, class_="number"),
         element("td", stacked_bar(parts, group.judged), class_="wide"),
         element("td", f"{group.lifted} / {group.executed}", class_="number"),
-        element("td", share, style="white-space:nowrap"),
+        element("td", share, class_="estimate"),
         class_=style or None,
     )
-
-
-def funnel_section(summary: Summary) -> Html:
-    """How many grasps pass each stage."""
-    total = summary.total
-    counts = {name: total.funnel[name] for name in summary.steps}
-    losses = [_loss(total, name) for name in summary.steps[1:]]
-    return section(
-        "Stages",
-        "Grasps that pass each stage, and what stopped the others.",
-        funnel(counts, losses),
-    )
-
-
-def _loss(total: Group, name: str) -> str:
-    lost = [(o, total.outcomes[o]) for o in STOPPED[name] if total.outcomes[o]]
-    return ", ".join(f"{n} {label(o)}" for o, n in sorted(lost, key=lambda pair: -pair[1]))
 
 
 def count_section(summary: Summary) -> Html:
@@ -93,7 +76,7 @@ def count_section(summary: Summary) -> Html:
         rows.append(element("tr", element("th", group.name, scope="row"), *cells, class_=style))
     head = ["object", *(label(o) for o in seen)]
     matrix = table(head, rows, numbers=tuple(range(1, len(head))), style="matrix")
-    return section("Counts", "Every grasp ends with exactly one outcome.", matrix)
+    return folded("Counts", "Every grasp ends with exactly one outcome.", matrix)
 
 
 def _count_style(count: int) -> str:
@@ -114,7 +97,7 @@ def cost_section(summary: Summary) -> Html:
         text += " That of reachable includes the search for the arm's motions."
     if summary.mode == "arm":
         text += " That of planned is their timing."
-    return section("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
+    return folded("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
 
 
 def label(outcome: Outcome) -> str:

@@ -1,4 +1,4 @@
-"""The report's last section: how to get the same results again, and what made them."""
+"""The report's last sections: how to get the same results again, and what made them."""
 
 from __future__ import annotations
 
@@ -14,33 +14,54 @@ from burg_drake.evaluation.motion_numbers import (
     without_motion,
 )
 from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.report.markup import Html, command, element, join
+from burg_drake.evaluation.report.markup import Html, command, element, folded, join, section
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
 from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, STATION_FILE, Run
 from burg_drake.station.engine import ENGINES, Engine
 from burg_drake.station.station import StationDocument
 
+ASKED = {
+    "hand": "the hand alone executes each grasp in simulation",
+    "reach": "the hand executes those that the arm can execute, too",
+    "arm": "the whole arm executes them, from the pregrasp on",
+}
+"""What a mode asks of each grasp."""
+DECIDING = ("burg_drake", "drake", "python")
+"""Software whose version people ask for first."""
+
+
+def repeat_section(run: Run) -> Html:
+    """The command that makes the same results again, and the settings that decide about them."""
+    document = run.document
+    facts = [
+        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("mode", f"{document.mode}: {ASKED[document.mode]}"),
+        ("motion", motion_text(motion_in(document.trial))),
+        ("engine", engine_label(document.engine)),
+        ("seed", str(document.seed)),
+        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in DECIDING)),
+        ("run", f"{document.hash} (hash of all of that; column run of the table)"),
+    ]
+    return section(
+        "How to repeat it", _text(document), command(reproduce_command(run)), _list(facts)
+    )
+
 
 def provenance(run: Run) -> Html:
-    """Command, inputs with their hashes, versions, stretches and files."""
+    """All inputs with their hashes, settings, versions, stretches and files."""
     facts = [*_inputs(run.document), *_settings(run.document), *_stretches(run.document)]
-    return element(
-        "section",
-        element("h2", "How to reproduce"),
-        element("p", _text(run.document)),
-        command(reproduce_command(run)),
-        element(
-            "dl",
-            *(join(element("dt", name), element("dd", fact)) for name, fact in facts),
-            element("dt", "files"),
-            element(
-                "dd",
-                f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
-                f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)",
-            ),
-            class_="facts",
-        ),
+    files = (
+        f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
+        f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
     )
+    text = "Everything that decides about the results, who judged when, and what is in the folder."
+    return folded("All settings and versions", text, _list([*facts, ("files", files)]))
+
+
+def _list(facts: list[tuple[str, str]]) -> Html:
+    pairs = (join(element("dt", name), element("dd", fact)) for name, fact in facts)
+    return element("dl", *pairs, class_="facts")
 
 
 def reproduce_command(run: Run) -> str:
