@@ -84,7 +84,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
         seed=arguments.seed,
     )
     if arguments.html is not None:
-        from burg_drake.experiment.comparison.page import comparison_page
+        from burg_drake.experiment.comparison.report.page import comparison_page
 
         page = comparison_page(found, Path(arguments.html), command_line(arguments))
         atomic_write(arguments.html, page)

@@ -145,7 +145,7 @@ def _bins(trials: Ordered, sign: float, weighted: bool) -> list[Bin]:
     bins = []
     for start, end in zip(first, [*first[1:], len(trials.value)][: len(first)], strict=True):
         part = slice(start, end)
-        ends = sorted(sign * trials.value[[start, end - 1]])
+        ends = sorted((sign * trials.value[start], sign * trials.last[end - 1]))
         count, good = trials.count[part].sum(), trials.good[part].sum()
         weight, squares = trials.weight[part].sum(), trials.squares[part].sum()
         effective = weight**2 / squares  # L. Kish, Survey Sampling, 1965
@@ -176,7 +176,7 @@ def _isotonic(trials: Ordered, sign: float) -> list[Step]:
     last = np.r_[first[1:], len(trials.value)] - 1
     steps = []
     for start, end in zip(fit.blocks[:-1], fit.blocks[1:], strict=True):
-        ends = sorted((sign * trials.value[first[start]], sign * trials.value[last[end - 1]]))
+        ends = sorted((sign * trials.value[first[start]], sign * trials.last[last[end - 1]]))
         steps.append(Step(low=float(ends[0]), high=float(ends[1]), share=float(fit.x[start])))
     return steps
 

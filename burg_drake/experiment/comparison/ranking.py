@@ -16,6 +16,9 @@ from burg_drake.experiment.comparison.measures import Figure, share
 from burg_drake.experiment.comparison.ordered import Ordered
 
 ALIKE = "all ended alike"
+USUAL = 1 / 12
+"""Variance of the placements of trials by a number that tells nothing. Two such trials are added
+to each kind, so that three failures that happen to be alike do not look certain."""
 
 
 def ranking(trials: Ordered, *, weighted: bool = False) -> Figure:
@@ -42,7 +45,7 @@ def ranking(trials: Ordered, *, weighted: bool = False) -> Figure:
     above = 1.0 - (np.cumsum(up) - up / 2) / up.sum()
     area = float(up @ below / up.sum())
     variance = _spread(up, up2, below, good) + _spread(down, down2, above, bad)
-    if variance <= 0.0 or not 1e-12 < area < 1 - 1e-12:
+    if not 1e-12 < area < 1 - 1e-12:
         rarer = float(min(good.sum(), bad.sum()))
         at = share(round(area * rarer, 9), rarer)
         return Figure.between(area, at.low or 0.0, 1.0 if at.high is None else at.high)
@@ -54,10 +57,10 @@ def ranking(trials: Ordered, *, weighted: bool = False) -> Figure:
 def _spread(weight: Array, squares: Array, placed: Array, count: Array) -> float:
     """Variance of the mean of the placements of one kind of trials."""
     number, total = count.sum(), weight.sum()
-    if number < 2:
-        return 0.0
     mean = weight @ placed / total
-    return float(squares @ (placed - mean) ** 2 / total**2 * number / (number - 1))
+    share_of_squares = squares.sum() / total**2  # 1 / number without weights
+    variance = squares @ (placed - mean) ** 2 / squares.sum() * number
+    return float(share_of_squares * (variance + 2 * USUAL) / (number + 1))
 
 
 def _logistic(odds: float) -> float:

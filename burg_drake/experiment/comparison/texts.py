@@ -18,12 +18,23 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
     """A number for each text that is the same for the same text, whatever the column's width, and
     in all likelihood another one for another text."""
     texts = np.ascontiguousarray(texts, dtype=np.str_)
-    if not texts.dtype.itemsize or not len(texts):
-        return np.zeros(len(texts), dtype=np.uint64)
-    characters = texts.view(np.uint32).reshape(len(texts), -1)
     keys = np.zeros(len(texts), dtype=np.uint64)
-    for k in range(characters.shape[1]):
-        keys += characters[:, k] * _KEYS[k % len(_KEYS)]
+    if not texts.dtype.itemsize or not len(texts):
+        return keys
+    characters = texts.view(np.uint32).reshape(len(texts), -1)
+    for plane in range(4):  # of characters' bytes; nearly all texts have the first one alone
+        if plane == 0 or characters.max() >= 1 << 8 * plane:
+            keys += _byte_keys((characters >> np.uint32(8 * plane)).astype(np.uint8), plane)
+    return keys
+
+
+def _byte_keys(letters: NDArray[np.uint8], plane: int) -> NDArray[np.uint64]:
+    """Sums of words of eight bytes, each times a number of its own."""
+    words = np.zeros((len(letters), -(-letters.shape[1] // 8) * 8), dtype=np.uint8)
+    words[:, : letters.shape[1]] = letters
+    keys = np.zeros(len(letters), dtype=np.uint64)
+    for k, word in enumerate(words.view(np.uint64).T):
+        keys += word * _KEYS[(4 * k + plane) % len(_KEYS)]
     return keys
 
 
