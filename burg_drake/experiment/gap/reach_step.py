@@ -20,7 +20,6 @@ from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.judge import LIFT_HEIGHT, Decision, Judge, Verdict
 from burg_drake.evaluation.run_document import origin_of
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
 
 
@@ -38,16 +37,15 @@ class ReachOfHandFactory:
 
     def __call__(self) -> Judge:
         judge = self.build()
-        if isinstance(judge, StationJudge):
-            ((stage, execute),) = judge.stages
+        ((stage, execute),) = judge.stages
 
-            def recall(grasp: Candidate, motion: object) -> Decision:
-                known = self.trials.get(grasp.id)
-                if known is None or known.margins.get(LIFT_HEIGHT) != grasp.lift:
-                    return execute(grasp, None)
-                return as_decision(known)
+        def recall(grasp: Candidate, motion: object) -> Decision:
+            known = self.trials.get(grasp.id)
+            if known is None or known.margins.get(LIFT_HEIGHT) != grasp.lift:
+                return execute(grasp, None)
+            return as_decision(known)
 
-            judge.stages = [(stage, recall)]
+        judge.stages = [(stage, recall)]
         return judge
 
 

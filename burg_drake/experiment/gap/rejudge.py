@@ -9,7 +9,7 @@ again what was changed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,9 +19,9 @@ from burg_drake.core.content import content_hash
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
+from burg_drake.evaluation.executor import Executor, Job, JobFailed, LocalExecutor
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
-from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.judge import Verdict, one_line
 from burg_drake.evaluation.run_document import origin_of, software_versions
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.gap.displaced import commanded
@@ -29,8 +29,8 @@ from burg_drake.experiment.gap.measured import measured_scene
 from burg_drake.experiment.gap.rejudged import Rejudged, Rejudging, why_skipped
 from burg_drake.experiment.gap.rejudged_files import write_rejudging
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
-from burg_drake.experiment.gap.source_runs import source_runs
-from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
+from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
+from burg_drake.experiment.trials.sources import load_sources
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
@@ -54,6 +54,7 @@ def rejudge(
     out: str | Path,
     *,
     runs: Mapping[str, Run] | None = None,
+    success: Success | None = None,
     executor: Executor | None = None,
     retry_failed: bool = False,
     progress: bool | Listener = True,
@@ -68,7 +69,9 @@ def rejudge(
         sheet: the trials.
         path: their file, from whose folder the sheet's paths start.
         out: folder for the answers; made if need be.
-        runs: the sheet's runs by key, if they are at hand.
+        runs: by the sheet's keys, in place of its own; trials of keys that are missing, or whose
+            grasp is not in the run, are skipped.
+        success: what counts; as the sheet says if None.
         executor: who judges; as many processes as there are processors if None.
         retry_failed: ask again what an earlier call could not simulate.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
@@ -76,11 +79,10 @@ def rejudge(
     Raises:
         InvalidInputError: a run is gone, or is another one; its library or station has changed; or
             the folder cannot be written.
-        UnknownNameError: a grasp is not in its run.
     """
-    runs = source_runs(sheet, path) if runs is None else runs
+    runs = load_sources(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
-    skipped = {trial.number: why for trial in sheet.trials if (why := why_skipped(trial))}
+    skipped = {t.number: why for t in sheet.trials if (why := why_skipped(t, runs.get(t.run)))}
     asked = _questions([t for t in sheet.trials if t.number not in skipped], runs)
     folder = writable_folder(out)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
@@ -90,14 +92,14 @@ def rejudge(
             for id, verdict in read_journal(folder / JOURNAL_FILE).items()
             if not verdict.is_open(retry_failed=retry_failed)
         }
-        known |= _judge(asked, known, executor, journal, reporter)
-    trials = tuple(
-        replace(one.trial, verdict=known[one.trial.candidate.id])
-        if one.trial.candidate
-        else one.trial
-        for one in asked
+        failed: dict[str, str] = {}
+        for id, verdict in _judge(asked, known, executor, reporter, failed):
+            journal.append(id, verdict)
+            known[id] = verdict
+    trials = tuple(_answered(one.trial, known, failed) for one in asked)
+    found = Rejudging(
+        path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
     )
-    found = Rejudging(path=folder, success=sheet.selection.success, trials=trials, skipped=skipped)
     write_rejudging(found)
     return found
 
@@ -151,14 +153,29 @@ def _question(
     return _Question(replace(trial, candidate=candidate), factory)
 
 
+def _answered(trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str, str]) -> Rejudged:
+    if trial.candidate is None:
+        return trial
+    id = trial.candidate.id
+    return replace(trial, verdict=known.get(id), reason=failed.get(id, ""))
+
+
 def _judge(
     asked: Sequence[_Question],
     known: Mapping[str, Verdict],
     executor: Executor,
-    journal: Journal,
     reporter: Reporter,
-) -> dict[str, Verdict]:
-    """Asks what is not known yet, trials of one scene together; each answer is on disk at once."""
+    failed: dict[str, str],
+) -> Iterator[tuple[str, Verdict]]:
+    """Asks what is not known yet, trials of one scene together.
+
+    Args:
+        asked, known, executor, reporter: what is asked, and what need not be.
+        failed: gets the reason, by id, for trials of scenes that cannot be built.
+
+    Yields:
+        Ids and verdicts.
+    """
     jobs: dict[str, Job] = {}
     total = 0
     for one in asked:
@@ -170,14 +187,15 @@ def _judge(
             held = jobs[key].candidates if key in jobs else ()
             jobs[key] = Job(key, one.factory, (*held, one.trial.candidate))
     if not jobs:
-        return {}
+        return
     todo = sum(len(job.candidates) for job in jobs.values())
     begin = Progress(STARTING, total - todo, total, unit="trials")
     pace = Pace(reporter.show, begin, "judging again")
-    found = {}
-    with closing(executor.judge(jobs.values())) as judged:
+
+    def note(lost: JobFailed) -> None:
+        failed.update({c.id: one_line(lost.error) for c in lost.job.candidates})
+
+    with closing(executor.judge(jobs.values(), note)) as judged:
         for _, candidate, verdict in judged:
-            journal.append(candidate.id, verdict)
-            found[candidate.id] = verdict
             pace.step(outcome=verdict.outcome)
-    return found
+            yield candidate.id, verdict

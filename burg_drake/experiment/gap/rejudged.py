@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
-
-from scipy.stats import binomtest
 
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.origin import Origin
-from burg_drake.experiment.trials.sheet import RealTrial, Success
+from burg_drake.evaluation.run_store import Run
+from burg_drake.experiment.comparison.paired import Paired, paired_counts
+from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
 from burg_drake.scene.scene import Scene
 
 Cause = Literal["agreed", "placement", "worsened", "physics"]
@@ -141,14 +142,12 @@ class Rejudging:
         whole = count + self.causes["physics"]
         return count, whole, *wilson_interval(count, whole)
 
-    @property
-    def p_value(self) -> float:
-        """Of McNemar's exact test that both verdicts agree with reality equally often (Q. McNemar,
-        Psychometrika 12, 1947); 1 where they never differ."""
-        for_it, against = self.causes["placement"], self.causes["worsened"]
-        if for_it + against == 0:
-            return 1.0
-        return float(binomtest(for_it, for_it + against, 0.5).pvalue)
+    @cached_property
+    def paired(self) -> Paired:
+        """McNemar's exact test of which verdicts agree with reality more often: those as measured,
+        which come first, or those as planned."""
+        of = self.causes
+        return paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
 
 
 def succeeded(outcome: Outcome | RealOutcome, success: Success) -> bool:
@@ -156,12 +155,32 @@ def succeeded(outcome: Outcome | RealOutcome, success: Success) -> bool:
     return outcome.held if success == "held" else outcome.value == Outcome.LIFTED.value
 
 
-def why_skipped(trial: RealTrial) -> str:
-    """Why a trial cannot be judged again; empty if it can."""
+def why_skipped(trial: RealTrial, run: Run | None) -> str:
+    """Why a trial cannot be judged again in a run; empty if it can."""
     if trial.outcome is None:
         return "not carried out yet"
     if not trial.outcome.attempted:
         return trial.outcome.value.replace("_", " ")
     if not any(place.status == "measured" and place.X_SO for place in trial.placement.values()):
         return "placement not measured"
+    if run is None:
+        return "of another scene"
+    if trial.grasp not in run.candidates.id:
+        return "grasp not in the run"
     return ""
+
+
+def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
+    """Which of some runs stands for each run of a sheet: itself, or else one of the same scene.
+
+    Args:
+        sheet: the trials.
+        runs: what a folder holds.
+    """
+    found = {}
+    for key, source in sheet.runs.items():
+        same = [run for run in runs if run.document.scene.content == source.scene.content]
+        same.sort(key=lambda run: run.document.hash != source.hash)
+        if same:
+            found[key] = same[0]
+    return found

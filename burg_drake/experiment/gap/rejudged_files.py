@@ -106,7 +106,7 @@ def rejudging_json(found: Rejudging) -> dict[str, Any]:
         },
         "causes": {cause: found.causes[cause] for cause in CAUSES},
         "explained": dict(zip(("count", "of", "low", "high"), found.explained, strict=True)),
-        "mcnemar_p": found.p_value,
+        "mcnemar_p": found.paired.p_value,
         "table": [
             {"planned": p, "measured": m, "real": r, "count": n}
             for (p, m, r), n in sorted(found.table.items())

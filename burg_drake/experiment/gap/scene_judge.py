@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import BurgError
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decide, Decision, Judge, Screen, one_line
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.scene.scene import Scene
@@ -23,8 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneJudgeFactory:
-    """Builds the judge of a station, or of a scene that cannot be built one that says so: with many
-    scenes, one of them must not end the work on all.
+    """Builds the judge of a scene with all settings that a run has recorded.
 
     Attributes:
         scene, station: what to build.
@@ -37,17 +31,14 @@ class SceneJudgeFactory:
     mode: Mode
     settings: TrialSettings
 
-    def __call__(self) -> Judge:
-        try:
-            return StationJudge(
-                self.scene,
-                self.station,
-                engine=self.engine,
-                mode=self.mode,
-                settings=self.settings,
-            )
-        except BurgError as error:
-            return NoScene(one_line(error))
+    def __call__(self) -> StationJudge:
+        return StationJudge(
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=self.settings,
+        )
 
     @property
     def content(self) -> str:
@@ -56,16 +47,3 @@ class SceneJudgeFactory:
             *(self.scene.content, self.station.content, self.mode),
             *(asdict(self.engine), asdict(self.settings)),
         )
-
-
-class NoScene:
-    """Says of every grasp that it could not be simulated, and why."""
-
-    screens: Sequence[Screen] = ()
-
-    def __init__(self, reason: str) -> None:
-        self._reason = reason
-        self.stages: Sequence[tuple[Stage, Decide]] = ((Stage.EXECUTED, self._decide),)
-
-    def _decide(self, grasp: Candidate, motion: object) -> Decision:
-        return Decision(Outcome.SIMULATION_FAILED, reason=self._reason)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from burg_drake.core.outcome import Outcome
-from burg_drake.core.statistics import wilson_interval
+from burg_drake.experiment.comparison.agreement import Agreement, agreement, matrix_of
 from burg_drake.experiment.gap.ladder import Ladder, StepName
 from burg_drake.experiment.gap.rejudged import succeeded
 from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
@@ -18,30 +20,11 @@ class StepAgreement:
 
     Attributes:
         step: its name.
-        tp, fp, fn, tn: predicted successes that succeeded on the robot and that failed, predicted
-            failures that succeeded and that failed.
+        found: confusion matrix and figures.
     """
 
     step: StepName
-    tp: int
-    fp: int
-    fn: int
-    tn: int
-
-    @property
-    def trials(self) -> int:
-        """Number of trials."""
-        return self.tp + self.fp + self.fn + self.tn
-
-    @property
-    def shares(self) -> dict[str, tuple[int, int, float, float]]:
-        """Precision, recall and accuracy: part, whole, and Wilson's 95 % interval."""
-        parts = {
-            "precision": (self.tp, self.tp + self.fp),
-            "recall": (self.tp, self.tp + self.fn),
-            "accuracy": (self.tp + self.tn, self.trials),
-        }
-        return {name: (*pair, *wilson_interval(*pair)) for name, pair in parts.items()}
+    found: Agreement
 
 
 def tried_grasps(sheet: TrialSheet, scene: str) -> list[RealTrial]:
@@ -66,14 +49,15 @@ def agreement_by_step(
     found = []
     for step in ladder.steps:
         runs = [*step.runs, *ladder.tried] if step.name == "placed" else list(step.runs)
-        cells = dict.fromkeys(("tp", "fp", "fn", "tn"), 0)
+        predicted, actual = [], []
         for trial in real:
             assert trial.outcome is not None
             verdicts = [run.verdicts[trial.grasp] for run in runs if trial.grasp in run.verdicts]
             judged = [v.outcome for v in verdicts if v.outcome is not Outcome.SIMULATION_FAILED]
             if judged:
-                good = sum(succeeded(outcome, success) for outcome in judged) > len(judged) / 2
-                came = succeeded(trial.outcome, success)
-                cells[("tp" if came else "fp") if good else ("fn" if came else "tn")] += 1
-        found.append(StepAgreement(step.name, **cells))
+                good = sum(succeeded(outcome, success) for outcome in judged)
+                predicted.append(good > len(judged) / 2)
+                actual.append(succeeded(trial.outcome, success))
+        cells = matrix_of(np.array(predicted, dtype=bool), np.array(actual, dtype=bool))
+        found.append(StepAgreement(step.name, agreement(cells)))
     return tuple(found)

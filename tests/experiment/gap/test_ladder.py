@@ -194,20 +194,20 @@ def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
     ]
     later = replace(trials[0], number=4, outcome=None)
     found = agreement_by_step(known, [*trials, later], "lifted")
-    assert [(a.step, a.tp, a.fp, a.fn, a.tn) for a in found] == [
+    assert [(a.step, *a.found.cells) for a in found] == [
         ("hand", 1, 1, 1, 0),
         ("reach", 2, 0, 0, 1),
         ("placed", 1, 0, 1, 0),
     ]
-    assert found[1].shares["precision"][:2] == (2, 2)
-    assert found[2].shares["recall"][:2] == (1, 2)
+    assert found[1].found.precision.value == 1.0
+    assert found[2].found.recall.value == 0.5
 
 
 def test_the_page_shows_all_sections(ladder: Ladder) -> None:
     from burg_drake.experiment.gap.report.page import gap_page
 
     page = gap_page(ladder, "lifted", (), "burg-drake gap tabletop_six -o gap")
-    for head in ("In short", "From step to step", "By object", "With the arm", "How to repeat"):
+    for head in ("From step to step", "By object", "With the arm", "How to repeat"):
         assert f"<h2>{head}</h2>" in page, head
     counts = re.findall(r"<text[^>]*>(\d+) (lifted|arm cannot reach|hand collides)</text>", page)
     assert ("1", "arm cannot reach") in counts

@@ -29,8 +29,10 @@ from burg_drake.experiment.trials.sheet import (
     RealTrial,
     Selection,
     SourceRun,
+    Stratum,
     TrialSheet,
 )
+from burg_drake.experiment.trials.sources import grasp_content
 from burg_drake.scene.scene import Scene
 from burg_drake.station.scene_check import SceneCheck
 
@@ -83,7 +85,7 @@ def sheet_of(run: Run, *placements: dict[str, ObjectPlace], real: str = "slipped
             block=1,
             run="a",
             grasp=grasp,
-            content="",
+            content=grasp_content("box", run.candidate(grasp).X_OG, run.candidate(grasp).width),
             instance="box",
             object="box",
             simulated=run.verdicts[grasp].outcome,
@@ -93,8 +95,11 @@ def sheet_of(run: Run, *placements: dict[str, ObjectPlace], real: str = "slipped
         )
         for number, placement in enumerate(placements, 1)
     ]
+    strata = {
+        "all": Stratum(run="a", object="box", label="all", population=2, selected=1, wanted=1)
+    }
     selection = Selection(per_object=1, balance="none")
-    return TrialSheet(runs={"a": source}, selection=selection, trials=tuple(trials))
+    return TrialSheet(runs={"a": source}, selection=selection, strata=strata, trials=tuple(trials))
 
 
 @pytest.fixture(scope="module")
@@ -157,7 +162,7 @@ def test_reality_slipped_and_only_the_displaced_scene_says_so(found: Rejudging) 
     assert found.causes == {"agreed": 0, "placement": 1, "worsened": 0, "physics": 2}
     assert found.table == {(True, True, False): 2, (True, False, False): 1}
     assert found.explained[:2] == (1, 3)
-    assert found.p_value == 1.0
+    assert found.paired.p_value == 1.0
     assert [t.cause("lifted") for t in found.trials] == ["physics", "placement", None, "physics"]
 
 
@@ -196,7 +201,7 @@ class Nobody:
 
 def test_a_run_that_is_gone_or_another_one_is_refused(run: Run, sheet: TrialSheet) -> None:
     other = replace(sheet, runs={"a": replace(sheet.runs["a"], hash="0123")})
-    with pytest.raises(InvalidInputError, match=r"the trials are of run 0123 \(runs.a\)"):
+    with pytest.raises(InvalidInputError, match="run 'a' is 0123, of scene 'tabletop_six'"):
         rejudge(other, "trials.yaml", run.path.parent / "never", progress=False)
     assert not (run.path.parent / "never").exists()
 

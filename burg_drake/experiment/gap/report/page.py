@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from burg_drake.core.figures import percent
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.report.markup import Html, command, element, join, section
-from burg_drake.evaluation.report.style import style_sheet
+from burg_drake.evaluation.report.html_page import header, html_page, tiles
+from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
 from burg_drake.experiment.gap.changes import Change, changes
 from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.flow_chart import STYLE
@@ -51,66 +51,47 @@ def gap_page(
     found = changes(ladder, success)
     document = ladder.first.document
     title = f"{document.scene.name} on {document.station.name}"
-    parts = [
-        _header(ladder, title, success),
-        _tiles(ladder, found),
-        element("section", element("h2", "In short"), *_told(story(ladder, found, success))),
+    return html_page(
+        f"Where grasps are lost: {title}",
+        element("style", Html(STYLE)),
+        header("Where grasps are lost", title, _about(ladder, success)),
+        *_told(story(ladder, found, success)),
+        tiles(_tiles(ladder, found)),
         flow_section(ladder, found),
         objects_section(ladder, success),
         *(change_section(change) for change in found),
         push_section(ladder),
         reality_section(agreement),
         _again(ladder, command_line),
-    ]
-    return "<!DOCTYPE html>\n" + element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", f"Where grasps are lost: {title}"),
-            element("style", Html(style_sheet() + STYLE)),
-        ),
-        element("body", *parts),
-        lang="en",
     )
 
 
-def _header(ladder: Ladder, title: str, success: Success) -> Html:
+def _about(ladder: Ladder, success: Success) -> str:
     document = ladder.first.document
     counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
     about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
-    return element(
-        "header",
-        element("p", "Where grasps are lost", class_="kind"),
-        element("h1", title),
-        element("p", f"{about}; success: {counts}", class_="about"),
-    )
+    return f"{about}; success: {counts}"
 
 
 def _told(sentences: Sequence[str]) -> list[Html]:
-    return [element("p", sentence) for sentence in sentences]
+    return [element("p", " ".join(sentences), class_="lead")]
 
 
-def _tiles(ladder: Ladder, found: Sequence[Change]) -> Html:
+def _tiles(ladder: Ladder, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
     whole = len(ladder.first.candidates)
-    tiles = [("Grasps", f"{whole}", "the same in every step")]
+    entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
     first = found[0].successes if found else 0
     if found and found[0].step != "placed":
-        tiles.append((TITLES["hand"].capitalize(), f"{first}", "succeed"))
+        entries.append((TITLES["hand"].capitalize(), f"{first}", "succeed"))
     for change in found:
         left = change.successes - len(change.lost) + len(change.won)
         if change.step == "placed":
             share = percent(left / change.successes) if change.successes else "-"
-            tiles.append(("Objects displaced", share, "of these succeed again"))
+            entries.append(("Objects displaced", share, "of these succeed again"))
         else:
             note = f"{len(change.lost)} lost, {len(change.won)} won"
-            tiles.append((TITLES[change.step].capitalize(), f"{left}", note))
-    rows = [
-        element("div", element("dt", name), element("dd", value, element("small", note)))
-        for name, value, note in tiles
-    ]
-    return element("dl", *rows, class_="tiles")
+            entries.append((TITLES[change.step].capitalize(), f"{left}", note))
+    return entries
 
 
 def _again(ladder: Ladder, command_line: str) -> Html:

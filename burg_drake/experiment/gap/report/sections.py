@@ -14,6 +14,7 @@ from burg_drake.evaluation.report.charts import interval_mark
 from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section, table
 from burg_drake.evaluation.summary import PUSH, pushes
 from burg_drake.evaluation.trial import PUSHED
+from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
 from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
@@ -197,21 +198,15 @@ def push_section(ladder: Ladder) -> Html | None:
 
 def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     """What each step does to the agreement with the robot."""
-    if not agreement or not agreement[0].trials:
+    if not agreement or not agreement[0].found.trials:
         return None
     rows = []
     for one in agreement:
-        cells: list[Child] = [one.trials, one.tp, one.fp, one.fn, one.tn]
+        cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
         numbers = [element("td", cell, class_="number") for cell in cells]
         shares = [
-            element(
-                "td",
-                join(interval_mark(part / whole, low, high), f" {percent(part / whole)}")
-                if whole
-                else "-",
-                style="white-space:nowrap",
-            )
-            for part, whole, low, high in one.shares.values()
+            element("td", _estimate(one.found.figure(name)), class_="estimate")
+            for name in ("precision", "recall", "accuracy")
         ]
         head = element("th", TITLES[one.step], scope="row")
         rows.append(element("tr", head, *numbers, *shares))
@@ -222,3 +217,9 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
         " means that success is predicted; in displaced scenes, in more than half of them.",
         table(names, rows, numbers=(1, 2, 3, 4, 5)),
     )
+
+
+def _estimate(found: Figure) -> Child:
+    if found.value is None or found.low is None or found.high is None:
+        return "-"
+    return join(interval_mark(found.value, found.low, found.high), f" {percent(found.value)}")

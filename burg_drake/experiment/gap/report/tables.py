@@ -11,11 +11,16 @@ from burg_drake.core.figures import percent
 from burg_drake.core.schema import plain_data
 from burg_drake.core.text_table import TextTable
 from burg_drake.evaluation.summary import pushes
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.record import plain
+from burg_drake.experiment.comparison.wording import interval
 from burg_drake.experiment.gap.changes import Change, successes_by_object
 from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.story import TITLES, replay_command, story, words
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
+
+FIGURES = ("precision", "recall", "accuracy")
 
 
 def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
@@ -50,15 +55,18 @@ def _caption(ladder: Ladder) -> str:
 def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     """What each step does to the agreement with the robot."""
     table = TextTable("Beside the robot", caption="positive: success is predicted")
-    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", "precision", "recall", "accuracy")
+    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", *FIGURES)
     for one in agreement:
-        shares = [
-            f"{percent(part / whole)} ({100 * low:.0f}-{100 * high:.0f})" if whole else "-"
-            for part, whole, low, high in one.shares.values()
-        ]
-        counts = (one.trials, one.tp, one.fp, one.fn, one.tn)
-        table.row(TITLES[one.step], *map(str, counts), *shares)
+        found = one.found
+        counts = (found.trials, *(f"{cell:g}" for cell in found.cells))
+        table.row(TITLES[one.step], *map(str, counts), *(_share(found.figure(n)) for n in FIGURES))
     return table
+
+
+def _share(found: Figure) -> str:
+    if found.value is None:
+        return "-"
+    return f"{100 * found.value:.0f} ({interval(found, percent=True)}) %"
 
 
 def gap_json(
@@ -90,14 +98,7 @@ def gap_json(
         ],
         "changes": [_change_json(change) for change in found],
         "pushed": None if pushed is None else asdict(pushed),
-        "reality": [
-            asdict(one)
-            | {
-                name: {"part": part, "whole": whole, "low": low, "high": high}
-                for name, (part, whole, low, high) in one.shares.items()
-            }
-            for one in agreement
-        ],
+        "reality": [{"step": one.step, **plain(one.found)} for one in agreement],
     }
 
 
