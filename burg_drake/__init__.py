@@ -50,6 +50,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.evaluation.executor": ["Executor", "LocalExecutor"],
         "burg_drake.experiment.trials.book": ["TrialBook"],
         "burg_drake.experiment.trials.plan": ["plan_trials"],
+        "burg_drake.experiment.comparison.comparison": ["Comparison", "compare"],
         "burg_drake.experiment.trials.sheet": ["RealTrial", "TrialSheet", "load_trials"],
         "burg_drake.export.export": ["export_scene"],
         "burg_drake.formats.grasp_files": ["read_grasp_file", "write_grasp_file"],
