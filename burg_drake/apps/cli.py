@@ -24,6 +24,7 @@ from burg_drake.apps import (
     grasps,
     hand,
     library,
+    merge,
     printout,
     reach,
     replay,
@@ -33,6 +34,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    status,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -53,6 +55,8 @@ VERBS = (
     grasps,
     reach,
     evaluate,
+    status,
+    merge,
     robustness,
     replay,
     report,

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -165,11 +165,9 @@ class _Call:
         )
         begun = time.monotonic()
         try:
-            with (
-                closing(self._jobs(left, crew)) as jobs,
-                closing(self.executor.judge(jobs)) as all_,
-            ):
-                for job, candidate, verdict in all_:
+            jobs = cast(Iterable[Job], self._jobs(left, crew))  # None only where it is polled
+            with closing(self.executor.judge(jobs, self._give_up)) as answers:
+                for job, candidate, verdict in answers:
                     self._take(job, candidate.id, verdict, crew)
         finally:
             for judging in list(self.judging.values()):
