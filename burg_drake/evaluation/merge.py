@@ -60,18 +60,21 @@ class Merged:
     @property
     def notes(self) -> tuple[str, ...]:
         """What is missing, and how to judge it, one sentence each."""
-        if not (self.missing or self.scenes):
-            return ()
         notes = []
+        shard = self.result.document.shard
+        if shard:
+            notes.append(f"all that was given is shard {shard}, and so is the united run")
+        if not (self.missing or self.scenes):
+            return tuple(notes)
         if self.missing:
             notes.append(f"{self.missing:,} grasps are not judged")
         if self.scenes:
             notes.append(f"{len(self.scenes):,} scenes have not been begun: {listing(self.scenes)}")
-        if self.shards:
+        if self.shards and not shard:
             notes.append(f"shards that were not given: {listing(self.shards)}")
+        how = f"--shard {shard}" if shard else "no --shard"
         notes.append(
-            f"to judge the rest: the command of the runs without --shard, and with"
-            f" -o {self.result.path}"
+            f"to judge the rest: the command of the runs with {how} and -o {self.result.path}"
         )
         return tuple(notes)
 

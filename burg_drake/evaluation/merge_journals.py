@@ -93,8 +93,7 @@ def chosen_lines(journals: Sequence[Path], choice: Choice) -> Iterator[bytes]:
             stream = streams[choice.source[k]]
             assert stream is not None
             stream.seek(int(choice.place[k]))
-            line = stream.readline(LONGEST_LINE)
-            yield line if line.endswith(b"\n") else line + b"\n"
+            yield stream.readline(LONGEST_LINE)
     finally:
         for stream in streams:
             if stream is not None:

@@ -85,14 +85,20 @@ def _header(run: Run, title: str) -> Html:
 
 
 def _notice(run: Run) -> Html | None:
-    judged, total = len(run.results["id"]), len(run.candidates)
-    if judged == total:
-        return None
-    text = (
-        f"This run is not complete: {judged} of {total} grasps are judged. The command at the end"
-        " of this page goes on with it."
-    )
-    return element("p", text, class_="notice")
+    judged, total = len(run.results["id"]), len(run.mine)
+    text = ""
+    if run.document.shard:
+        number, _, count = run.document.shard.partition("/")
+        text = (
+            f"This is shard {number} of {count}: of {len(run.candidates)} grasps {total} are judged"
+            " here. burg-drake merge unites the shards. "
+        )
+    if judged < total:
+        text += (
+            f"This run is not complete: {judged} of {total} grasps are judged. The command at the"
+            " end of this page goes on with it."
+        )
+    return element("p", text.strip(), class_="notice") if text else None
 
 
 def _tiles(summary: Summary) -> Html:
