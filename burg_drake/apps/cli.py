@@ -19,8 +19,10 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    compare,
     evaluate,
     frames,
+    gap,
     grasps,
     hand,
     library,
@@ -35,6 +37,7 @@ from burg_drake.apps import (
     setup,
     station,
     status,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -58,8 +61,11 @@ VERBS = (
     status,
     merge,
     robustness,
+    gap,
     replay,
     report,
+    trials,
+    compare,
     station,
     hand,
     frames,

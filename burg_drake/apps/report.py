@@ -25,11 +25,12 @@ def run_report(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.evaluate import print_summary
     from burg_drake.apps.evaluate_many import how_it_ended, print_campaign
     from burg_drake.evaluation.campaign import Campaign
-    from burg_drake.evaluation.report import write_report
+    from burg_drake.evaluation.report import write_campaign_report, write_report
     from burg_drake.evaluation.results import open_results
 
     run = open_results(arguments.run_folder)
     if isinstance(run, Campaign):
+        write_campaign_report(run)
         print_campaign(run)
         return how_it_ended(run)
     write_report(run)

@@ -35,9 +35,10 @@ from burg_drake.evaluation.campaign_document import (
 )
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.ledger import Ledger, SceneState
+from burg_drake.evaluation.ledger import LEDGER_FILE, Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.part_file import require_arrow
+from burg_drake.evaluation.report import write_campaign_report
 from burg_drake.evaluation.request import Request, command, given_content
 from burg_drake.evaluation.run_document import begun_now, input_of, software_versions
 from burg_drake.evaluation.scene_crew import SceneCrew
@@ -114,6 +115,16 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
     return replace(document, hash=campaign_hash(document))
 
 
+def finish_campaign(campaign: Campaign) -> Campaign:
+    """Writes the report over all scenes, unless it is there already."""
+    ledger, report = campaign.path / LEDGER_FILE, campaign.report_path
+    if ledger.exists() and not (
+        report.exists() and report.stat().st_mtime_ns >= ledger.stat().st_mtime_ns
+    ):
+        write_campaign_report(campaign)
+    return campaign
+
+
 @dataclass
 class _Call:
     """One call of `evaluate` on many scenes."""
@@ -150,7 +161,7 @@ class _Call:
             if left:
                 self._judge(left, crew)
             crew.close()
-        return load_campaign(self.folder)
+        return finish_campaign(load_campaign(self.folder))
 
     def _judge(self, left: list[str], crew: SceneCrew) -> None:
         document = self.campaign.document
@@ -184,9 +195,8 @@ class _Call:
         crew.prepare(
             Prepare(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
         )
-        polls = getattr(self.executor, "polls", False)
         while True:
-            if polls and self.judging and not crew.ready():
+            if self.judging and not crew.ready():
                 yield None
                 continue
             prepared = crew.prepared()

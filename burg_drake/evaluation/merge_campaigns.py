@@ -32,6 +32,7 @@ from burg_drake.evaluation.part_file import require_arrow
 from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex
 from burg_drake.evaluation.part_writer import PartWriter
 from burg_drake.evaluation.preparation import finish_run
+from burg_drake.evaluation.report import write_campaign_report
 from burg_drake.evaluation.run_store import RUN_FILE, Run, load_run
 from burg_drake.evaluation.shard import share
 
@@ -67,6 +68,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -
     writer = PartWriter(folder, united.places, document.instances)
     writer.catch_up()
     writer.close()
+    write_campaign_report(united)
     return Merged(united, merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.evaluation.codes import member_codes
 from burg_drake.evaluation.judge import LIFT_HEIGHT
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.motion_numbers import motion_in
@@ -32,6 +33,7 @@ STAGES: dict[Mode, tuple[Stage, ...]] = {
 }
 """Stages whose cost is known by mode; that of `reachable` includes the search for motions, that of
 `planned` is their timing."""
+OUTCOMES, ALL_STAGES = tuple(Outcome), tuple(Stage)
 PUSH = 0.001
 """Objects that the approach moved by more than this were pushed [m]."""
 
@@ -190,14 +192,16 @@ def summarize(run: Run | Campaign) -> Summary:
 
         return summarize_campaign(run)
     columns, document = run.results, run.document
-    names = document.grasps.objects
+    outcome = member_codes(columns["outcome"], OUTCOMES)
+    stage = member_codes(columns["stage"], ALL_STAGES)
+    mine = {name: columns["object"] == name for name in document.grasps.objects}
     sampling = document.grasps
     costs = [stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
     if sampling.origin == "sampled" and sampling.count:
         costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
     return Summary(
-        objects=tuple(_group(columns, name, columns["object"] == name) for name in names),
-        total=_group(columns, "all", np.ones(len(columns["id"]), dtype=bool)),
+        objects=tuple(_group(name, outcome[own], stage[own]) for name, own in mine.items()),
+        total=_group("all", outcome, stage),
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(columns),
@@ -227,11 +231,21 @@ def pushes(columns: Columns) -> Pushes | None:
     )
 
 
-def _group(columns: Columns, name: str, mask: np.ndarray) -> Group:
-    outcomes = Counter(Outcome(o) for o in columns["outcome"][mask])
-    decided = Counter(Stage(s) for s in columns["stage"][mask])
-    failed = columns["stage"][mask & (columns["outcome"] == Outcome.SIMULATION_FAILED)]
-    return Group(name, int(mask.sum()), outcomes, decided, Counter(Stage(s) for s in failed))
+def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> Group:
+    """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`."""
+    failed = stage[outcome == OUTCOMES.index(Outcome.SIMULATION_FAILED)]
+    return Group(
+        name,
+        len(outcome),
+        _counter(OUTCOMES, outcome),
+        _counter(ALL_STAGES, stage),
+        _counter(ALL_STAGES, failed),
+    )
+
+
+def _counter(members: tuple[Any, ...], codes: np.ndarray) -> Counter[Any]:
+    counts = np.bincount(codes, minlength=len(members)).tolist()
+    return Counter({member: n for member, n in zip(members, counts, strict=True) if n})
 
 
 def stage_cost(columns: Columns, stage: Stage) -> StageCost:
