@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -35,9 +35,10 @@ from burg_drake.evaluation.campaign_document import (
 )
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.ledger import Ledger, SceneState
+from burg_drake.evaluation.ledger import LEDGER_FILE, Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.part_file import require_arrow
+from burg_drake.evaluation.report import write_campaign_report
 from burg_drake.evaluation.request import Request, command, given_content
 from burg_drake.evaluation.run_document import begun_now, input_of, software_versions
 from burg_drake.evaluation.scene_crew import SceneCrew
@@ -114,6 +115,16 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
     return replace(document, hash=campaign_hash(document))
 
 
+def finish_campaign(campaign: Campaign) -> Campaign:
+    """Writes the report over all scenes, unless it is there already."""
+    ledger, report = campaign.path / LEDGER_FILE, campaign.report_path
+    if ledger.exists() and not (
+        report.exists() and report.stat().st_mtime_ns >= ledger.stat().st_mtime_ns
+    ):
+        write_campaign_report(campaign)
+    return campaign
+
+
 @dataclass
 class _Call:
     """One call of `evaluate` on many scenes."""
@@ -150,7 +161,7 @@ class _Call:
             if left:
                 self._judge(left, crew)
             crew.close()
-        return load_campaign(self.folder)
+        return finish_campaign(load_campaign(self.folder))
 
     def _judge(self, left: list[str], crew: SceneCrew) -> None:
         document = self.campaign.document
@@ -165,11 +176,9 @@ class _Call:
         )
         begun = time.monotonic()
         try:
-            with (
-                closing(self._jobs(left, crew)) as jobs,
-                closing(self.executor.judge(jobs)) as all_,
-            ):
-                for job, candidate, verdict in all_:
+            jobs = cast(Iterable[Job], self._jobs(left, crew))  # None only where it is polled
+            with closing(self.executor.judge(jobs, self._give_up)) as answers:
+                for job, candidate, verdict in answers:
                     self._take(job, candidate.id, verdict, crew)
         finally:
             for judging in list(self.judging.values()):
