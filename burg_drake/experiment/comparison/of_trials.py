@@ -94,8 +94,8 @@ def _telling(
     left_out: Counter[str] = Counter()
     silent: dict[int, str] = {}
     for columns in tables:
-        for outcome, rows in undecided(Factor.of(columns["outcome"])).items():
-            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {outcome}")
+        for verdict, rows in undecided(Factor.of(columns["outcome"])).items():
+            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {verdict}")
     chosen = []
     for k in indices:
         outcome = sheet.trials[k].outcome

@@ -10,11 +10,12 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.evaluation.robustness import TABLE_FILE
 from burg_drake.evaluation.table_file import read_table
+from burg_drake.experiment.comparison.arrays import Values
 from burg_drake.experiment.comparison.side import Judged
 
 
 def predicted_probability(
-    judged: Judged, ids: Array, table: str | Path | None = None
+    judged: Judged, ids: Values, table: str | Path | None = None
 ) -> Array | None:
     """Share of the perturbed repeats that were lifted.
 

@@ -32,9 +32,9 @@ def margin_section(judged: Judgement) -> Html | None:
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
         "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
-        f" margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes among {trials} in bins of about"
-        " equally many trials, with Wilson's intervals; line: the monotone curve that fits best;"
-        " dashes: all of them."
+        " margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes"
+        f" among {trials} in bins of about equally many trials, with Wilson's intervals; line: the"
+        " monotone curve that fits best; dashes: all of them."
     )
     return section(
         "Do margins tell what will succeed?",
