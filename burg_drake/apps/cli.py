@@ -34,6 +34,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -57,6 +58,7 @@ VERBS = (
     robustness,
     replay,
     report,
+    trials,
     compare,
     station,
     hand,
