@@ -7,10 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import add_verb, not_negative, seed
+from burg_drake.apps.compare_rejudge import (
+    add_rejudge,
+    rejudge_for,
+    rejudge_words,
+    rejudged_json,
+    rejudged_sections,
+    show_rejudged,
+)
 from burg_drake.core.errors import InvalidInputError, shown
 
 if TYPE_CHECKING:
     from burg_drake.experiment.comparison.comparison import Comparison
+    from burg_drake.experiment.gap.rejudged import Rejudging
 
 # Kept in step with experiment.comparison, which imports too much for a help text; a test compares
 # them.
@@ -27,6 +36,7 @@ def add_to(verbs: Any) -> None:
         "compare simulated grasps with trials on the robot, or with another simulation",
         "burg-drake compare runs/first trials.yaml --html compare.html",
         "burg-drake compare runs/first trials.yaml --json > compare.json",
+        "burg-drake compare runs/first trials.yaml --rejudge --html compare.html",
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",
         "",
@@ -64,6 +74,7 @@ def add_to(verbs: Any) -> None:
     )
     parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_rejudge(parser)
 
 
 def run_compare(arguments: argparse.Namespace) -> int:
@@ -83,12 +94,14 @@ def run_compare(arguments: argparse.Namespace) -> int:
         robustness=arguments.robustness,
         seed=arguments.seed,
     )
+    again = rejudge_for(arguments)
     if arguments.html is not None:
         from burg_drake.experiment.comparison.report.page import comparison_page
 
-        page = comparison_page(found, Path(arguments.html), command_line(arguments))
+        line, more = command_line(arguments), rejudged_sections(again)
+        page = comparison_page(found, Path(arguments.html), line, more)
         atomic_write(arguments.html, page)
-    _print(found, arguments)
+    _print(found, again, arguments)
     return 0
 
 
@@ -102,14 +115,15 @@ def command_line(arguments: argparse.Namespace) -> str:
         words += ["--placement-limit-mm", f"{arguments.placement_limit_mm:g}"]
     words += [] if arguments.robustness is None else ["--robustness", arguments.robustness]
     words += [] if arguments.seed == 0 else ["--seed", str(arguments.seed)]
+    words += rejudge_words(arguments)
     return shlex.join([*words, "--html", arguments.html])
 
 
-def _print(found: Comparison, arguments: argparse.Namespace) -> None:
+def _print(found: Comparison, again: Rejudging | None, arguments: argparse.Namespace) -> None:
     if arguments.json:
         from burg_drake.experiment.comparison.record import comparison_json
 
-        print(comparison_json(found), end="")
+        print(comparison_json(found, rejudged_json(again)), end="")
         return
     from rich.console import Console
 
@@ -120,6 +134,7 @@ def _print(found: Comparison, arguments: argparse.Namespace) -> None:
         console.print(part, crop=False)
         if not isinstance(part, str) or not part.startswith(("differs", "note")):
             console.print()
+    show_rejudged(again)
     if arguments.html is not None:
         print(f"page    {arguments.html}")
 

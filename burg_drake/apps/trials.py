@@ -12,13 +12,17 @@ from burg_drake.apps import (
     trials_plan,
     trials_record,
     trials_restore,
+    trials_serve,
+    trials_sheet,
     trials_show,
 )
 from burg_drake.apps.arguments import add_group
 
 VERBS = (
     trials_plan,
+    trials_sheet,
     trials_export,
+    trials_serve,
     trials_record,
     trials_show,
     trials_restore,

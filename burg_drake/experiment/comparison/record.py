@@ -11,9 +11,14 @@ from typing import Any
 from burg_drake.experiment.comparison.comparison import Comparison
 
 
-def comparison_json(comparison: Comparison) -> str:
-    """A comparison as JSON; keys are the names of the dataclasses' fields."""
-    return json.dumps(plain(comparison), indent=2, allow_nan=False) + "\n"
+def comparison_json(comparison: Comparison, more: Mapping[str, Any] | None = None) -> str:
+    """A comparison as JSON; keys are the names of the dataclasses' fields.
+
+    Args:
+        comparison: what is told.
+        more: further keys.
+    """
+    return json.dumps(plain(comparison) | dict(more or {}), indent=2, allow_nan=False) + "\n"
 
 
 def plain(value: Any) -> Any:

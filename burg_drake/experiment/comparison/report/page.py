@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
@@ -40,7 +41,10 @@ KINDS = {
 
 
 def comparison_page(
-    comparison: Comparison, path: str | Path = "compare.html", line: str = ""
+    comparison: Comparison,
+    path: str | Path = "compare.html",
+    line: str = "",
+    more: Sequence[Child] = (),
 ) -> str:
     """The page as HTML.
 
@@ -48,6 +52,7 @@ def comparison_page(
         comparison: what it shows.
         path: where the page will be, so that its links to photos hold there.
         line: the command that makes it again; left out if empty.
+        more: further sections.
     """
     c = comparison
     title = ", ".join(c.first.scenes[:3]) + (" and others" if len(c.first.scenes) > 3 else "")
@@ -59,6 +64,7 @@ def comparison_page(
         _lead(c),
         *(element("p", note, class_="notice") for note in c.notes),
         *_sections(c, _photos(c, Path(path))),
+        *more,
         _settings(c),
         section("How to repeat it", "The same inputs give the same page.", command(line))
         if line
