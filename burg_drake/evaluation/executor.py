@@ -6,31 +6,19 @@ that build a job's judge when they first need it, so that many jobs go through t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.processes import default_workers
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.judge import Judge, Verdict
+from burg_drake.evaluation.job import Job, JobFailed, OnFailure
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.limits import Limits
+from burg_drake.evaluation.pool import Pool
 
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """Grasps that one judge judges.
-
-    Attributes:
-        key: names it among the jobs of a call.
-        make_judge: builds the judge; pickled by reference, see `judge_all`.
-        candidates: the grasps.
-    """
-
-    key: str
-    make_judge: Callable[[], Judge]
-    candidates: Sequence[Candidate]
+__all__ = ["Executor", "Job", "JobFailed", "LocalExecutor", "OnFailure"]
 
 
 class Executor(Protocol):
@@ -41,18 +29,24 @@ class Executor(Protocol):
         """Number of processes that judge."""
         ...
 
-    def judge(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
+    def judge(
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
+    ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """Judges all grasps of all jobs.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work.
+            jobs: asked for one after the other, when workers run out of work. None says that no
+                job is ready yet, and that there are others to work on meanwhile.
+            on_failure: told of a job that cannot be done, such as one whose judge cannot be built;
+                no more verdicts come for it, and the other jobs go on. If None, its error is
+                raised.
 
         Yields:
             Each grasp with its verdict, in the order of completion. Closing the iterator ends the
             work.
 
         Raises:
-            BurgError: see `judge_all`.
+            BurgError: a job cannot be done, and there is no `on_failure`; see `judge_all`.
         """
         ...
 
@@ -63,9 +57,11 @@ class LocalExecutor:
 
     Attributes:
         workers: their number.
+        limits: what they may take.
     """
 
     workers: int
+    limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
         if self.workers < 1:
@@ -76,10 +72,10 @@ class LocalExecutor:
         """One process a processor."""
         return cls(default_workers())
 
-    def judge(self, jobs: Iterable[Job]) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
+    def judge(
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
+    ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
-        for job in jobs:
-            found = judge_all(job.candidates, job.make_judge, workers=self.workers)
-            with closing(found) as judged:
-                for candidate, verdict in judged:
-                    yield job, candidate, verdict
+        pool = Pool(self.workers, self.limits)
+        yield from pool.run(jobs, on_failure)
+        pool.dismiss()

@@ -1,9 +1,10 @@
-"""The main loop of a worker process: build a judge once, then judge what comes."""
+"""The main loop of a worker process: build a judge when told to, then judge what comes."""
 
 from __future__ import annotations
 
 import logging
 import os
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -19,6 +20,28 @@ from burg_drake.evaluation.judge import (
     one_line,
     screen_grasps,
 )
+from burg_drake.evaluation.limits import (
+    Limits,
+    let_time_limits_end_this_process,
+    time_limit,
+)
+
+
+@dataclass(frozen=True)
+class Build:
+    """Work for a worker: to build a judge.
+
+    Attributes:
+        key: names the judge from then on.
+        recipe: builds it, pickled.
+        drop: judges that are not needed any more.
+        limits: what it may take, and each piece of work from then on.
+    """
+
+    key: str
+    recipe: bytes
+    drop: tuple[str, ...]
+    limits: Limits
 
 
 @dataclass(frozen=True)
@@ -26,9 +49,11 @@ class Screening:
     """Work for a worker: the next screen of many grasps.
 
     Attributes:
+        key: of the judge.
         grasps: with the answers of the screens before, the same ones for all.
     """
 
+    key: str
     grasps: tuple[tuple[Candidate, Screened], ...]
 
 
@@ -37,10 +62,12 @@ class Task:
     """Work for a worker: all that is left to ask about a few grasps.
 
     Attributes:
+        key: of the judge.
         grasps: to be judged in this order; each with the answers of screens that are known.
         last_try: of a single grasp that has ended another worker before.
     """
 
+    key: str
     grasps: tuple[tuple[Candidate, Screened], ...]
     last_try: bool = False
 
@@ -106,6 +133,7 @@ def main(handle: int) -> None:
     """
     # A filter, because importing pydrake sets the logger's level back.
     logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
+    let_time_limits_end_this_process()
     connection = Connection(handle)
     try:
         _serve(connection)
@@ -118,20 +146,40 @@ def main(handle: int) -> None:
 
 
 def _serve(connection: Connection) -> None:
-    make_judge: Callable[[], Judge] = connection.recv()
-    try:
-        judge = make_judge()
-    except BurgError as error:
-        connection.send(Unable(error))
-        return
-    except Exception as error:
-        connection.send(Unable(SimulationError(f"cannot build the simulation: {one_line(error)}")))
-        return
-    connection.send(Ready(tuple(screen.batch for screen in judge.screens)))
+    judges: dict[str, Judge] = {}
+    limits = Limits()
     while (work := connection.recv()) is not None:
-        if isinstance(work, Screening):
-            connection.send(Screens(tuple(screen_grasps(judge, work.grasps))))
+        if isinstance(work, Build):
+            limits = work.limits
+            for key in work.drop:
+                judges.pop(key, None)
+            with time_limit(limits.build, limits.wall):
+                built = _build(work.recipe)
+            if isinstance(built, Unable):
+                connection.send(built)
+            else:
+                judges[work.key] = built
+                connection.send(Ready(tuple(screen.batch for screen in built.screens)))
             continue
-        for candidate, screened in work.grasps:
-            verdict = judge_grasp(judge, candidate, lambda s: connection.send(Begins(s)), screened)
+        judge = judges[work.key]
+        if isinstance(work, Screening):
+            with time_limit(limits.cpu, limits.wall):
+                screened = screen_grasps(judge, work.grasps)
+            connection.send(Screens(tuple(screened)))
+            continue
+        for candidate, answers in work.grasps:
+            with time_limit(limits.cpu, limits.wall):
+                verdict = judge_grasp(
+                    judge, candidate, lambda s: connection.send(Begins(s)), answers
+                )
             connection.send(Judged(verdict))
+
+
+def _build(recipe: bytes) -> Judge | Unable:
+    try:
+        make_judge: Callable[[], Judge] = pickle.loads(recipe)
+        return make_judge()
+    except BurgError as error:
+        return Unable(error)
+    except Exception as error:
+        return Unable(SimulationError(f"cannot build the simulation: {one_line(error)}"))

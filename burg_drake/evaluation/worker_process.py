@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import signal
 import subprocess
-import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
 from burg_drake.core.outcome import Stage
 from burg_drake.core.processes import cause_of_death, start_worker, was_ended_from_outside
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Judge, Screened
-from burg_drake.evaluation.worker import Screening, Task
+from burg_drake.evaluation.limits import TOO_LONG, Limits
+from burg_drake.evaluation.open_job import Grasp, OpenJob
+from burg_drake.evaluation.worker import Build, Screening, Task
 
-Grasp = tuple[Candidate, Screened]
-"""A grasp with the answers of the screens that have been asked."""
+KEPT_JUDGES = 2
+"""Judges that a worker keeps; more would take memory."""
 
 
 @dataclass(eq=False)
@@ -26,34 +26,55 @@ class WorkerProcess:
 
     Attributes:
         process, connection: the process and our end of the pipe.
-        first: task that is kept for it until it is ready, if any.
-        ready: whether its judge is built.
+        limits: what it may take.
+        first: task that is kept for it until its judge is built, if any.
+        job: what it works on, or did last.
+        building: whether it builds the judge of `job`.
+        judges: those that it has, by key, with the batches of their screens; used last comes last.
         screening: grasps that it screens, with the answers before.
         task: grasps that it was given and has not judged yet, likewise.
         last_try: whether its task is a grasp that has ended another worker before.
         stage: the last one that it announced.
-        since: when it began with the first grasp of `task`, or the screening, by
-            `time.monotonic` [s].
-        overdue: whether it was ended because that took too long.
         last_words: why it is about to end.
     """
 
     process: subprocess.Popen[bytes]
     connection: Connection
+    limits: Limits
     first: Task | None = None
-    ready: bool = False
+    job: OpenJob | None = None
+    building: bool = False
+    judges: dict[str, tuple[int, ...]] = field(default_factory=dict)
     screening: tuple[Grasp, ...] = ()
     task: deque[Grasp] = field(default_factory=deque)
     last_try: bool = False
     stage: Stage = Stage.CLEAR
-    since: float = 0.0
-    overdue: bool = False
     last_words: str = ""
 
     @property
     def busy(self) -> bool:
         """Whether it has something to do."""
-        return bool(self.task or self.screening)
+        return self.building or bool(self.task or self.screening)
+
+    def take_up(self, job: OpenJob) -> None:
+        """Hands it work of a job, or has it build the judge first."""
+        self.job = job
+        if job.key in self.judges:
+            self.judges[job.key] = self.judges.pop(job.key)
+            job.know(self.judges[job.key])
+            self.give(job.next_work())
+            return
+        drop = tuple(self.judges)[: max(0, len(self.judges) + 1 - KEPT_JUDGES)]
+        for key in drop:
+            del self.judges[key]
+        self.building = True
+        self.send(Build(job.key, job.recipe, drop, self.limits))
+
+    def built(self, batches: tuple[int, ...]) -> None:
+        """Its judge is built."""
+        assert self.job is not None
+        self.building = False
+        self.judges[self.job.key] = batches
 
     def give(self, work: Task | Screening) -> None:
         """Hands it work."""
@@ -62,50 +83,49 @@ class WorkerProcess:
         else:
             self.task = deque(work.grasps)
             self.last_try = work.last_try
-        self.since = time.monotonic()
         self.send(work)
 
     def judged(self) -> Candidate:
         """Takes the grasp off the task that a verdict has come for."""
-        self.since, self.overdue = time.monotonic(), False
         return self.task.popleft()[0]
 
     def screened(self) -> list[Candidate]:
         """Takes the grasps off that are screened."""
         candidates = [candidate for candidate, _ in self.screening]
-        self.screening, self.overdue = (), False
+        self.screening = ()
         return candidates
-
-    def end_if_overdue(self, limit: float) -> None:
-        """Ends it if it has been at one grasp, or one screening, for longer than that [s]."""
-        if time.monotonic() > self.since + limit and not self.connection.poll():
-            self.overdue = True
-            self.process.kill()
 
     def send(self, message: object) -> None:
         """Tells it something."""
         with contextlib.suppress(OSError):  # it has died; its pipe's end tells the main loop
             self.connection.send(message)
 
-    def cause_of_death(self, limit: float) -> str:
-        """Why it has ended, for people; `limit` as above."""
+    def cause_of_death(self) -> str:
+        """Why it has ended, for people."""
         cause = cause_of_death(self.process, self.last_words)
-        return f"took longer than {limit:g} s" if self.overdue else cause
+        if not self.overdue:
+            return cause
+        if self.process.wait() == -signal.SIGALRM:
+            return f"took longer than {self.limits.wall:g} s"
+        limit = self.limits.build if self.building else self.limits.cpu
+        return f"took longer than {limit:g} s of CPU time"
+
+    @property
+    def overdue(self) -> bool:
+        """Whether it has ended because it took too long."""
+        return -self.process.wait() in TOO_LONG
 
     @property
     def was_interrupted(self) -> bool:
         """Whether it has been ended by others than us, and through no fault of its grasp."""
-        return not self.overdue and was_ended_from_outside(self.process)
+        return was_ended_from_outside(self.process)
 
 
-def start(make_judge: Callable[[], Judge], first: Task | None) -> WorkerProcess:
-    """Starts a process that builds a judge.
+def start(limits: Limits) -> WorkerProcess:
+    """Starts a process.
 
     Args:
-        make_judge: builds it there.
-        first: work that is kept for it until then, if any.
+        limits: what it may take.
     """
     process, connection = start_worker("burg_drake.evaluation.worker")
-    worker = WorkerProcess(process, connection, first)
-    worker.send(make_judge)
-    return worker
+    return WorkerProcess(process, connection, limits)

@@ -98,9 +98,9 @@ class CrashingJudge(KnownJudge):
     """Ends its process on some grasps, in the stage `executed`.
 
     Attributes:
-        how: by grasp id: `segfault`, `exit`, `error`, `hang`, or `once`, which crashes only as long
-            as the file `log` does not exist; `screen` and `screen_error` are `segfault` and `error`
-            in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
+        how: by grasp id: `segfault`, `exit`, `error`, `hang`, `spin`, or `once`, which crashes only
+            as long as the file `log` does not exist; `screen` and `screen_error` are `segfault` and
+            `error` in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -115,6 +115,9 @@ class CrashingJudge(KnownJudge):
                 raise RuntimeError("the solver\ndid not converge")
             case "hang":
                 time.sleep(3600.0)
+            case "spin":
+                while True:
+                    pass
             case "once" if self.log is not None and not self.log.exists():
                 self.log.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
@@ -178,6 +181,20 @@ def die() -> KnownJudge:
 
 
 @dataclass(frozen=True)
+class MakeAndTell:
+    """A factory that writes its name and its process to `log` when it is called."""
+
+    judge: Any
+    log: Path
+    name: str
+
+    def __call__(self) -> Any:
+        with self.log.open("a") as file:
+            file.write(f"{self.name} {os.getpid()}\n")
+        return self.judge
+
+
+@dataclass(frozen=True)
 class DieOnStart:
     """A factory that ends the process in which it is called for the n-th time, counted in `log`."""
 
@@ -198,5 +215,7 @@ def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause:
     judge = Make(KnownJudge(log, pause))
     setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     setattr("burg_drake.evaluation.cascade._require_sound", lambda *_: None)
+    # of many scenes, too: processes of their own would not know of this
+    setattr("burg_drake.evaluation.scene_crew.preparers", lambda workers: 0)
     # the chart of the arm's reach takes longer than all else
     setattr("burg_drake.evaluation.report.page.reachability_section", lambda *_: None)

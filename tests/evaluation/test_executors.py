@@ -25,6 +25,7 @@ from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executors import judge_all
+from burg_drake.evaluation.limits import Limits
 
 
 def grasps(n: int) -> list[Candidate]:
@@ -112,12 +113,11 @@ def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
     assert judged == {c.id: expected(c.id) for c in grasps(10)}
 
 
-def test_deaths_without_end_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.executors.HOPELESS", 5)
+def test_deaths_without_end_end_the_run() -> None:
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
     judged = []
     with pytest.raises(SimulationError, match=r"^5 grasps in a row could not .*: .*SIGSEGV"):
-        for candidate, _ in judge_all(grasps(40), make, workers=2):
+        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=Limits(hopeless=5)):
             judged.append(candidate.id)
     assert len(set(judged)) == len(judged) == 5  # none of them is lost
 
@@ -144,22 +144,34 @@ def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_grasp_that_takes_too_long_is_settled(
-    workers: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.executors.GRASP_TIME_LIMIT", 0.5)
+def test_a_grasp_that_takes_too_long_is_settled(workers: int) -> None:
     # 20 grasps of 50 ms each: a whole task is not a grasp
-    judge = CrashingJudge(pause=0.05, how=(("cube-0003", "hang"), ("cube-0012", "hang")))
-    judged = {c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=workers)}
+    judge = CrashingJudge(pause=0.05, how=(("cube-0003", "hang"), ("cube-0012", "spin")))
+    limits = Limits(cpu=0.4, wall=1.5)
+    judged = {
+        c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=workers, limits=limits)
+    }
     assert len(judged) == 20
+    reasons = {
+        "cube-0003": "took longer than 1.5 s",
+        "cube-0012": "took longer than 0.4 s of CPU time",
+    }
     for id, verdict in judged.items():
-        if id in ("cube-0003", "cube-0012"):
+        if id in reasons:
             assert verdict.outcome is Outcome.SIMULATION_FAILED
             assert verdict.stage is Stage.EXECUTED
-            assert verdict.reason == "took longer than 0.5 s"
+            assert verdict.reason == reasons[id]
             assert not verdict.interrupted
         else:
             assert verdict.outcome is expected(id)
+
+
+def test_a_slow_grasp_is_not_one_that_takes_too_long() -> None:
+    judge = KnownJudge(pause=0.6)
+    ids = {c.id for c in grasps(20) if expected(c.id).stage is Stage.EXECUTED}
+    few = [c for c in grasps(20) if c.id in ids][:2]
+    judged = {c.id: v for c, v in judge_all(few, Make(judge), workers=2, limits=Limits(cpu=0.3))}
+    assert {id: v.outcome for id, v in judged.items()} == {c.id: expected(c.id) for c in few}
 
 
 def test_what_cannot_be_built_is_said_as_it_is() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.names import name_from
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.mode import MODES
@@ -61,16 +61,23 @@ def gather_runs(given: Iterable[Run | str | Path]) -> dict[str, Run]:
         given: runs, or folders that hold one, or one a scene.
 
     Raises:
-        InvalidInputError: there is no run, or nothing in one is judged yet.
+        InvalidInputError: there is no run, nothing is judged yet, or a run is given in two copies.
     """
     runs: dict[str, Run] = {}
+    places = []
     for one in given:
         for run in [one] if isinstance(one, Run) else load_runs(one):
+            places.append(str(run.path))
             if not run.document.hash or not len(run.results["id"]):
-                raise InvalidInputError(f"{run.path}: no grasp is judged yet")
-            runs.setdefault(run.document.hash, run)
+                continue
+            same = runs.setdefault(run.document.hash, run)
+            if same.path.resolve() != run.path.resolve():
+                raise InvalidInputError(
+                    f"{same.path} and {run.path} hold the same run; give one of them, or merge them"
+                    " if they are shards"
+                )
     if not runs:
-        raise InvalidInputError("there are no runs to choose grasps from")
+        raise InvalidInputError(f"{listing(places) or 'no run is given'}: no grasp is judged yet")
     by_scene: defaultdict[str, list[Run]] = defaultdict(list)
     for hash in sorted(runs):
         by_scene[name_from(runs[hash].document.scene.name)].append(runs[hash])

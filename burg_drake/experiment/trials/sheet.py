@@ -243,8 +243,11 @@ class TrialSheet:
             self._check(i, trial)
 
     def _check(self, i: int, trial: RealTrial) -> None:
-        """Refuses a trial whose run or stratum is unknown, or not its own."""
+        """Refuses a trial whose run or stratum is unknown, or not its own; a sheet without any
+        strata is one that nobody has balanced."""
         require_known(trial.run, self.runs, "run", "trials", i, "run")
+        if not self.strata:
+            return
         require_known(trial.stratum, self.strata, "stratum", "trials", i, "stratum")
         stratum = self.strata[trial.stratum]
         for name in ("run", "object"):

@@ -1,0 +1,98 @@
+"""Many jobs through the same worker processes: who builds what, and what becomes of bad jobs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expected, refuse
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor
+from burg_drake.evaluation.limits import Limits
+
+
+def grasps(scene: str, n: int) -> list[Candidate]:
+    return [Candidate(f"{scene}-{i:04d}", scene, np.eye(4)) for i in range(n)]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_jobs_share_the_processes_and_each_judge_is_built_once(
+    workers: int, tmp_path: Path
+) -> None:
+    log = tmp_path / "built"
+    jobs = [
+        Job(name, MakeAndTell(KnownJudge(batches=(7, 5)), log, name), grasps(name, n))
+        for name, n in (("a", 3), ("b", 9), ("empty", 0), ("c", 1), ("d", 4))
+    ]
+    judged = list(LocalExecutor(workers).judge(iter(jobs)))
+    assert all(verdict.outcome is expected(grasp.id) for _, grasp, verdict in judged)
+    assert Counter(job.key for job, _, _ in judged) == {"a": 3, "b": 9, "c": 1, "d": 4}
+    assert all(grasp in job.candidates for job, grasp, _ in judged)
+    built = [line.split() for line in log.read_text().splitlines()]
+    if workers == 1:
+        assert [name for name, _ in built] == ["a", "b", "c", "d"]
+    assert len({process for _, process in built}) == workers
+
+
+def test_jobs_are_asked_for_when_they_are_needed() -> None:
+    asked: list[str] = []
+
+    def jobs() -> Iterator[Job]:
+        for name in "abcdef":
+            asked.append(name)
+            yield Job(name, Make(KnownJudge()), grasps(name, 5))
+
+    judged = LocalExecutor(1).judge(jobs())
+    for name in "abc":
+        for k in range(5):
+            assert next(judged)[0].key == name
+            assert asked[-1] == name, k
+    judged.close()
+    assert asked == list("abc")
+
+
+def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
+    crashing = CrashingJudge(how=tuple((c.id, "segfault") for c in grasps("worse", 9)))
+    jobs = [
+        Job("good", Make(KnownJudge()), grasps("good", 6)),
+        Job("bad", refuse, grasps("bad", 6)),
+        Job("deadly", die, grasps("deadly", 6)),
+        Job("worse", Make(crashing), grasps("worse", 9)),
+        Job("fine", Make(KnownJudge()), grasps("fine", 6)),
+    ]
+    failed: list[JobFailed] = []
+    executor = LocalExecutor(2, Limits(hopeless=3))
+    judged = list(executor.judge(jobs, failed.append))
+    whole = {g.id: expected(g.id) for name in ("good", "fine") for g in grasps(name, 6)}
+    found = {grasp.id: verdict.outcome for job, grasp, verdict in judged}
+    assert {id: outcome for id, outcome in found.items() if not id.startswith("worse")} == whole
+    lost = [outcome for id, outcome in found.items() if id.startswith("worse")]
+    assert set(lost) == {Outcome.SIMULATION_FAILED}
+    assert len(lost) == 3
+    assert {failure.job.key: str(failure.error) for failure in failed} == {
+        "bad": "no such model",
+        "deadly": "cannot build the simulation: the worker process was ended by SIGSEGV",
+        "worse": "3 grasps in a row could not be simulated; the last one: the worker process was"
+        " ended by SIGSEGV",
+    }
+    with pytest.raises(InvalidInputError, match="no such model"):
+        list(executor.judge(jobs))
+
+
+def test_workers_that_have_no_job_left_help_with_one(tmp_path: Path) -> None:
+    log = tmp_path / "built"
+    jobs = [
+        Job(name, MakeAndTell(KnownJudge(pause=0.02), log, name), grasps(name, n))
+        for name, n in (("long", 60), ("short", 2))
+    ]
+    judged = list(LocalExecutor(2).judge(jobs))
+    assert len(judged) == 62
+    built = [line.split() for line in log.read_text().splitlines()]
+    assert Counter(name for name, _ in built) == {"long": 2, "short": 1}
+    assert len({process for _, process in built}) == 2
