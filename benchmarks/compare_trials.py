@@ -1,13 +1,13 @@
 """Trials "on the robot" to try `burg-drake compare` with: a second simulation plays reality.
 
     python benchmarks/compare_trials.py RUN -o trials.yaml [--per-object 10] [--offset-mm 2]
-        [--seed 0]
+        [--turn-deg 0] [--seed 0]
 
 Chooses grasps of a run in mode `hand`, half of each object's from those that were lifted and half
 from the others as far as there are enough, and executes them again with the engine `screening`
-where each object stands off its target by a normally distributed offset. Outcomes and offsets go
-into a trials file, some as not attempted, some without a measured placement, as it happens in a
-laboratory.
+where each object stands off its target by normally distributed offsets and turns. Outcomes and
+offsets go into a trials file, some as not attempted, some without a measured placement, as it
+happens in a laboratory.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
 from burg_drake.core.grasps import GraspSet
@@ -42,6 +43,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("trials.yaml"))
     parser.add_argument("--per-object", type=int, default=10)
     parser.add_argument("--offset-mm", type=float, default=2.0)
+    parser.add_argument("--turn-deg", type=float, default=0.0, help="about each axis")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     sheet = make_sheet(
@@ -49,18 +51,22 @@ def main() -> None:
         arguments.output.absolute().parent,
         arguments.per_object,
         arguments.offset_mm,
+        arguments.turn_deg,
         arguments.seed,
     )
     save_trials(sheet, arguments.output)
     print(f"{len(sheet.trials)} trials in {arguments.output}")
 
 
-def make_sheet(run: Run, folder: Path, per_object: int, offset_mm: float, seed: int) -> TrialSheet:
+def make_sheet(
+    run: Run, folder: Path, per_object: int, offset_mm: float, turn_deg: float, seed: int
+) -> TrialSheet:
     """Chooses, executes and records."""
     rng = np.random.default_rng(seed)
     strata, chosen = choose(run, per_object, rng)
     offsets = rng.normal(0.0, offset_mm, (len(chosen), 2))
-    ended = execute(run, [row for row, _ in chosen], offsets)
+    turns = np.radians(rng.normal(0.0, turn_deg, (len(chosen), 3)))
+    ended = execute(run, [row for row, _ in chosen], offsets, turns)
     order = rng.permutation(len(chosen))
     trials = [
         record(run, number, *chosen[k], offsets[k], ended[k], rng)
@@ -100,8 +106,9 @@ def choose(
     return strata, chosen
 
 
-def execute(run: Run, rows: list[int], offsets: np.ndarray) -> list[Outcome]:
-    """What becomes of each grasp where its object stands off by an offset [mm]."""
+def execute(run: Run, rows: list[int], offsets: np.ndarray, turns: np.ndarray) -> list[Outcome]:
+    """What becomes of each grasp where its object stands off by an offset [mm], and the hand is
+    turned by a rotation vector [rad]."""
     scene, grasps = run.scene(), run.candidates
     index = {id: k for k, id in enumerate(grasps.id)}
     moved: dict[str, list[np.ndarray]] = defaultdict(list)
@@ -111,6 +118,7 @@ def execute(run: Run, rows: list[int], offsets: np.ndarray) -> list[Outcome]:
         X_OG = grasps.grasps.X_OG[index[str(run.results["id"][row])]].copy()
         R_SO = scene.instance(name).X_SO.matrix()[:3, :3]
         X_OG[:3, 3] -= R_SO.T @ [*offsets[k] * 1e-3, 0.0]
+        X_OG[:3, :3] = X_OG[:3, :3] @ Rotation.from_rotvec(turns[k]).as_matrix()
         moved[name].append(X_OG)
         asked[name].append(k)
     given = {

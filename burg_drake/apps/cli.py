@@ -35,6 +35,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -59,6 +60,7 @@ VERBS = (
     gap,
     replay,
     report,
+    trials,
     compare,
     station,
     hand,

@@ -14,18 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
+from burg_drake.objects.library import ObjectLibrary
 from burg_drake.visualization.flat_view import FlatView, path_data
 
-TONES = 4
+TONES = 6
 """Even tones from the darkest, 0, to the lightest."""
 LIGHT = np.array([-0.45, -0.75, -0.48])
 """Where the light comes from, in the camera frame: above, to the left, in front."""
 DETAIL = 3
 """Pixels a SVG unit, in which contours are found."""
-SMOOTHING = 7
+SMOOTHING = 9
 """Width of the filter that mends jagged borders of tones [pixel]; odd."""
 TOLERANCE = 0.9
 """By which a contour may be simplified [pixel]."""
+SURFACES = 64
+"""So many objects' surfaces are kept for the next scene."""
 LEAST_AREA = 24.0
 """Smaller contours are left out [pixel]."""
 SUBPIXEL = 4
@@ -54,6 +57,26 @@ def shaded_outline(solids: Sequence[Solid], view: FlatView) -> list[str]:
     """
     levels = _levels(solids, view)
     return [_contours(levels > tone) for tone in range(TONES)]
+
+
+def surface_of(library: ObjectLibrary, name: str) -> Solid:
+    """The surface of an object in its own frame; read once a process, as long as it is the same.
+
+    Raises:
+        UnknownNameError: no such object, or its mesh file is missing.
+        MeshError: the mesh file is damaged.
+    """
+    key = str(library.root.resolve()), name, library.content[name]
+    if key not in _SURFACES:
+        while len(_SURFACES) >= SURFACES:
+            del _SURFACES[next(iter(_SURFACES))]
+        mesh = library.surface(name)
+        faces = np.asarray(mesh.faces, dtype=np.int64)
+        _SURFACES[key] = Solid(np.asarray(mesh.vertices), faces)
+    return _SURFACES[key]
+
+
+_SURFACES: dict[tuple[str, str, str], Solid] = {}
 
 
 def footprint(solid: Solid, view: FlatView) -> str:

@@ -56,7 +56,7 @@ def test_a_complete_run_returns_at_once(
     first = evaluate(
         scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
     )
-    monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.Job", None)
     again = evaluate(
         scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
     )
@@ -370,7 +370,7 @@ def test_bad_input_is_said_before_any_work(
         evaluate(scene, station, tmp_path / folder, progress=False, **options)  # type: ignore[arg-type]
 
     install(monkeypatch.setattr)
-    monkeypatch.setattr("burg_drake.evaluation.cascade.judge_all", None)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.Job", None)
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidInputError, match=r"cannot write to folder .*file"):
         evaluate_in("file")

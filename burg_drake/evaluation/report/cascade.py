@@ -38,22 +38,21 @@ def cascade_section(summary: Summary) -> Html:
 def _row(total: Group, step: str, before: int | None) -> Html:
     passed, whole = total.funnel[step], max(total.judged, 1)
     share = f"{percent(passed / whole)} of all"
-    if before:
+    if before and passed < before < whole:
         share += f", {percent(passed / before)} of the stage before"
     lost = _lost(total, step)
+    name = element("b", step), " ", element("span", MEANING[step], class_="faint")
     return element(
         "li",
-        element(
-            "span",
-            element("b", step),
-            " ",
-            element("span", MEANING[step], class_="faint"),
-            class_="step",
-        ),
+        element("span", *name, class_="step"),
         element("span", count(passed), class_="passed"),
         _bar(total, step, passed, whole),
-        element("span", share, class_="share faint"),
-        element("span", f"lost {lost}", class_="lost") if lost else None,
+        element(
+            "span",
+            element("span", share, class_="faint"),
+            element("span", f" · lost {lost}", class_="lost") if lost else None,
+            class_="share",
+        ),
     )
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import shlex
-from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.figures import count, percent
+from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.codes import Texts, member_codes, texts_of
 from burg_drake.evaluation.report.markup import Html, command, element, section
 from burg_drake.evaluation.report.outcomes import label
 from burg_drake.evaluation.report.style import STYLES
@@ -52,8 +54,27 @@ TYPICAL_BY = (
     ("lift", ("blocked",)),
 )
 """Which margin tells a weak case of an outcome from a strong one; by beginnings of outcomes."""
+MARGINS_ASKED = tuple(name for name, _ in TYPICAL_BY)
 NAMED = 3
 """Most frequent objects and blockers that are listed for each outcome."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What is asked about the grasps of one run or of many.
+
+    Attributes:
+        outcomes: (N,) places in `Outcome`.
+        objects, blockers: what each grasp is on, and what was in its way.
+        margins: (N,) by name of `MARGINS_ASKED`; those that the runs have.
+        replay: the command that shows the grasp of a row.
+    """
+
+    outcomes: NDArray[np.int8]
+    objects: Texts
+    blockers: Texts
+    margins: Mapping[str, Array]
+    replay: Callable[[int], str]
 
 
 @dataclass(frozen=True)
@@ -65,67 +86,77 @@ class Cause:
         number: of grasps.
         objects, blockers: what they are on and what was in their way, with how often, most frequent
             first.
-        typical: id of the median one.
+        typical: row of the median one.
     """
 
     outcome: Outcome
     number: int
     objects: tuple[tuple[str, int], ...]
     blockers: tuple[tuple[str, int], ...]
-    typical: str
+    typical: int
 
 
-def causes_of(columns: Columns) -> list[Cause]:
+def rows_of_run(columns: Columns, path: str) -> Rows:
+    """Those of a run in a folder."""
+    ids = columns["id"]
+
+    def replay(row: int) -> str:
+        return shlex.join(["burg-drake", "replay", path, "--grasp", str(ids[row])])
+
+    return Rows(
+        outcomes=member_codes(columns["outcome"], tuple(Outcome)),
+        objects=texts_of(columns["object"]),
+        blockers=texts_of(columns["blocker"]),
+        margins={name: columns[name] for name in MARGINS_ASKED if name in columns},
+        replay=replay,
+    )
+
+
+def causes_of(rows: Rows) -> list[Cause]:
     """Why grasps did not succeed, the most frequent cause first."""
     found = []
-    for outcome in MEANING:
-        rows = np.flatnonzero(columns["outcome"] == outcome.value)
-        if len(rows):
-            objects = Counter(columns["object"][rows].tolist()).most_common(NAMED)
-            named = columns["blocker"][rows].tolist()
-            blockers = Counter(body for body in named if body).most_common(NAMED)
-            typical = str(columns["id"][typical_row(columns, rows, outcome)])
-            found.append(Cause(outcome, len(rows), tuple(objects), tuple(blockers), typical))
+    for place, outcome in enumerate(Outcome):
+        mine = np.flatnonzero(rows.outcomes == place) if outcome in MEANING else np.empty(0)
+        if len(mine):
+            objects = rows.objects.most_common(mine, NAMED)
+            blockers = rows.blockers.most_common(mine, NAMED)
+            typical = typical_row(rows.margins, mine, outcome)
+            found.append(Cause(outcome, len(mine), objects, blockers, typical))
     return sorted(found, key=lambda cause: -cause.number)
 
 
-def typical_row(columns: Columns, rows: NDArray[np.int64], outcome: Outcome) -> int:
+def typical_row(margins: Mapping[str, Array], rows: NDArray[np.int64], outcome: Outcome) -> int:
     """The median row of those with an outcome: by the margin that tells how strong a case it is,
-    and by id among equal ones; half of the cases are weaker, and half are stronger."""
+    and by their order among equal ones; half of the cases are weaker, and half are stronger."""
     name = next((m for m, starts in TYPICAL_BY if outcome.value.startswith(starts)), "")
-    values = columns[name][rows] if name in columns else np.full(len(rows), np.nan)
-    known = rows[np.isfinite(values)]
-    rows, values = (known, values[np.isfinite(values)]) if len(known) else (rows, 0.0 * rows)
-    order = np.lexsort((columns["id"][rows], values))
+    values = margins[name][rows] if name in margins else np.zeros(len(rows))
+    known = np.isfinite(values)
+    if known.any():
+        rows, values = rows[known], values[known]
+    order = np.argsort(values, kind="stable")
     return int(rows[order[(len(rows) - 1) // 2]])
 
 
-def causes_section(columns: Columns, path: str) -> Html | None:
+def causes_section(rows: Rows) -> Html | None:
     """Each cause with its meaning, how often, where, and the command that shows a typical grasp;
-    nothing where all grasps were lifted.
-
-    Args:
-        columns: the results.
-        path: of the run, for the commands.
-    """
-    causes = causes_of(columns)
+    nothing where all grasps were lifted."""
+    causes = causes_of(rows)
     if not causes:
         return None
-    whole = len(columns["outcome"])
+    entries = (_entry(cause, len(rows.outcomes), rows.replay(cause.typical)) for cause in causes)
     return section(
         "Why grasps fail",
         "By cause, the most frequent one first. The command shows a typical case: the median one,"
         " with as many milder as worse ones.",
-        element("div", *(_entry(cause, whole, path) for cause in causes), class_="causes"),
+        element("div", *entries, class_="causes"),
     )
 
 
-def _entry(cause: Cause, whole: int, path: str) -> Html:
+def _entry(cause: Cause, whole: int, replay: str) -> Html:
     style = STYLES[group_of(cause.outcome).name]
     where = [f"on {_listed(cause.objects)}"]
     if cause.blockers:
         where.append(f"in the way: {_listed(cause.blockers)}")
-    line = shlex.join(["burg-drake", "replay", path, "--grasp", cause.typical])
     return element(
         "article",
         element(
@@ -135,7 +166,7 @@ def _entry(cause: Cause, whole: int, path: str) -> Html:
             element("span", f"{count(cause.number)} ({percent(cause.number / whole)})"),
         ),
         element("p", f"{MEANING[cause.outcome]}; {'; '.join(where)}"),
-        command(line),
+        command(replay),
     )
 
 

@@ -21,10 +21,15 @@ from burg_drake.visualization.flat_view import FlatView, fit_view, path_data
 from burg_drake.visualization.grasp_strokes import grasp_corners, grasp_strokes
 from burg_drake.visualization.palette import GROUPS
 from burg_drake.visualization.portrait import best_yaw, camera_rotation
-from burg_drake.visualization.shaded_outline import Solid, footprint, shaded_outline
+from burg_drake.visualization.shaded_outline import (
+    Solid,
+    footprint,
+    shaded_outline,
+    surface_of,
+)
 
-SCENE_WIDTH = 640.0
-SCENE_ELEVATION = float(np.deg2rad(42.0))
+SCENE_WIDTH = 480.0
+SCENE_ELEVATION = float(np.deg2rad(56.0))
 ELEVATION = float(np.deg2rad(30.0))
 """By which the cameras look down: over a whole scene, and at one object [rad]."""
 PANEL = 220.0
@@ -57,9 +62,8 @@ class DrawnGrasps:
 
 def solid_of(scene: Scene, name: str) -> Solid:
     """An instance's surface in the scene frame."""
-    mesh = scene.library.surface(scene.instance(name).object)
-    p_SV = transform_points(scene.X_SO(name), np.asarray(mesh.vertices))
-    return Solid(p_SV, np.asarray(mesh.faces, dtype=np.int64))
+    surface = surface_of(scene.library, scene.instance(name).object)
+    return Solid(transform_points(scene.X_SO(name), surface.vertices), surface.faces)
 
 
 def scene_drawing(

@@ -4,39 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from burg_drake.core.figures import count, percent
-from burg_drake.core.statistics import wilson_interval
+from burg_drake.core.statistics import clustered_interval
 from burg_drake.evaluation.report.html_page import tiles
 from burg_drake.evaluation.report.markup import Child, Html, element
-from burg_drake.evaluation.report.outcomes import STOPPED, label
+from burg_drake.evaluation.report.outcomes import STOPPED
 from burg_drake.evaluation.summary import Group, Summary
 
-INTERVALS = (
+ALIKE = (
     "Intervals hold 95 % (Wilson's), and take grasps as independent draws; grasps on one object are"
     " alike, so that for other objects the range is wider."
 )
+MANY = 8
+"""From so many scenes on, quartiles tell more than the worst and the best."""
+BY_SCENE = (
+    "Intervals hold 95 %, for other scenes of the same kind: they follow from how much scenes"
+    " differ (never narrower than Wilson's)."
+)
+"""What the intervals stand for, in a run and in one over many scenes."""
 
 
 def headline(summary: Summary) -> Html:
     """Sentences with figures and intervals, and the same figures large."""
-    sentences = [_success(summary), _cascade(summary), _spread(summary.objects)]
-    first, *rest = [sentence for sentence in sentences if sentence]
+    sentences = [
+        _success(summary),
+        _cascade(summary),
+        _spread(summary.scenes, "scene"),
+        _spread(summary.objects, "object"),
+    ]
+    first, *rest = [text.replace(" %", "\u00a0%") for text in sentences if text]
+    note = BY_SCENE if summary.scenes else ALIKE
     return element(
         "div",
-        element("p", element("b", first), *(f" {sentence}" for sentence in rest), class_="lead"),
+        element("p", element("b", first), *(f" {text}" for text in rest), class_="lead"),
         tiles(_tiles(summary)),
-        element("p", INTERVALS, class_="note") if summary.total.judged else None,
+        element("p", note, class_="note") if summary.total.judged else None,
     )
 
 
-def share_text(part: int, whole: int) -> str:
-    """A share with its interval, such as "87.8 %, interval 79 to 93 %"."""
-    return f"{percent(part / whole)}, interval {interval_text(part, whole)}"
+def interval_text(summary: Summary, *, executed: bool) -> str:
+    """The 95 % interval of the share of grasps that were lifted, such as "79 to 93 %".
 
-
-def interval_text(part: int, whole: int) -> str:
-    """The 95 % interval of a share, such as "79 to 93 %"."""
-    low, high = wilson_interval(part, whole)
+    Args:
+        summary: of a run, of one scene or of many.
+        executed: of those that were executed, not of all.
+    """
+    groups = summary.scenes or (summary.total,)
+    whole = [group.executed if executed else group.judged for group in groups]
+    low, high = clustered_interval([group.lifted for group in groups], whole)
     return f"{100 * low:.0f} to {100 * high:.0f} %"
 
 
@@ -51,7 +68,9 @@ def _success(summary: Summary) -> str:
         return "No grasp is judged yet."
     if not total.lifted:
         return f"None of {grasps(total.judged)} lifted its object."
-    share = share_text(total.lifted, total.judged)
+    share = (
+        f"{percent(total.lifted / total.judged)}, interval {interval_text(summary, executed=False)}"
+    )
     return f"{count(total.lifted)} of {grasps(total.judged)} lifted their object ({share})."
 
 
@@ -62,7 +81,8 @@ def _cascade(summary: Summary) -> str:
     if not total.executed:
         return f"Nothing was executed: {_losses(summary)}."
     whole = "by the whole arm" if summary.mode == "arm" else "by the hand"
-    share = share_text(total.lifted, total.executed)
+    share = f"{percent(total.lifted / total.executed)}, interval"
+    share += f" {interval_text(summary, executed=True)}"
     text = f"Of the {count(total.executed)} that were executed {whole} in simulation,"
     text += f" {count(total.lifted)} succeeded ({share})."
     if total.executed < total.judged:
@@ -85,17 +105,24 @@ def _losses(summary: Summary) -> str:
     return ", ".join(f"{text} in {count(number)}" for number, text in counts if number)
 
 
-def _spread(objects: Sequence[Group]) -> str:
-    """The best and the worst object of those that were tried."""
-    tried = [group for group in objects if group.executed]
+def _spread(groups: Sequence[Group], what: str) -> str:
+    """The best and the worst object or scene of those that were tried."""
+    tried = [group for group in groups if group.executed]
     if len(tried) < 2:
         return ""
     shares = [group.lifted / group.executed for group in tried]
     if min(shares) == max(shares):
-        return f"Success when executed is the same on all objects: {percent(shares[0])}."
+        where = "In" if what == "scene" else "On"
+        return f"{where} each {what} that was tried it is {percent(shares[0])}."
+    if what == "scene" and len(tried) >= MANY:
+        low, middle, high = np.quantile(shares, [0.25, 0.5, 0.75])
+        return (
+            f"In half of the scenes, success when executed is between {percent(low)} and"
+            f" {percent(high)} (median {percent(middle)})."
+        )
     low, high = (tried[shares.index(pick(shares))] for pick in (min, max))
     return (
-        f"By object, success when executed is between {percent(min(shares))} ({low.name}:"
+        f"By {what}, success when executed is between {percent(min(shares))} ({low.name}:"
         f" {low.lifted} of {low.executed}) and {percent(max(shares))} ({high.name}: {high.lifted}"
         f" of {high.executed})."
     )
@@ -106,29 +133,24 @@ def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
     screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a way"
     disturbed = total.held - total.lifted
     extra = f"; {count(disturbed)} more disturbed others" if disturbed else ""
-    of_all = "of executed", percent(total.lifted / total.executed) if total.executed else "-"
+    scenes = f" in {count(len(summary.scenes))} scenes" if summary.scenes else ""
     objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
-    worst = _worst(summary)
     return [
-        ("Grasps judged", count(total.judged), objects),
+        ("Grasps judged", count(total.judged), objects + scenes),
         ("Executed", count(total.executed), screened),
         ("Lifted", count(total.lifted), f"of {count(total.executed)} executed{extra}"),
         (
             "Success when executed",
-            of_all[1],
-            f"{interval_text(total.lifted, total.executed)} (95 % interval)"
+            percent(total.lifted / total.executed) if total.executed else "-",
+            f"{interval_text(summary, executed=True)} (95 % interval)"
             if total.executed
             else "nothing executed",
         ),
-        ("Most frequent loss", worst[0], worst[1]),
+        (
+            "Success of all",
+            percent(total.lifted / total.judged) if total.judged else "-",
+            f"{interval_text(summary, executed=False)} (95 % interval)"
+            if total.judged
+            else "nothing judged",
+        ),
     ]
-
-
-def _worst(summary: Summary) -> tuple[str, str]:
-    """What stops most grasps, and how many."""
-    outcomes = summary.total.outcomes
-    lost = [(outcomes[o], label(o)) for part in STOPPED.values() for o in part if outcomes[o]]
-    if not lost:
-        return "none", "every judged grasp lifted" if summary.total.judged else ""
-    number, name = max(lost, key=lambda pair: pair[0])
-    return count(number), name

@@ -47,3 +47,8 @@ def tiles(entries: list[tuple[str, Child, str]]) -> Html:
         ),
         class_="tiles",
     )
+
+
+def closer(*sections: Child) -> Html:
+    """The folded sections at the end; on paper they begin a new page."""
+    return element("div", *sections, class_="closer")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.report.charts import Series
 from burg_drake.evaluation.report.markup import Html, element, folded, section
@@ -53,12 +54,14 @@ FURTHER = (
 )
 
 
-def margin_section(columns: Columns, groups: NDArray[np.int8], disturbance: float) -> Html | None:
+def margin_section(
+    columns: Mapping[str, Array], groups: NDArray[np.int8], disturbance: float
+) -> Html | None:
     """The chosen margins; nothing where nothing was executed.
 
     Args:
-        columns: the results.
-        groups: (N,) of each row, see `outcome_groups`.
+        columns: (N,) by name, of grasps that came to a trial.
+        groups: (N,) of each, see `outcome_groups`.
         disturbance: displacement from which on a lifted grasp counts as disturbing [m].
     """
     limits = {DISTURBED: Limit(disturbance * 1e3, "limit")} if math.isfinite(disturbance) else {}
@@ -71,12 +74,12 @@ def margin_section(columns: Columns, groups: NDArray[np.int8], disturbance: floa
         " below it, each half on its own scale. A dashed line is the median. Slip and tilt are of"
         " those that both fingers held once, since the grip.",
         element("div", *charts, class_="charts"),
-        group_legend(present(groups[_executed(columns)])),
+        group_legend(present(groups)),
     )
 
 
-def further_margins(columns: Columns, groups: NDArray[np.int8]) -> Html | None:
-    """The others; nothing where nothing was executed."""
+def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> Html | None:
+    """The others; likewise."""
     charts = _charts(FURTHER, columns, groups, {})
     if not charts:
         return None
@@ -84,19 +87,27 @@ def further_margins(columns: Columns, groups: NDArray[np.int8]) -> Html | None:
     return folded("Further margins", text, element("div", *charts, class_="charts"))
 
 
+def tried_margins(
+    columns: Columns, groups: NDArray[np.int8]
+) -> tuple[dict[str, Array], NDArray[np.int8]]:
+    """What `margin_section` asks for, of a table of results and its groups (N,)."""
+    tried = columns["stage"] == Stage.EXECUTED.value
+    names = [margin.column for margin in (*CHOSEN, *FURTHER) if margin.column in columns]
+    return {name: columns[name][tried] for name in names}, groups[tried]
+
+
 def _charts(
     margins: Sequence[Margin],
-    columns: Columns,
+    columns: Mapping[str, Array],
     groups: NDArray[np.int8],
     limits: dict[Margin, Limit],
 ) -> list[Html]:
-    tried = _executed(columns)
-    own, charts = groups[tried], []
+    charts = []
     for margin in margins:
-        values = columns[margin.column][tried] * margin.factor if margin.column in columns else []
+        values = columns.get(margin.column, np.empty(0)) * margin.factor
         known = np.isfinite(values)
         if known.any():
-            charts.append(_chart(margin, values[known], own[known], limits.get(margin)))
+            charts.append(_chart(margin, values[known], groups[known], limits.get(margin)))
     return charts
 
 
@@ -110,8 +121,3 @@ def _chart(
     success = series.pop(LIFTED)
     failures = [series[k] for k in sorted(series)]
     return mirrored_histogram(success, failures, title=margin.title, unit=margin.unit, limit=limit)
-
-
-def _executed(columns: Columns) -> NDArray[np.bool_]:
-    """Which rows (N,) came to a trial."""
-    return np.asarray(columns["stage"] == Stage.EXECUTED.value)

@@ -179,4 +179,7 @@ def _text(name: str, values: Array, unit: str, y: float) -> Html:
 def _spoken(name: str, values: Array, unit: str) -> str:
     if not len(values):
         return f"{name}: none"
-    return f"{name}: {count(len(values))}, median {figure(float(np.median(values)))} {unit}"
+    median = float(np.median(values))
+    decimals = 2 if abs(median) < 10.0 else 1 if abs(median) < 100.0 else 0
+    space = "" if unit == "°" else " "
+    return f"{name}: {count(len(values))}, median {figure(median, decimals)}{space}{unit}"

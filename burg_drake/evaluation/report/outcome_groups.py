@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.codes import member_codes
 from burg_drake.evaluation.report.charts import legend
 from burg_drake.evaluation.report.markup import Html
 from burg_drake.evaluation.report.style import STYLES
@@ -20,15 +21,12 @@ LIFTED = INDEX[Outcome.LIFTED]
 
 def group_indices(outcomes: NDArray[np.str_]) -> NDArray[np.int8]:
     """Index into `GROUPS` (N,) of each outcome (N,); one pass an outcome, not one a row."""
-    found = np.full(len(outcomes), -1, dtype=np.int8)
-    left = len(outcomes)
-    for outcome, k in sorted(INDEX.items(), key=lambda item: item[1]):
-        if not left:
-            break
-        mine = outcomes == outcome.value
-        found[mine] = k
-        left -= int(np.count_nonzero(mine))
-    return found
+    return groups_of_codes(member_codes(outcomes, tuple(Outcome)))
+
+
+def groups_of_codes(outcomes: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Index into `GROUPS` (N,) of outcomes that are given by their places in `Outcome`."""
+    return np.array([INDEX[outcome] for outcome in Outcome], dtype=np.int8)[outcomes]
 
 
 def present(groups: NDArray[np.int8]) -> list[int]:

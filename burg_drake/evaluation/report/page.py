@@ -15,11 +15,11 @@ from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.arm import arm_section, execution_section
 from burg_drake.evaluation.report.bodies import collision_section, disturbed_section
 from burg_drake.evaluation.report.cascade import cascade_section
-from burg_drake.evaluation.report.causes import causes_section
+from burg_drake.evaluation.report.causes import causes_section, rows_of_run
 from burg_drake.evaluation.report.grasps import best_section, failure_section
 from burg_drake.evaluation.report.headline import headline
-from burg_drake.evaluation.report.html_page import header, html_page
-from burg_drake.evaluation.report.margins import further_margins, margin_section
+from burg_drake.evaluation.report.html_page import closer, header, html_page
+from burg_drake.evaluation.report.margins import further_margins, margin_section, tried_margins
 from burg_drake.evaluation.report.markup import Html, element
 from burg_drake.evaluation.report.outcome_groups import group_indices
 from burg_drake.evaluation.report.outcomes import cost_section, count_section, objects_section
@@ -44,7 +44,7 @@ def report_page(run: Run) -> str:
     summary, columns = summarize(run), run.results
     groups = group_indices(columns["outcome"])
     disturbance = run.document.trial.get("disturbance", math.inf)
-    pictures = pictures_of(run, groups)
+    pictures, tried = pictures_of(run, groups), tried_margins(columns, groups)
     title = f"{run.document.scene.name} on {run.document.station.name}"
     return html_page(
         f"Grasp evaluation: {title}",
@@ -55,20 +55,22 @@ def report_page(run: Run) -> str:
         cascade_section(summary),
         objects_section(summary),
         grasp_section(pictures),
-        causes_section(columns, str(run.path)),
-        margin_section(columns, groups, disturbance),
+        causes_section(rows_of_run(columns, str(run.path))),
+        margin_section(*tried, disturbance),
         reachability_section(run),
         execution_section(summary, columns),
         repeat_section(run),
-        best_section(run),
-        count_section(summary),
-        arm_section(summary, columns),
-        collision_section(columns),
-        disturbed_section(columns, disturbance),
-        further_margins(columns, groups),
-        failure_section(run),
-        cost_section(summary),
-        provenance(run),
+        closer(
+            best_section(run),
+            count_section(summary),
+            arm_section(summary, columns),
+            collision_section(columns),
+            disturbed_section(columns, disturbance),
+            further_margins(*tried),
+            failure_section(run),
+            cost_section(summary),
+            provenance(run),
+        ),
     )
 
 
@@ -83,11 +85,16 @@ def _about(run: Run) -> str:
 
 
 def _notice(run: Run) -> Html | None:
-    judged, total = len(run.results["id"]), len(run.candidates)
-    if judged == total:
-        return None
-    text = (
-        f"This run is not complete: {judged} of {total} grasps are judged. The command under “How"
-        " to repeat it” goes on with it."
-    )
-    return element("p", text, class_="notice")
+    judged, mine = len(run.results["id"]), len(run.mine)
+    parts = []
+    if run.document.shard:
+        parts.append(
+            f"This is share {run.document.shard} of a run, {mine} of its {len(run.candidates)}"
+            " grasps; others have the rest."
+        )
+    if judged < mine:
+        parts.append(
+            f"This run is not complete: {judged} of {mine} grasps are judged. The command under"
+            " “How to repeat it” goes on with it."
+        )
+    return element("p", " ".join(parts), class_="notice") if parts else None

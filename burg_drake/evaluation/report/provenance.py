@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
+from pathlib import Path
 
 from burg_drake.core.figures import duration
 from burg_drake.core.schema import load_document
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.campaign_document import CampaignDocument
 from burg_drake.evaluation.motion_numbers import (
     motion_in,
     motion_options,
@@ -35,12 +38,7 @@ def repeat_section(run: Run) -> Html:
     document = run.document
     facts = [
         ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
-        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
-        ("mode", f"{document.mode}: {ASKED[document.mode]}"),
-        ("motion", motion_text(motion_in(document.trial))),
-        ("engine", engine_label(document.engine)),
-        ("seed", str(document.seed)),
-        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in DECIDING)),
+        *_common(document),
         ("run", f"{document.hash} (hash of all of that; column run of the table)"),
     ]
     return section(
@@ -57,6 +55,49 @@ def provenance(run: Run) -> Html:
     )
     text = "Everything that decides about the results, who judged when, and what is in the folder."
     return folded("All settings and versions", text, _list([*facts, ("files", files)]))
+
+
+def repeat_campaign(campaign: Campaign) -> Html:
+    """The command that began a run over many scenes, and the settings that decide about it."""
+    document = campaign.document
+    scenes = [entry.path for entry in document.scenes]
+    text = (
+        "Results follow from the inputs, the seed and the versions below; not from the number of"
+        " workers, machines or shares, or the order of their work."
+    )
+    facts = [
+        ("scenes", f"{len(scenes)}, their contents in campaign.yaml"),
+        *_common(document),
+        ("run", f"{document.hash} (hash of all of that)"),
+    ]
+    return section("How to repeat it", text, command(document.command), _list(facts))
+
+
+def campaign_facts(campaign: Campaign) -> Html:
+    """All settings, versions, and who worked on a run over many scenes."""
+    document = campaign.document
+    facts = [
+        *(
+            (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
+            for folder, content in document.libraries.items()
+        ),
+        *_settings(document),
+        *_stretches(document),
+    ]
+    text = "Everything that decides about the results but the scenes, and who judged when."
+    return folded("All settings and versions", text, _list(facts))
+
+
+def _common(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+    """Settings that people ask for first."""
+    return [
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("mode", f"{document.mode}: {ASKED[document.mode]}"),
+        ("motion", motion_text(motion_in(document.trial))),
+        ("engine", engine_label(document.engine)),
+        ("seed", str(document.seed)),
+        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in DECIDING)),
+    ]
 
 
 def _list(facts: list[tuple[str, str]]) -> Html:
@@ -113,7 +154,7 @@ def _inputs(document: RunDocument) -> list[tuple[str, str]]:
     ]
 
 
-def _settings(document: RunDocument) -> list[tuple[str, str]]:
+def _settings(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     engine = document.engine
     return [
         ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
@@ -145,7 +186,7 @@ def _listed(settings: dict[str, float]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
 
 
-def _stretches(document: RunDocument) -> list[tuple[str, str]]:
+def _stretches(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     lines = []
     for stretch in document.stretches:
         judged = "interrupted" if stretch.judged is None else f"{stretch.judged} grasps"

@@ -71,6 +71,8 @@ class Calibration:
         name: of the margin; `probability`.
         smaller_is_better: whether success should come with small numbers.
         trials, successes: with a number.
+        share: of successes among them.
+        weighted: the same for what the trials stand for; None without weights.
         without: trials that have none, as where the simulation stopped before it is measured.
         bins: by increasing number, about equally many trials in each.
         auroc: probability that a success has the better number of a success and a failure.
@@ -82,6 +84,8 @@ class Calibration:
     smaller_is_better: bool
     trials: int
     successes: int
+    share: Figure
+    weighted: Figure | None
     without: int
     bins: tuple[Bin, ...]
     auroc: Figure
@@ -131,6 +135,8 @@ def calibration(
         smaller_is_better=falling,
         trials=int(trials.count.sum()),
         successes=int(trials.good.sum()),
+        share=share(trials.good.sum(), trials.count.sum()),
+        weighted=None if weight is None else _effective(trials, slice(None)),
         without=int((~known).sum()),
         bins=_along(_bins(trials, sign, weight is not None), falling),
         auroc=ranking(trials),
@@ -147,9 +153,6 @@ def _bins(trials: Ordered, sign: float, weighted: bool) -> list[Bin]:
         part = slice(start, end)
         ends = sorted((sign * trials.value[start], sign * trials.last[end - 1]))
         count, good = trials.count[part].sum(), trials.good[part].sum()
-        weight, squares = trials.weight[part].sum(), trials.squares[part].sum()
-        effective = weight**2 / squares  # L. Kish, Survey Sampling, 1965
-        of_all = share(trials.good_weight[part].sum() / weight * effective, effective)
         bins.append(
             Bin(
                 low=float(ends[0]),
@@ -158,10 +161,20 @@ def _bins(trials: Ordered, sign: float, weighted: bool) -> list[Bin]:
                 trials=int(count),
                 successes=int(good),
                 share=share(int(good), int(count)),
-                weighted=of_all if weighted else None,
+                weighted=_effective(trials, part) if weighted else None,
             )
         )
     return bins
+
+
+def _effective(trials: Ordered, part: slice) -> Figure:
+    """Share of successes of what trials stand for; Wilson's interval for the effective number of
+    trials (L. Kish, Survey Sampling, 1965)."""
+    weight, squares = trials.weight[part].sum(), trials.squares[part].sum()
+    if not weight:
+        return Figure.undefined("no trials")
+    effective = weight**2 / squares
+    return share(trials.good_weight[part].sum() / weight * effective, effective)
 
 
 def _isotonic(trials: Ordered, sign: float) -> list[Step]:

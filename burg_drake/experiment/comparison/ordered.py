@@ -8,7 +8,6 @@ import numpy as np
 
 from burg_drake.core.frames import Array
 
-
 FINEST = 20_000
 """Rows; of more the trials with neighbouring numbers share one, which changes a share of trials by
 less than 1e-4."""

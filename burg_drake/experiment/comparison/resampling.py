@@ -5,8 +5,8 @@ drawn from their Dirichlet distribution given the counts (the Bayesian bootstrap
 Annals of Statistics 9, 1981), since drawing counts anew takes a cell that happens to be empty for
 one that cannot be filled: with 10 of 10 right it would be sure that all are. Jeffreys' half a trial
 for each cell is shared among the strata by what they stand for, so that many small strata do not
-outweigh what was seen; and as the spread within a stratum of n trials is taken from the same n, they
-count as n - 2 (at least a third). `benchmarks/compare.py` measures the coverage.
+outweigh what was seen. The n trials of a stratum count as n - 2, at least a third, since the spread
+within it is taken from them, too. `benchmarks/compare.py` measures the coverage.
 """
 
 from __future__ import annotations

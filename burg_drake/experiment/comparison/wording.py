@@ -35,17 +35,12 @@ def interval(found: Figure, *, percent: bool) -> str:
     """The interval of a figure in brackets; empty if there is none."""
     if found.low is None or found.high is None:
         return ""
+    bounds, decimals = [found.low, found.high], 2
     if percent:
-        return f"[{100 * found.low:.0f}, {100 * found.high:.0f}]"
-    return f"[{found.low + 0.0:.2f}, {found.high + 0.0:.2f}]"
-
-
-def with_interval(found: Figure, name: str = "accuracy") -> str:
-    """A measure with its interval, or why it is undefined."""
-    percent = name in SHARES
-    if found.value is None:
-        return f"undefined: {found.reason}"
-    return f"{number(found, percent=percent)} {interval(found, percent=percent)}"
+        bounds = [100 * bound for bound in bounds]
+        decimals = 0 if bounds[1] - bounds[0] >= 2.0 else 1
+    low, high = (f"{round(bound, decimals) + 0.0:.{decimals}f}" for bound in bounds)
+    return f"[{low}, {high}]"
 
 
 def brief(found: Figure) -> str:
@@ -93,15 +88,14 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     if b.difference.value is None:
         return "no trials"
     more = "more" if b.difference.value >= 0 else "less"
-    signs = [100 * (x or 0.0) for x in (b.difference.low, b.difference.high)]
-    what = "first run" if comparison.kind == "runs" else "simulation"
-    reference = "second" if comparison.kind == "runs" else "reality"
-    size = 100 * abs(b.difference.value)
+    who, other = ("simulator promises", "the robot achieved")
+    if comparison.kind == "runs":
+        who, other = "first run sees", "the second"
     return (
-        f"The {what} sees {size:.1f} percentage points {more} success than the {reference}"
-        f" [{signs[0]:.0f}, {signs[1]:.0f}]: {b.only_first} successes did not come true,"
-        f" {b.only_second} came about against the prediction (McNemar's exact test:"
-        f" p = {figure(b.p_value)})."
+        f"The {who} {100 * abs(b.difference.value):.1f} percentage points {more} success than"
+        f" {other} {interval(b.difference, percent=True)}: {b.only_first:,} predicted successes did"
+        f" not come true, {b.only_second:,} came about against the prediction (McNemar's exact"
+        f" test: p = {figure(b.p_value)})."
     )
 
 

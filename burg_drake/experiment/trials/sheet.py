@@ -6,18 +6,17 @@ not known is left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
-from burg_drake.core.errors import FieldError, InvalidInputError, nearest, quoted
+from burg_drake.core.errors import FieldError, InvalidInputError
 from burg_drake.core.names import require_names
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose, load_document, save_document
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.run_document import Input
+from burg_drake.experiment.trials.checks import require_known, require_least, require_time
 
 SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the
 rest by hand, or with burg-drake trials record and burg-drake trials serve."""
@@ -65,21 +64,23 @@ class Selection:
         blocks: how many blocks the trials of a scene were divided into.
     """
 
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
     per_object: int
     balance: Balance
     margin: str = ""
     bins: int = 0
     success: Success = "lifted"
     seed: int = 0
-    among: Among = "clear"
+    among: Among = "executed"
     scenes: int = 0
     blocks: int = 1
 
     def __post_init__(self) -> None:
-        _require_least(self.per_object, 1, "per_object")
-        _require_least(self.blocks, 1, "blocks")
-        _require_least(self.scenes, 0, "scenes")
-        _require_least(self.bins, 0, "bins")
+        require_least(self.per_object, 1, "per_object")
+        require_least(self.blocks, 1, "blocks")
+        require_least(self.scenes, 0, "scenes")
+        require_least(self.bins, 0, "bins")
         if (self.balance == "margin") != bool(self.margin):
             what = "names a margin" if self.margin else "names none"
             raise FieldError(f"margin {what}, and balance is {self.balance!r}", "margin")
@@ -106,7 +107,7 @@ class Stratum:
     wanted: int
 
     def __post_init__(self) -> None:
-        _require_least(self.selected, 0, "selected")
+        require_least(self.selected, 0, "selected")
         if self.population < self.selected:
             raise FieldError(
                 f"population {self.population} is less than selected {self.selected}", "population"
@@ -193,8 +194,8 @@ class RealTrial:
     robot: RobotReport | None = None
 
     def __post_init__(self) -> None:
-        _require_least(self.number, 1, "number")
-        _require_time(self.time, "time")
+        require_least(self.number, 1, "number")
+        require_time(self.time, "time")
 
     @property
     def carried_out(self) -> bool:
@@ -227,9 +228,9 @@ class TrialSheet:
 
     def __post_init__(self) -> None:
         require_names(self.runs, "runs")
-        _require_time(self.created, "created")
+        require_time(self.created, "created")
         for key, stratum in self.strata.items():
-            _require_known(stratum.run, self.runs, "run", "strata", key, "run")
+            require_known(stratum.run, self.runs, "run", "strata", key, "run")
         lines: dict[int, int] = {}
         for i, trial in enumerate(self.trials):
             first = lines.setdefault(trial.number, i)
@@ -242,9 +243,12 @@ class TrialSheet:
             self._check(i, trial)
 
     def _check(self, i: int, trial: RealTrial) -> None:
-        """Refuses a trial whose run or stratum is unknown, or not its own."""
-        _require_known(trial.run, self.runs, "run", "trials", i, "run")
-        _require_known(trial.stratum, self.strata, "stratum", "trials", i, "stratum")
+        """Refuses a trial whose run or stratum is unknown, or not its own; a sheet without any
+        strata is one that nobody has balanced."""
+        require_known(trial.run, self.runs, "run", "trials", i, "run")
+        if not self.strata:
+            return
+        require_known(trial.stratum, self.strata, "stratum", "trials", i, "stratum")
         stratum = self.strata[trial.stratum]
         for name in ("run", "object"):
             theirs, own = getattr(stratum, name), getattr(trial, name)
@@ -296,25 +300,3 @@ def load_trials(path: str | Path) -> TrialSheet:
 def save_trials(sheet: TrialSheet, path: str | Path) -> None:
     """Writes a trials file anew; see `core.schema.save_document`."""
     save_document(sheet, path, SHEET_HEADER)
-
-
-def _require_least(value: int, least: int, name: str) -> None:
-    if value < least:
-        raise FieldError(f"{name} is {value}; it has to be {least} at least", name)
-
-
-def _require_known(name: str, known: Iterable[str], what: str, *place: str | int) -> None:
-    known = list(known)
-    if name not in known:
-        raise FieldError(f"there is no {what} {quoted(name)}; {nearest(name, known)}", *place)
-
-
-def _require_time(text: str, name: str) -> None:
-    try:
-        known = not text or datetime.fromisoformat(text)
-    except ValueError:
-        known = False
-    if not known:
-        raise FieldError(
-            f"{name} is {quoted(text)}; write it as in 2026-05-04T16:30:00+02:00", name
-        )

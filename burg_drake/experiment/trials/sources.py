@@ -1,4 +1,4 @@
-"""The runs behind a sheet of trials: found again, and found to be the ones that were planned with."""
+"""The runs behind a sheet of trials: found again, and known to be those that it was made of."""
 
 from __future__ import annotations
 
@@ -58,6 +58,13 @@ def load_sources(
     for key, run in found.items():
         _check_grasps(run, [t for t in sheet.trials if t.run == key], Path(path))
     return found
+
+
+def load_run_of(
+    sheet: TrialSheet, path: str | Path, key: str, *, moved: Moved | None = None
+) -> Run:
+    """One run of a sheet, without a look at its grasps; see `load_sources`."""
+    return _load(key, sheet.runs[key], Path(path), moved or {})
 
 
 def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:

@@ -58,6 +58,7 @@ def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
     real = any(case.trial is not None for case in cases)
     head = ["trial", "object", "simulated", "happened"] if real else ["object", "first", "second"]
     head += ["offset", "note"] if real else []
+    head.append("replay")
     rows = []
     for case in cases:
         verdict = case.simulated.replace("_", " ")
@@ -70,10 +71,14 @@ def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
         if real:
             offset = "-" if case.offset_mm is None else f"{figure(case.offset_mm)} mm"
             cells += [offset, _note(case, photos)]
-        replays = [command(line) for line in case.replays]
-        cells.append(join(*replays))
-        rows.append(element("tr", *(element("td", cell) for cell in cells)))
-    return table([*head, "replay"], rows, style="cases")
+        cells.append(join(*(command(line) for line in case.replays)))
+        rows.append(
+            element(
+                "tr",
+                *(element("td", c, data_label=h) for h, c in zip(head, cells, strict=True)),
+            )
+        )
+    return table(head, rows, style="cases")
 
 
 def _note(case: Disagreement, photos: Path | None) -> Child:
@@ -92,8 +97,8 @@ def stopped_section(judged: Judgement) -> Html:
             element("th", row.outcome.replace("_", " "), scope="row"),
             element("td", row.blocker or "", class_="faint"),
             element("td", row.stage),
-            element("td", count(row.trials), class_="number"),
-            element("td", share_mark(row.successes), class_="estimate"),
+            element("td", count(row.trials), class_="number", data_label="trials"),
+            element("td", share_mark(row.successes), class_="estimate", data_label="succeeded"),
         )
         for row in judged.stopped[:MOST_STOPPED]
     ]
@@ -102,7 +107,9 @@ def stopped_section(judged: Judgement) -> Html:
         more = f" The first {MOST_STOPPED} of {len(judged.stopped)}."
     head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
     text = f"By what the simulation said: how many of these grasps succeeded.{more}"
-    return section("What became of each verdict", text, table(head, rows, numbers=(3,)))
+    return section(
+        "What became of each verdict", text, table(head, rows, numbers=(3,), style="groups")
+    )
 
 
 def outcome_section(comparison: Comparison, judged: Judgement) -> Html:

@@ -11,7 +11,7 @@ from burg_drake.experiment.comparison.agreement import Agreement
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import Group
 from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import MEASURES, Figure
+from burg_drake.experiment.comparison.measures import CELLS, MEASURES, Figure
 from burg_drake.experiment.comparison.wording import CELL_NAMES, SHARES, interval, number
 
 MOST_ROWS = 60
@@ -78,38 +78,33 @@ def figure_section(judged: Named) -> Html:
             columns.append((_titled("all grasps", name), judgement.all_grasps))
     if len(columns) == 1:
         columns = [("value", columns[0][1])]
-    head = ["figure", *(part for name, _ in columns for part in (name, "95 % interval"))]
+    head = ["figure", *(name for name, _ in columns)]
     rows = []
     for key, measure in MEASURES.items():
-        cells = [part for _, a in columns for part in _cells(a.figure(key), key)]
+        cells = [figure_cell(a.figure(key), percent=key in SHARES) for _, a in columns]
         rows.append(element("tr", element("th", measure.name, scope="row"), *cells))
     return section("Figures", _how(judged), table(head, rows, numbers=range(1, len(head))))
 
 
+def figure_cell(found: Figure, *, percent: bool) -> Html:
+    """A figure and its interval, below each other where there is little room."""
+    if found.value is None:
+        return element("td", found.reason, class_="number faint why")
+    bounds = element("small", interval(found, percent=percent), class_="bounds")
+    return element("td", number(found, percent=percent), " ", bounds, class_="number")
+
+
 def _how(judged: Named) -> str:
     weighted = any(j.all_grasps is not None for _, j in judged)
-    text = "Shares have Wilson's intervals, all others come from a Bayesian bootstrap."
+    text = "With 95 % intervals: Wilson's for shares, all others come from a Bayesian bootstrap."
     if weighted:
         text = (
             "The grasps were chosen from strata. Figures of the selected trials describe the"
             " experiment; figures for all grasps, in which each trial stands for its share of a"
-            " stratum, describe what a user of the simulator meets. Intervals: Wilson's for shares"
+            " stratum, describe what a user of the simulator meets. 95 % intervals: Wilson's for shares"
             " of the selected trials; a Bayesian bootstrap within strata for all others."
         )
     return text
-
-
-def _cells(found: Figure, key: str) -> list[Html]:
-    percent = key in SHARES
-    if found.value is None:
-        return [
-            element("td", "undefined", class_="number faint"),
-            element("td", found.reason, class_="faint"),
-        ]
-    return [
-        element("td", number(found, percent=percent), class_="number"),
-        element("td", interval(found, percent=percent), class_="number faint"),
-    ]
 
 
 def group_section(title: str, text: str, head: str, groups: Sequence[Group]) -> Html:
@@ -123,9 +118,13 @@ def group_section(title: str, text: str, head: str, groups: Sequence[Group]) -> 
 
 def _group_row(group: Group) -> Html:
     a = group.agreement
-    counts = [element("td", count(round(n)), class_="number") for n in (a.trials, *a.cells)]
+    counts = [
+        element("td", count(round(n)), class_="number", data_label=name)
+        for name, n in zip(("trials", *CELLS), (a.trials, *a.cells), strict=True)
+    ]
     shares = [
-        element("td", share_mark(f), class_="estimate") for f in (a.accuracy, a.precision, a.recall)
+        element("td", share_mark(found), class_="estimate", data_label=name)
+        for name, found in (("right", a.accuracy), ("precision", a.precision), ("recall", a.recall))
     ]
     return element("tr", element("th", group.name, scope="row"), *counts, *shares)
 

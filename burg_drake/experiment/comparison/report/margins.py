@@ -7,11 +7,12 @@ from burg_drake.evaluation.report.markup import Html, element, section, table
 from burg_drake.experiment.comparison.calibration import Calibration
 from burg_drake.experiment.comparison.groups import Group
 from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.report.figures import group_section
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.report.figures import figure_cell, group_section
 from burg_drake.experiment.comparison.report.plots import reliability_plot
-from burg_drake.experiment.comparison.wording import interval, margin_title, number
+from burg_drake.experiment.comparison.wording import margin_title
 
-MOST_PLOTS = 6
+MOST_PLOTS = 4
 
 
 def margin_section(judged: Judgement) -> Html | None:
@@ -20,26 +21,26 @@ def margin_section(judged: Judgement) -> Html | None:
     if not found:
         return None
     weighted = any(c.auroc_weighted is not None for c in found)
-    head = ["margin", "better", "trials", "AUROC", "95 % interval"]
-    head += ["AUROC, all grasps", "95 % interval"] if weighted else []
+    head = ["margin", "trials", "AUROC"]
+    head += ["AUROC, all grasps"] if weighted else []
     rows = [_row(c, weighted) for c in found]
     plots = [
-        reliability_plot(c, "actual success", base=c.successes / c.trials)
+        reliability_plot(c, "actual success")
         for c in found[:MOST_PLOTS]
         if c.auroc.value is not None
     ]
+    trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
         "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
-        " margin; one half tells nothing. Dots: share of successes in bins of about equally many"
-        " trials, with Wilson's intervals; line: the monotone curve that fits best"
+        f" margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes among {trials} in bins of about"
+        " equally many trials, with Wilson's intervals; line: the monotone curve that fits best;"
+        " dashes: all of them."
     )
-    text += " for all grasps" if weighted else ""
-    text += "; dashes: all trials."
     return section(
         "Do margins tell what will succeed?",
         text,
-        element("div", *plots, class_="charts"),
-        table(head, rows, numbers=range(2, len(head))),
+        element("div", *plots, class_="charts plots"),
+        table(head, rows, numbers=range(1, len(head))),
     )
 
 
@@ -50,17 +51,14 @@ def _telling(found: Calibration) -> float:
 
 
 def _row(c: Calibration, weighted: bool) -> Html:
-    cells = [count(c.trials)]
-    for found in (c.auroc, c.auroc_weighted) if weighted else (c.auroc,):
-        if found is None or found.value is None:
-            cells += ["-", "" if found is None else found.reason]
-        else:
-            cells += [number(found, percent=False), interval(found, percent=False)]
+    found = (c.auroc, c.auroc_weighted) if weighted else (c.auroc,)
     return element(
         "tr",
-        element("th", margin_title(c.name)[0], scope="row"),
-        element("td", "smaller" if c.smaller_is_better else "larger"),
-        *(element("td", cell, class_="number") for cell in cells),
+        element(
+            "th", f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}", scope="row"
+        ),
+        element("td", count(c.trials), class_="number"),
+        *(figure_cell(f or Figure.undefined(""), percent=False) for f in found),
     )
 
 
@@ -79,10 +77,6 @@ def placement_section(judged: Judgement) -> Html | None:
         "Where objects stood off their targets, the simulation judged another scene than the robot"
         " met. Agreement that is much better in the first row points at placement, not physics."
     )
-    plots = [
-        reliability_plot(c, "right verdicts", base=c.successes / c.trials)
-        for c in (p.largest, p.target)
-        if c.trials
-    ]
+    plots = [reliability_plot(c, "right verdicts") for c in (p.largest, p.target) if c.trials]
     whole = group_section("By placement of the objects", text, "placement", groups)
-    return element("div", whole, element("div", *plots, class_="charts"))
+    return element("div", whole, element("div", *plots, class_="charts plots"))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from burg_drake.core.figures import figure
 from burg_drake.evaluation.report.charts import nice_step
 from burg_drake.evaluation.report.markup import Html, element
-from burg_drake.experiment.comparison.calibration import Calibration
+from burg_drake.experiment.comparison.calibration import Bin, Calibration
 from burg_drake.experiment.comparison.wording import margin_title
 
 WIDTH, HEIGHT = 330, 210
@@ -15,13 +16,13 @@ LEFT, RIGHT, TOP, BOTTOM = 38, 10, 24, 38
 """Size and margins of a plot in SVG units."""
 
 
-def reliability_plot(found: Calibration, vertical: str, *, base: float | None = None) -> Html:
-    """Share over a number: a dot with its interval for each bin, and the isotonic fit as a line.
+def reliability_plot(found: Calibration, vertical: str) -> Html:
+    """Share over a number: a dot with its interval for each bin, the isotonic fit as a line, and
+    the share of all together dashed.
 
     Args:
-        found: bins and fit.
+        found: bins and fit; shares of what the trials stand for, if that is known.
         vertical: what the share is of.
-        base: share of all trials, a dashed line.
     """
     title, unit, size = margin_title(found.name)
     ends = [size * found.bins[0].low, size * found.bins[-1].high]
@@ -44,7 +45,7 @@ def reliability_plot(found: Calibration, vertical: str, *, base: float | None = 
         element("text", named, x=WIDTH - RIGHT, y=HEIGHT - 5, class_="title end"),
         *_levels(),
         element("g", *axis, class_="middle"),
-        _across(base) if base is not None else None,
+        _across((found.weighted or found.share).value),
         _fit(found, x),
         *(part for row in found.bins for part in _dot(row, x, size, unit)),
         viewBox=f"0 0 {WIDTH} {HEIGHT}",
@@ -70,7 +71,9 @@ def _levels() -> list[Html]:
     return parts
 
 
-def _across(share: float) -> Html:
+def _across(share: float | None) -> Html | None:
+    if share is None:
+        return None
     y = f"{y_of(share):.1f}"
     return element(
         "g",
@@ -79,31 +82,27 @@ def _across(share: float) -> Html:
     )
 
 
-def _fit(found: Calibration, x) -> Html:  # type: ignore[no-untyped-def]
-    points = [
-        f"{x(value):.1f},{y_of(step.share):.1f}"
-        for step in found.isotonic
-        for value in (step.low, step.high)
-    ]
-    return element("path", d="M" + " L".join(points), class_="fit") if points else Html("")
+def _fit(found: Calibration, x: Callable[[float], float]) -> Html | None:
+    """The isotonic fit, which jumps half way between its steps."""
+    points, steps = [], found.isotonic
+    for k, step in enumerate(steps):
+        start = (steps[k - 1].high + step.low) / 2 if k else step.low
+        end = (step.high + steps[k + 1].low) / 2 if k + 1 < len(steps) else step.high
+        points += [f"{x(value):.1f},{y_of(step.share):.1f}" for value in (start, end)]
+    return element("path", d="M" + " L".join(points), class_="fit") if points else None
 
 
-def _dot(row, x, size: float, unit: str) -> list[Html]:  # type: ignore[no-untyped-def]
-    at = row.share
+def _dot(row: Bin, x: Callable[[float], float], size: float, unit: str) -> list[Html]:
+    at = row.share if row.weighted is None else row.weighted
     place = f"{x(row.mean):.1f}"
     tip = (
-        f"{row.successes} of {row.trials}, {figure(size * row.low)} to"
+        f"{row.successes} of {row.trials} trials, {figure(size * row.low)} to"
         f" {figure(size * row.high)} {unit}".rstrip()
     )
-    whisker = {"x1": place, "x2": place, "y1": f"{y_of(at.low):.1f}", "y2": f"{y_of(at.high):.1f}"}
+    value, low, high = (f"{y_of(v or 0.0):.1f}" for v in (at.value, at.low, at.high))
     return [
-        element("line", element("title", tip), class_="whisker", **whisker),
         element(
-            "circle",
-            element("title", tip),
-            cx=place,
-            cy=f"{y_of(at.value):.1f}",
-            r=3.5,
-            class_="dot",
+            "line", element("title", tip), x1=place, x2=place, y1=low, y2=high, class_="whisker"
         ),
+        element("circle", element("title", tip), cx=place, cy=value, r=3.5, class_="dot"),
     ]
