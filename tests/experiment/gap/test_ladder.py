@@ -18,6 +18,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.executor import LocalExecutor
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
@@ -41,7 +42,7 @@ NONE = PlacementNoise(place=0.0, turn=0.0)
 ASKED: dict[str, Any] = {
     "grasps": {"box": GraspSet.create(GRASPS, object="box", width=0.06)},
     "engine": "screening",
-    "workers": 1,
+    "executor": LocalExecutor(1),
     "progress": False,
 }
 
