@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import subprocess
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any, Generic, TypeVar
@@ -108,21 +108,37 @@ class Ahead(Generic[Work]):
         """
         self._work = iter(work)
         self._processes = [SideProcess(module, first) for _ in range(count)]
+        self._given = self._taken = 0
 
-    def __iter__(self) -> Iterator[tuple[Work, Any]]:
-        """The work and what came of it, which may be an error."""
-        given = taken = 0
+    def ready(self) -> bool:
+        """Whether `take` returns at once."""
+        self._give()
+        return self._taken == self._given or self._next.ready()
+
+    def take(self) -> tuple[Work, Any] | None:
+        """The next work and what came of it, which may be an error; None when there is no more.
+        Waits for it."""
+        self._give()
+        if self._taken == self._given:
+            return None
+        found = self._next.take()
+        self._taken += 1
+        self._give()
+        return found
+
+    @property
+    def _next(self) -> SideProcess:
+        return self._processes[self._taken % len(self._processes)]
+
+    def _give(self) -> None:
         count = len(self._processes)
-        while True:
+        while self._given - self._taken < WAITING * count:
             for work in self._work:
-                self._processes[given % count].give(work)
-                given += 1
-                if given - taken >= WAITING * count:
-                    break
-            if taken == given:
+                self._processes[self._given % count].give(work)
+                self._given += 1
+                break
+            else:
                 return
-            yield self._processes[taken % count].take()
-            taken += 1
 
     def end(self) -> None:
         """Ends the processes."""

@@ -142,23 +142,19 @@ class Campaign:
         return self.path / REPORT_FILE
 
     @property
-    def expected(self) -> int:
-        """Number of grasps that are judged here; of scenes that have not been begun, as many as are
-        asked for."""
-        document = self.document
-        shard = document.shard_of_grasps
-        each = document.grasps.per_object or 0
+    def expected(self) -> dict[str, int]:
+        """Number of grasps that are judged here, by scene; of scenes that have not been begun as
+        many as are asked for, and 0 if grasps are given."""
+        document, shard = self.document, self.document.shard_of_grasps
         only = set(document.grasps.only)
-        total = 0
+        found = {}
         for entry in document.mine:
             state = self.states.get(entry.name)
-            if state is not None and state.state != "failed":
-                total += state.mine
-                continue
             chosen = [n for n, o in entry.instances.items() if not only or n in only or o in only]
-            asked = each * len(chosen) if state is None else 0
-            total += asked if shard is None else len(range(shard.number - 1, asked, shard.count))
-        return total
+            asked = range((document.grasps.per_object or 0) * len(chosen))
+            mine = asked if shard is None else asked[shard.number - 1 :: shard.count]
+            found[entry.name] = len(mine) if state is None or state.why else state.mine
+        return found
 
 
 def load_campaign(path: str | Path) -> Campaign:

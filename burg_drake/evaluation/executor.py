@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.processes import default_workers
@@ -35,7 +35,9 @@ class Executor(Protocol):
         """Judges all grasps of all jobs.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work.
+            jobs: asked for one after the other, when workers run out of work. An executor with an
+                attribute `polls` that is True may get None: no job is ready yet, and there are
+                others to work on.
             on_failure: told of a job that cannot be done, such as one whose judge cannot be built;
                 no more verdicts come for it, and the other jobs go on. If None, its error is
                 raised.
@@ -57,8 +59,10 @@ class LocalExecutor:
     Attributes:
         workers: their number.
         limits: what they may take.
+        polls: see `Executor.judge`.
     """
 
+    polls: ClassVar[bool] = True
     workers: int
     limits: Limits = field(default_factory=Limits)
 
@@ -72,7 +76,7 @@ class LocalExecutor:
         return cls(default_workers())
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
         pool = Pool(self.workers, self.limits)

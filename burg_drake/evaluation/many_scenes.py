@@ -14,6 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from burg_drake.core.errors import BurgError
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
@@ -30,7 +33,7 @@ from burg_drake.evaluation.campaign_document import (
     campaign_hash,
     require_same_campaign,
 )
-from burg_drake.evaluation.executor import Executor, Job
+from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.ledger import Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
@@ -39,12 +42,7 @@ from burg_drake.evaluation.request import Request, command, given_content
 from burg_drake.evaluation.run_document import begun_now, input_of, software_versions
 from burg_drake.evaluation.scene_crew import SceneCrew
 from burg_drake.evaluation.scene_entries import Scenes, read_scenes, require_used
-from burg_drake.evaluation.scene_judging import (
-    SceneJudging,
-    TolerantFactory,
-    build_failure,
-    is_finished,
-)
+from burg_drake.evaluation.scene_judging import SceneJudging, is_finished
 from burg_drake.evaluation.scene_work import Keeping, Prepare, Preparer
 from burg_drake.scene.scene import Scene
 
@@ -156,10 +154,9 @@ class _Call:
 
     def _judge(self, left: list[str], crew: SceneCrew) -> None:
         document = self.campaign.document
-        total = self.campaign.expected
-        there = sum(s.mine for s in self.ledger.states.values() if s.state == "done")
-        outcomes: Counter[Outcome] = Counter()
-        event = Progress(STARTING, there, total, outcomes=outcomes)
+        self.expected = self.campaign.expected
+        there = sum(n for name, n in self.expected.items() if name not in left)
+        event = Progress(STARTING, there, sum(self.expected.values()), outcomes=self._found())
         self.pace = Pace(self.reporter.show, event, "judging")
         stretch = begun_now(self.executor.workers)
         stretches = document.stretches
@@ -183,56 +180,87 @@ class _Call:
                 replace(self.campaign, document=replace(document, stretches=(*stretches, stretch)))
             )
 
-    def _jobs(self, left: list[str], crew: SceneCrew) -> Generator[Job, None, None]:
-        """Scenes that are prepared, one after the other."""
-        work = (Prepare(name, self.campaign.folder(name), self.scenes.given[name]) for name in left)
-        for item, scene in crew.prepared(work):
-            if scene is None:
-                self.ledger.note(SceneState(scene=item.name, state="empty"))
+    def _jobs(self, left: list[str], crew: SceneCrew) -> Generator[Job | None, None, None]:
+        """Scenes that are prepared, one after the other; None while workers have others to judge
+        and the next one is not ready."""
+        crew.prepare(
+            Prepare(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
+        )
+        polls = getattr(self.executor, "polls", False)
+        while True:
+            if polls and self.judging and not crew.ready():
+                yield None
                 continue
-            if isinstance(scene, BaseException):
-                self._fail(item.name, str(scene))
-                continue
-            judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
-            self.ledger.note(judging.state("open"))
-            if not judging.left:
-                self._finish(judging, crew)
-                continue
-            judging.begin()
-            self.judging[item.name] = judging
-            self.pace.step(judging.known, note=self._note())
-            request = self.request
-            factory = self.make_judge(
-                scene, request.station, request.engine, request.mode, request.motion
-            )
-            yield Job(item.name, TolerantFactory(factory), judging.left)
+            prepared = crew.prepared()
+            if prepared is None:
+                return
+            job = self._begin(*prepared, crew)
+            if job is not None:
+                yield job
+
+    def _begin(
+        self, item: Prepare, scene: Scene | BaseException | None, crew: SceneCrew
+    ) -> Job | None:
+        """What is to be judged of a scene that is prepared, if anything."""
+        if scene is None:
+            self.ledger.note(SceneState(scene=item.name, state="empty"))
+            self._expect(item.name, 0)
+            return None
+        if isinstance(scene, BaseException):
+            self._fail(item.name, scene)
+            return None
+        judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
+        self.ledger.note(judging.state("open"))
+        if not judging.left:
+            self._finish(judging, crew)
+            return None
+        judging.begin()
+        self._expect(item.name, judging.mine)
+        self.judging[item.name] = judging
+        if judging.known:
+            self.pace.skip(judging.known, note=self._note())
+        request = self.request
+        factory = self.make_judge(
+            scene, request.station, request.engine, request.mode, request.motion
+        )
+        return Job(item.name, factory, judging.left)
 
     def _take(self, job: Job, id: str, verdict: Verdict, crew: SceneCrew) -> None:
-        judging = self.judging.get(job.key)
-        if judging is None:
-            return  # of a scene that has failed
-        failure = build_failure(verdict)
-        if failure is not None:
-            judging.close()
-            del self.judging[job.key]
-            self._fail(job.key, failure)
-            return
+        judging = self.judging[job.key]
         judging.take(id, verdict)
         self.judged += 1
         self.pace.step(outcome=verdict.outcome, note=self._note())
         if judging.is_done:
-            judging.close()
             del self.judging[job.key]
             self._finish(judging, crew)
         elif judging.is_worth_a_part():
             crew.take(job.key)
 
+    def _give_up(self, failed: JobFailed) -> None:
+        """A scene whose judge cannot be built, for example."""
+        self.judging.pop(failed.job.key).close()
+        self._fail(failed.job.key, failed.error)
+
     def _finish(self, judging: SceneJudging, crew: SceneCrew) -> None:
         self.ledger.note(judging.state("done"))
         crew.finish(judging.name)
 
-    def _fail(self, name: str, why: str) -> None:
+    def _fail(self, name: str, error: BaseException) -> None:
+        why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"
         self.ledger.note(SceneState(scene=name, state="failed", why=why))
+        self._expect(name, 0)
+
+    def _found(self) -> Counter[Outcome]:
+        """Grasps that were judged before, by outcome."""
+        if not self.ledger.states:
+            return Counter()
+        codes, texts = self.campaign.rows(["outcome"]).codes("outcome")
+        counts = np.bincount(codes, minlength=len(texts)).tolist()
+        return Counter({Outcome(text): n for text, n in zip(texts, counts, strict=True)})
+
+    def _expect(self, name: str, grasps: int) -> None:
+        self.expected[name] = grasps
+        self.pace.expect(sum(self.expected.values()))
 
     def _note(self) -> str:
         done = sum(s.state != "open" for s in self.ledger.states.values())

@@ -34,21 +34,30 @@ class SceneCrew:
         self._preparer, self._keeping = preparer, keeping
         self._count = preparers(workers)
         self._ahead: Ahead[Prepare] | None = None
+        self._work: Iterator[Prepare] = iter(())
         self._side = SideProcess(MODULE, keeping) if self._count else None
         self._here = Finisher(keeping)
         self._used = False
         self._failed: list[Finish | Close] = []
 
-    def prepared(
-        self, work: Iterable[Prepare]
-    ) -> Iterator[tuple[Prepare, Scene | BaseException | None]]:
-        """Scenes whose runs have been begun, or why they cannot be; None without grasps."""
-        if not self._count:
-            for item in work:
-                yield item, self._prepared_here(item)
-            return
-        self._ahead = Ahead(work, MODULE, self._preparer.request, self._count)
-        yield from self._ahead
+    def prepare(self, work: Iterable[Prepare]) -> None:
+        """Says which scenes are to be prepared, in order."""
+        self._work = iter(work)
+        if self._count:
+            self._ahead = Ahead(self._work, MODULE, self._preparer.request, self._count)
+
+    def ready(self) -> bool:
+        """Whether `prepared` returns at once."""
+        return self._ahead is None or self._ahead.ready()
+
+    def prepared(self) -> tuple[Prepare, Scene | BaseException | None] | None:
+        """The next scene whose run has been begun, or why it cannot be; without grasps its result
+        is None. None when there are no more scenes."""
+        if self._ahead is not None:
+            return self._ahead.take()
+        for item in self._work:
+            return item, self._prepared_here(item)
+        return None
 
     def finish(self, name: str) -> None:
         """Has table, report and rows of a judged scene written."""

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.core.errors import BurgError, SimulationError
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
-from burg_drake.evaluation.judge import Decide, Decision, Judge, Screen, Verdict
+from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.ledger import SceneState
 from burg_drake.evaluation.part_writer import PART_ROWS
 from burg_drake.evaluation.preparation import open_grasps
 from burg_drake.evaluation.request import Request
 from burg_drake.evaluation.run_document import Stretch, begun_now
 from burg_drake.evaluation.run_store import REPORT_FILE, Run, load_run, save_run
-
-UNBUILDABLE = "the simulation of the scene cannot be built: "
 
 
 class SceneJudging:
@@ -29,7 +26,8 @@ class SceneJudging:
     Attributes:
         name: in the run.
         left: grasps that had no verdict when it was opened.
-        known: how many had one.
+        mine: how many grasps are judged here.
+        known: how many of them had one.
     """
 
     def __init__(self, name: str, folder: Path, request: Request, workers: int) -> None:
@@ -43,8 +41,8 @@ class SceneJudging:
         self._journal: Journal | None = Journal(folder / JOURNAL_FILE)
         self.left: Sequence[Candidate] = open_grasps(self._run, retry_failed=request.retry_failed)
         again = {grasp.id for grasp in self.left}
-        self._mine = len(self._run.mine)
-        self.known = self._mine - len(self.left)
+        self.mine = len(self._run.mine)
+        self.known = self.mine - len(self.left)
         # verdicts are not kept: a thousand runs have a million
         self._failed = {
             id: v.interrupted
@@ -100,7 +98,7 @@ class SceneJudging:
             state=state,
             run=document.hash,
             grasps=self._count,
-            mine=self._mine,
+            mine=self.mine,
             sampling=document.grasps.cpu,
             size=journal.stat().st_size if state == "done" else 0,
             failed=len(self._failed) if state == "done" else 0,
@@ -122,51 +120,3 @@ def is_finished(folder: Path, size: int, table: str) -> bool:
         return False
     newer = all(other.st_mtime_ns >= journal.st_mtime_ns for other in others)
     return journal.st_size == size and newer
-
-
-@dataclass(frozen=True)
-class TolerantFactory:
-    """Builds a judge; where that fails, one whose verdicts say so, so that the others go on.
-
-    Attributes:
-        make_judge: builds it.
-    """
-
-    make_judge: Callable[[], Judge]
-
-    def __call__(self) -> Judge:
-        try:
-            return self.make_judge()
-        except BurgError as error:
-            return _Unbuildable(str(error))
-        except Exception as error:
-            return _Unbuildable(f"{type(error).__name__}: {error}")
-
-
-@dataclass(frozen=True)
-class _Unbuildable:
-    """A judge that cannot judge.
-
-    Attributes:
-        why: it could not be built.
-    """
-
-    why: str
-
-    @property
-    def screens(self) -> Sequence[Screen]:
-        return ()
-
-    @property
-    def stages(self) -> Sequence[tuple[Stage, Decide]]:
-        return ((Stage.CLEAR, self._refuse),)
-
-    def _refuse(self, grasp: Candidate, motion: object) -> Decision:
-        raise SimulationError(UNBUILDABLE + self.why)
-
-
-def build_failure(verdict: Verdict) -> str | None:
-    """Why the judge of a scene could not be built, if a verdict says so."""
-    if verdict.outcome is not Outcome.SIMULATION_FAILED or UNBUILDABLE not in verdict.reason:
-        return None
-    return UNBUILDABLE + verdict.reason.partition(UNBUILDABLE)[2]
