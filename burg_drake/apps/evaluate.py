@@ -25,6 +25,7 @@ from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, re
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
+    from burg_drake.evaluation.summary import Summary
 
 DEFAULT_OUTPUT = "runs"
 DEFAULT_GRASPS = 100
@@ -171,11 +172,13 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def print_summary(run: Run) -> None:
-    """Prints the tables of a run."""
+def print_summary(run: Run) -> Summary:
+    """Prints the tables of a run; returns what they show."""
     from rich.console import Console
 
     from burg_drake.evaluation.summary import summarize
     from burg_drake.evaluation.summary_tables import summary_view
 
-    Console().print(summary_view(summarize(run)))
+    summary = summarize(run)
+    Console().print(summary_view(summary))
+    return summary

@@ -35,7 +35,7 @@ from burg_drake.evaluation.campaign_document import (
 )
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.ledger import Ledger, SceneState
+from burg_drake.evaluation.ledger import LEDGER_FILE, Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.part_file import require_arrow
 from burg_drake.evaluation.request import Request, command, given_content
@@ -90,7 +90,20 @@ def evaluate_scenes(
         if before is None or document != before.document:
             save_campaign(campaign)
         call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
-        return call.run()
+        judged = call.run()
+        write_report_if_old(judged)
+        return judged
+
+
+def write_report_if_old(campaign: Campaign) -> None:
+    """Writes the report of all scenes, unless it is as new as what is known of them."""
+    from burg_drake.evaluation.report import write_campaign_report
+
+    known = campaign.path / LEDGER_FILE
+    since = known.stat().st_mtime_ns if known.exists() else 0
+    report = campaign.report_path
+    if not report.exists() or report.stat().st_mtime_ns < since:
+        write_campaign_report(campaign)
 
 
 def _document(scenes: Scenes, request: Request) -> CampaignDocument:

@@ -91,7 +91,7 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
     if campaign.document.shard:
         parts.append(f"This is share {campaign.document.shard} of a run; others have the rest.")
     if not campaign.complete:
-        judged, expected = count(summary.total.judged), count(campaign.expected)
+        judged, expected = count(summary.total.judged), count(sum(campaign.expected.values()))
         parts.append(
             f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
             " goes on with it."

@@ -123,7 +123,13 @@ def grasp_drawing(name: str, solid: Solid, X_SO: Array, grasps: DrawnGrasps) -> 
         ((lifted, "lifted", counts[0]), (~lifted, "not lifted", counts[1]))
     ):
         panel = (
-            element("text", f"{text}: {count or 'none'}", x=PANEL / 2, y=15, class_="panel"),
+            element(
+                "text",
+                f"{text}: {f'{count:,}' if count else 'none'}",
+                x=PANEL / 2,
+                y=15,
+                class_="panel",
+            ),
             element(
                 "g",
                 behind,
