@@ -19,8 +19,10 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    compare,
     evaluate,
     frames,
+    gap,
     grasps,
     hand,
     library,
@@ -33,6 +35,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -54,8 +57,11 @@ VERBS = (
     reach,
     evaluate,
     robustness,
+    gap,
     replay,
     report,
+    trials,
+    compare,
     station,
     hand,
     frames,

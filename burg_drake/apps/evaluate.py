@@ -17,6 +17,7 @@ from burg_drake.apps.arguments import (
     add_verb,
     workers,
 )
+from burg_drake.apps.cluster_option import add_cluster, chosen_cluster
 from burg_drake.apps.evaluate_many import evaluate_many
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.motion_options import add_motion, chosen_motion, require_standoff_of_arm
@@ -48,6 +49,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --station panda_shelf --least-lift-mm 20",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
+        "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
@@ -78,9 +80,11 @@ def add_to(verbs: Any) -> None:
         default=DEFAULT_ENGINE,
         help="how time is stepped: for truth, for results, for a first look (default: %(default)s)",
     )
-    parser.add_argument(
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
+    add_cluster(who)
     parser.add_argument(
         "--table",
         choices=("csv", "parquet"),
@@ -122,7 +126,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     require_sampled(arguments)
     references = scene_references(arguments.scenes)
     if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
-        return evaluate_many(arguments, references)
+        with chosen_cluster(arguments) as executor:
+            return evaluate_many(arguments, references, executor=executor)
     scene = load_scene(references[0])
     station = load_station(arguments.station)
     mode = mode_for(station, arguments.mode)
@@ -135,25 +140,27 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         require_sound_scene(scene, station)
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
-    run = evaluate(
-        scene,
-        station,
-        arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-        grasps_per_object=grasps_per_object(arguments),
-        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-        blind=arguments.blind,
-        only=arguments.only,
-        grasps=given.by_instance if given else None,
-        engine=arguments.engine,
-        seed=arguments.seed,
-        workers=arguments.workers,
-        shard=arguments.shard,
-        table=arguments.table,
-        mode=mode,
-        motion=motion,
-        retry_failed=arguments.retry_failed,
-        progress=not arguments.quiet,
-    )
+    with chosen_cluster(arguments) as executor:
+        run = evaluate(
+            scene,
+            station,
+            arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
+            grasps_per_object=grasps_per_object(arguments),
+            approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+            blind=arguments.blind,
+            only=arguments.only,
+            grasps=given.by_instance if given else None,
+            engine=arguments.engine,
+            seed=arguments.seed,
+            workers=arguments.workers,
+            executor=executor,
+            shard=arguments.shard,
+            table=arguments.table,
+            mode=mode,
+            motion=motion,
+            retry_failed=arguments.retry_failed,
+            progress=not arguments.quiet,
+        )
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; burg-drake merge unites all of them")

@@ -18,6 +18,7 @@ from burg_drake.core.errors import InvalidInputError, listing
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.campaign import Campaign
+    from burg_drake.evaluation.executor import Executor
     from burg_drake.evaluation.request import Given
     from burg_drake.evaluation.summary import Summary
     from burg_drake.scene.scene import Scene
@@ -27,13 +28,15 @@ SHOWN = 20
 """So many scenes have a row of their own."""
 
 
-def evaluate_many(arguments: argparse.Namespace, references: Sequence[str], **who: Any) -> int:
+def evaluate_many(
+    arguments: argparse.Namespace, references: Sequence[str], executor: Executor | None = None
+) -> int:
     """Evaluates; 1 if scenes could not be judged, or grasps not be simulated.
 
     Args:
         arguments: of the verb.
         references: the scenes.
-        who: further arguments of `evaluate`, such as an executor.
+        executor: judges in place of processes of this machine.
     """
     from burg_drake.evaluation.cascade import evaluate
     from burg_drake.evaluation.mode import mode_for
@@ -59,13 +62,13 @@ def evaluate_many(arguments: argparse.Namespace, references: Sequence[str], **wh
         engine=arguments.engine,
         seed=arguments.seed,
         workers=arguments.workers,
+        executor=executor,
         shard=arguments.shard,
         table=arguments.table,
         mode=mode,
         motion=motion,
         retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
-        **who,
     )
     print_campaign(campaign)
     if motion != GraspMotion():

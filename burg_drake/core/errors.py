@@ -65,6 +65,10 @@ class WorkerEnded(SimulationError):
     """A worker process was ended from outside, through no fault of its work."""
 
 
+class ClusterError(BurgError, RuntimeError):
+    """A cluster that cannot be reached, is lost, or has workers that must not be used."""
+
+
 def quoted(value: object) -> str:
     """A value from outside as a message repeats it: in quotes if it is a text, never long.
 

@@ -13,11 +13,11 @@ Z_95 = 1.959963984540054
 """Quantile of the normal distribution that leaves 2.5 % on either side."""
 
 
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
+def wilson_interval(successes: float, trials: float, z: float = Z_95) -> tuple[float, float]:
     """Wilson's score interval for a proportion (E. B. Wilson, JASA 22, 1927).
 
     Args:
-        successes, trials: counts.
+        successes, trials: counts, or effective ones of weighted trials.
         z: quantile of the normal distribution; 95 % by default.
 
     Returns:

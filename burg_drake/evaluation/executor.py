@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.processes import default_workers
@@ -30,14 +30,13 @@ class Executor(Protocol):
         ...
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """Judges all grasps of all jobs.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work. An executor with an
-                attribute `polls` that is True may get None: no job is ready yet, and there are
-                others to work on.
+            jobs: asked for one after the other, when workers run out of work. None says that no
+                job is ready yet, and that there are others to work on meanwhile.
             on_failure: told of a job that cannot be done, such as one whose judge cannot be built;
                 no more verdicts come for it, and the other jobs go on. If None, its error is
                 raised.
@@ -59,10 +58,8 @@ class LocalExecutor:
     Attributes:
         workers: their number.
         limits: what they may take.
-        polls: see `Executor.judge`.
     """
 
-    polls: ClassVar[bool] = True
     workers: int
     limits: Limits = field(default_factory=Limits)
 

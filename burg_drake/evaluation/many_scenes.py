@@ -199,9 +199,8 @@ class _Call:
         crew.prepare(
             Prepare(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
         )
-        polls = getattr(self.executor, "polls", False)
         while True:
-            if polls and self.judging and not crew.ready():
+            if self.judging and not crew.ready():
                 yield None
                 continue
             prepared = crew.prepared()

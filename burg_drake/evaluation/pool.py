@@ -53,6 +53,7 @@ class Pool:
         limits: what they may take.
         workers: by their connection.
         jobs: those under way.
+        stopped: whether it was told to stop.
         deadly: ids of grasps whose outcome is that they end their workers, in the order in which
             they came up.
     """
@@ -63,6 +64,7 @@ class Pool:
         self.workers: dict[object, WorkerProcess] = {}
         self.jobs: list[OpenJob] = []
         self.deadly: list[str] = []
+        self.stopped = False
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
 
@@ -73,7 +75,7 @@ class Pool:
         the end stay, for another call; whatever else ends it, ends them."""
         self._coming, self._on_failure = iter(jobs), on_failure
         try:
-            while True:
+            while not self.stopped:
                 self.employ()
                 if not any(worker.busy for worker in self.workers.values()):
                     break
@@ -85,6 +87,8 @@ class Pool:
                         yield from self.bury(worker)
                     else:
                         yield from self.hear(worker, message)
+                if self.stopped:
+                    raise SimulationError("the workers were ended")
         except BaseException:
             self.kill()
             raise
@@ -126,6 +130,8 @@ class Pool:
 
     def hire(self, job: OpenJob, first: Task | None = None) -> None:
         """Starts a worker for a job, with work that is kept for it if any."""
+        if self.stopped:
+            raise SimulationError("the workers were ended")
         worker = start(self.limits)
         self.workers[worker.connection] = worker
         worker.first = first
@@ -220,6 +226,12 @@ class Pool:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 worker.process.wait(FAREWELL)
         self.kill()
+
+    def stop(self) -> None:
+        """Ends all workers, and with them `run` in another thread."""
+        self.stopped = True
+        for worker in list(self.workers.values()):
+            worker.process.kill()
 
     def kill(self) -> None:
         """Ends all workers at once."""

@@ -1,0 +1,1 @@
+"""Judging on other machines: scenes and stations that travel, workers of Dask, and their driver."""

@@ -1,0 +1,181 @@
+"""Judges jobs on a cluster of Dask."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Callable, Generator, Iterable, Iterator
+from typing import Any
+
+from burg_drake.core.errors import ClusterError, MissingDependencyError
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
+from burg_drake.evaluation.job import Job, OnFailure
+from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.limits import Limits
+
+REACH = 5.0
+"""Time in which a scheduler has to be reached [s]."""
+
+
+class DaskExecutor:
+    """The workers of a cluster; see `executor.Executor`.
+
+    Attributes:
+        client: of `distributed`.
+        limits: what the workers' children may take.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        limits: Limits | None = None,
+        tend: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Uses a cluster that one is connected to.
+
+        Args:
+            client: a `distributed.Client`; what it is connected to has to be safe, see
+                `require_safe`.
+            limits: the usual ones if None.
+            tend: called from time to time while grasps are judged.
+
+        Raises:
+            ClusterError: the connection is not encrypted and goes beyond this machine.
+        """
+        address = client.scheduler.address if client.scheduler is not None else ""
+        if not address.startswith("inproc://"):
+            require_safe(address)
+        self.client = client
+        self.limits = limits or Limits()
+        self._tend = tend
+
+    @property
+    def workers(self) -> int:
+        """Number of children that judge at a time, as the cluster is now."""
+        from burg_drake.evaluation.cluster.crew import threads_by_address
+
+        return sum(threads_by_address(self.client).values())
+
+    def judge(
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
+    ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
+        """See `executor.Executor.judge`.
+
+        Raises:
+            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+        """
+        from burg_drake.evaluation.cluster.dispatch import Dispatch
+
+        yield from Dispatch(self.client, self.limits, self._tend).run(jobs, on_failure)
+
+
+@contextlib.contextmanager
+def connect(cluster: str, limits: Limits | None = None) -> Iterator[DaskExecutor]:
+    """An executor on a cluster, until the block is left.
+
+    Args:
+        cluster: `local:4` starts four workers on this machine; `tls://HOST:PORT` is a scheduler
+            that runs; else the path of a cluster file, see `document.ClusterDocument`.
+        limits: what the workers' children may take; the usual ones if None.
+
+    Raises:
+        MissingDependencyError: Dask is not installed.
+        ClusterError: no scheduler is reached, or it is not safe.
+        BurgError: see `read_cluster`.
+    """
+    asked = read_cluster(cluster)
+    try:
+        import dask
+        import distributed
+    except ImportError as error:
+        raise MissingDependencyError(
+            "a cluster needs Dask: pip install burg-drake[dask]"
+        ) from error
+    quiet = dask.config.set({"distributed.comm.timeouts.connect": f"{REACH:g}s"})
+    with quiet, _without_its_log(), contextlib.ExitStack() as stack:
+        tend: Callable[[], None] = lambda: None  # noqa: E731
+        where: Any
+        security = _security(distributed, asked)
+        if asked.local:
+            from burg_drake.evaluation.cluster.local_nodes import LocalNodes
+
+            nodes = LocalNodes(asked.local)
+            stack.callback(nodes.close)
+            where, tend = nodes.address, nodes.mend
+        elif asked.document is not None and asked.document.jobqueue is not None:
+            from burg_drake.evaluation.cluster.jobqueue import start_jobqueue
+
+            where = stack.enter_context(start_jobqueue(asked, security))
+            security = where.security
+        else:
+            assert asked.document is not None
+            where = asked.document.address
+        client = _client(distributed, where, security)
+        stack.callback(_leave, client)
+        yield DaskExecutor(client, limits, tend)
+
+
+def _client(distributed: Any, where: Any, security: Any) -> Any:
+    try:
+        return distributed.Client(where, timeout=REACH, security=security, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, RuntimeError, TypeError) as error:
+        raise ClusterError(
+            f"no scheduler of Dask is reached at {where} within {REACH:.0f} s: {_reason(error)}"
+        ) from error
+
+
+def _reason(error: BaseException) -> str:
+    """The innermost cause, in one line."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _leave(client: Any) -> None:
+    with contextlib.suppress(Exception):  # of a scheduler that is gone
+        client.close(timeout=REACH)
+
+
+def _security(distributed: Any, cluster: Cluster) -> Any:
+    """TLS of the files that the cluster file names, or else of Dask's configuration."""
+    document, files = cluster.document, cluster.tls
+    if document is None or (document.jobqueue is not None and files is None):
+        return None
+    if files is not None:
+        return _of_files(distributed, files)
+    if document.address.startswith("tls://"):
+        security = distributed.Security(require_encryption=True)
+        if security.tls_ca_file is None:
+            raise ClusterError(
+                f"{document.address} asks for certificates: name them in a cluster.yaml by"
+                " tls: {ca: CA.pem, cert: CERT.pem, key: KEY.pem}, or in Dask's configuration by"
+                " distributed.comm.tls"
+            )
+        return security
+    return None
+
+
+def _of_files(distributed: Any, files: TlsFiles) -> Any:
+    return distributed.Security(
+        tls_ca_file=files.ca,
+        tls_client_cert=files.cert,
+        tls_client_key=files.key,
+        tls_scheduler_cert=files.cert,
+        tls_scheduler_key=files.key,
+        tls_worker_cert=files.cert,
+        tls_worker_key=files.key,
+        require_encryption=True,
+    )
+
+
+@contextlib.contextmanager
+def _without_its_log() -> Iterator[None]:
+    """What Dask would say of lost connections is said by our errors, in one line."""
+    log = logging.getLogger("distributed")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)

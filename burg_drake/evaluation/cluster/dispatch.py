@@ -1,0 +1,268 @@
+"""Hands the grasps of jobs out to the workers of a cluster and collects what becomes of them.
+
+The driver decides who does what: each chunk is for one worker, and Dask only carries it there. So
+a worker that is lost takes nothing along but the chunk that it was at. As long as it may be the
+machine that failed, no grasp is blamed: the grasps of that chunk travel again, one by one.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+import uuid
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
+from typing import Any
+
+from distributed import KilledWorker
+
+from burg_drake.core.errors import BurgError, ClusterError, SimulationError
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.cluster.crew import Crew, Hand, lost_scheduler
+from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, deliver, judge_chunk
+from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
+from burg_drake.evaluation.job import Job, JobFailed, OnFailure
+from burg_drake.evaluation.judge import Verdict, one_line
+from burg_drake.evaluation.limits import Limits
+from burg_drake.evaluation.pool import Answer
+
+LOOK = 1.0
+"""Between two looks for new and lost workers [s]."""
+FETCH = 10.0
+"""Time in which a result that is there has to come [s]."""
+PATIENCE = 600.0
+"""So long the run waits without any worker: a batch system may have none free [s]."""
+
+
+class Dispatch:
+    """Jobs under way on a cluster.
+
+    Attributes:
+        client: of Dask.
+        limits: of the workers' children.
+        crew: the workers.
+        jobs: those under way.
+    """
+
+    def __init__(self, client: Any, limits: Limits, tend: Callable[[], None]) -> None:
+        self.client = client
+        self.limits = limits
+        self._tend = tend
+        self.crew = Crew(client)
+        self.jobs: list[SentJob] = []
+        self._name = f"burg-drake-{uuid.uuid4().hex}"
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._sent: dict[Any, tuple[SentChunk, Hand]] = {}
+        self._coming: Iterator[Job | None] = iter(())
+        self._on_failure: OnFailure | None = None
+        self._seen = -LOOK
+        self._without = time.monotonic()
+
+    def run(
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None
+    ) -> Generator[Answer, None, None]:
+        """See `executor.Executor.judge`."""
+        self._coming, self._on_failure = iter(jobs), on_failure
+        self.crew.look()  # before anything is registered where other versions would not know it
+        self.client.register_plugin(Supervisor(self._name), name=self._name)
+        try:
+            while True:
+                if time.monotonic() > self._seen + LOOK:
+                    yield from self.look()
+                self.hand_out()
+                if not self._sent and not any(job.left for job in self.jobs):
+                    return
+                yield from self.collect()
+        finally:
+            self.end()
+
+    def look(self) -> Iterator[Answer]:
+        """Sees who is there."""
+        self._tend()
+        for hand in self.crew.look():
+            yield from self.lose(hand)
+        self._seen = time.monotonic()
+        if self.crew.hands:
+            self._without = self._seen
+        elif self._seen > self._without + PATIENCE:
+            raise ClusterError(
+                f"the scheduler at {self.client.scheduler.address} has had no worker for"
+                f" {PATIENCE / 60:.0f} minutes"
+            )
+
+    def hand_out(self) -> None:
+        """Gives every worker what it has room for; those with the least come first."""
+        while True:
+            hands = [hand for hand in self.crew.hands.values() if hand.room > 0]
+            for hand in hands:
+                hand.job = self.choose(hand)
+            hands = [hand for hand in hands if hand.job is not None]
+            if not hands:
+                return
+            least = min(hand.load for hand in hands)
+            for hand in hands:
+                if hand.load <= least and hand.job is not None and hand.job.left:
+                    self.send(hand.job.cut(max(1, self.crew.threads)), hand)
+
+    def choose(self, hand: Hand) -> SentJob | None:
+        """What a worker is to work on: its job, or the next one, or one that others are at."""
+        if hand.job is not None and hand.job.left:
+            return hand.job
+        for job in self._coming:
+            if job is None:  # none is ready yet
+                break
+            if job.candidates:
+                try:
+                    self.jobs.append(SentJob(job))
+                except BurgError as error:
+                    self._tell(JobFailed(job, error))
+                    continue
+                return self.jobs[-1]
+        self.jobs = [job for job in self.jobs if job.left or job.sent]
+        open_jobs = [job for job in self.jobs if job.left]
+        return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
+
+    def send(self, chunk: SentChunk, hand: Hand) -> None:
+        """Sends a chunk to a worker."""
+        packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
+        future = self.client.submit(
+            judge_chunk,
+            packed,
+            key=f"grasps-{uuid.uuid4().hex}",
+            pure=False,
+            retries=0,
+            workers=[hand.address],
+            allow_other_workers=False,
+        )
+        chunk.future = future
+        chunk.job.sent += 1
+        hand.chunks.append(chunk)
+        self._sent[future.key] = (chunk, hand)
+        future.add_done_callback(self._done.put)
+
+    def collect(self) -> Iterator[Answer]:
+        """Waits a while for what comes, and takes all that has come."""
+        try:
+            futures = [self._done.get(timeout=LOOK)]
+        except queue.Empty:
+            return
+        while not self._done.empty():
+            futures.append(self._done.get())
+        missing: dict[str, tuple[SentJob, list[str]]] = {}
+        for future in futures:
+            if future.key not in self._sent:
+                continue  # was taken back
+            chunk, hand = self._sent[future.key]
+            try:
+                answers: Answers = future.result(timeout=FETCH)
+            except KilledWorker:
+                self.forget(chunk, hand)
+                yield from self.doubt(chunk)
+                continue
+            except OSError:
+                self._refetch(future, hand)
+                continue
+            except CancelledError:  # by the loss of the scheduler, or by somebody else
+                answers = Answers(ended=True)
+            except Exception as error:
+                raise ClusterError(f"worker {hand.address}: {one_line(error)}") from error
+            self.forget(chunk, hand)
+            if answers.ended:
+                chunk.take_back()
+                self._seen = -LOOK
+            elif answers.missing:
+                chunk.take_back()
+                missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))[1].append(hand.address)
+            elif not chunk.job.failed:
+                yield from self.take(chunk, answers)
+        for job, addresses in missing.values():
+            self.deliver(job, addresses)
+
+    def take(self, chunk: SentChunk, answers: Answers) -> Iterator[Answer]:
+        """Passes the verdicts of a chunk on."""
+        job = chunk.job
+        judged = set()
+        for place, verdict in answers.verdicts:
+            judged.add(place)
+            yield job.job, chunk.grasps[place], verdict
+            job.crashes_in_a_row = job.crashes_in_a_row + 1 if place in answers.deadly else 0
+            if job.crashes_in_a_row >= self.limits.hopeless and not job.failed:
+                self.fail(
+                    job,
+                    SimulationError(
+                        f"{self.limits.hopeless} grasps in a row could not be simulated;"
+                        f" the last one: {verdict.reason}"
+                    ),
+                )
+        if answers.error is not None:
+            self.fail(job, answers.error)
+
+    def deliver(self, job: SentJob, addresses: list[str]) -> None:
+        """Sends the bundle of a job to workers that lack it."""
+        assert job.bundle is not None
+        there = [address for address in dict.fromkeys(addresses) if address in self.crew.hands]
+        told = self.client.run(
+            deliver, job.bundle.data, job.bundle.name, workers=there, on_error="return"
+        )
+        for address, error in told.items():
+            if isinstance(error, BurgError):
+                raise ClusterError(f"worker {address}: {error}")
+
+    def lose(self, hand: Hand) -> Iterator[Answer]:
+        """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
+        for k, chunk in enumerate(list(hand.chunks)):
+            self.forget(chunk, hand)
+            chunk.future.cancel()
+            if k < hand.threads:
+                yield from self.doubt(chunk)
+            else:
+                chunk.take_back()
+
+    def doubt(self, chunk: SentChunk) -> Iterator[Answer]:
+        """Deals with a chunk at which a worker was lost."""
+        grasp = chunk.suspect()
+        if grasp is not None:
+            reason = f"{LOSSES} workers of the cluster were lost at it, one after the other"
+            failed = Outcome.SIMULATION_FAILED
+            yield (
+                chunk.job.job,
+                grasp,
+                Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True),
+            )
+
+    def forget(self, chunk: SentChunk, hand: Hand) -> None:
+        """A worker does not have a chunk any more."""
+        del self._sent[chunk.future.key]
+        hand.chunks.remove(chunk)
+        chunk.job.sent -= 1
+
+    def fail(self, job: SentJob, error: BurgError) -> None:
+        """Gives a job up, and tells of it once."""
+        if not job.failed:
+            job.give_up()
+            self._tell(JobFailed(job.job, error))
+
+    def _tell(self, failure: JobFailed) -> None:
+        if self._on_failure is None:
+            raise failure.error
+        self._on_failure(failure)
+
+    def _refetch(self, future: Any, hand: Hand) -> None:
+        """A result did not come: the worker is lost, which a look will tell, or is busy."""
+        if self.client.status != "running":
+            raise lost_scheduler(self.client)
+        if hand.address in self.crew.hands:
+            self._done.put(future)
+        self._seen = -LOOK
+
+    def end(self) -> None:
+        """Ends the children of this run."""
+        futures = [chunk.future for chunk, _ in self._sent.values()]
+        self._sent.clear()
+        if self.client.status != "running":
+            return
+        try:
+            self.client.cancel(futures, force=True)
+            self.client.unregister_worker_plugin(self._name)
+        except OSError:
+            pass  # the scheduler is lost, and its workers end with it

@@ -1,0 +1,198 @@
+"""The cluster document: where a cluster of Dask is, or how a batch system is to start one."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from burg_drake.core.errors import ClusterError, FieldError, InvalidInputError, quoted
+from burg_drake.core.resources import resolve
+from burg_drake.core.schema import load_document
+
+LOCAL = re.compile(r"local:(\d{1,4})")
+ADDRESS = re.compile(r"(tls|tcp)://(\[[^\]]+\]|[^:/\s]+):(\d{1,5})")
+HOW_TLS = (
+    "start scheduler and workers with --protocol tls --tls-ca-file CA --tls-cert CERT --tls-key"
+    " KEY, and give a cluster.yaml with address: tls://HOST:PORT and tls: {ca, cert, key}"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TlsFiles:
+    """Files in PEM form, relative to the document.
+
+    Attributes:
+        ca: certificate of who has signed those of all machines.
+        cert, key: certificate and private key of this one.
+    """
+
+    ca: str
+    cert: str
+    key: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adapt:
+    """Between so many jobs of the batch system run, as there is work.
+
+    Attributes:
+        minimum, maximum: numbers of jobs.
+    """
+
+    minimum: int = 0
+    maximum: int
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.minimum <= self.maximum or self.maximum < 1:
+            raise InvalidInputError(
+                f"adapt from {self.minimum} to {self.maximum} jobs; minimum is at most maximum,"
+                " which is 1 or more"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobQueue:
+    """How a batch system starts workers, by dask-jobqueue.
+
+    Attributes:
+        kind: the batch system.
+        workers: workers in a job, each with one thread, one child and one processor.
+        memory: of a job, such as `16GB`.
+        walltime, queue, account, interface, local_directory, python, log_directory: as
+            dask-jobqueue has them; its own default if empty.
+        directives: more lines for the head of the job's script, without `#SBATCH` or `#PBS`.
+        prologue: commands before the workers start, such as those that activate an environment.
+        shared_directory: that all machines see, for certificates of passing use, if there are no
+            `tls` files.
+    """
+
+    kind: Literal["slurm", "pbs", "sge", "lsf", "htcondor", "oar", "moab"]
+    workers: int
+    memory: str
+    walltime: str = ""
+    queue: str = ""
+    account: str = ""
+    interface: str = ""
+    local_directory: str = ""
+    python: str = ""
+    log_directory: str = ""
+    directives: tuple[str, ...] = ()
+    prologue: tuple[str, ...] = ()
+    shared_directory: str = ""
+
+    def __post_init__(self) -> None:
+        if self.workers < 1:
+            raise FieldError(f"workers is {self.workers}; give 1 or more", "workers")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClusterDocument:
+    """Schema of a cluster file.
+
+    Attributes:
+        address: of a scheduler that runs, such as `tls://head:8786`.
+        tls: files that prove who is who.
+        jobqueue: a batch system that starts workers.
+        scale: number of its jobs.
+        adapt: their number as there is work, in place of `scale`.
+    """
+
+    version: int = 1
+    address: str = ""
+    tls: TlsFiles | None = None
+    jobqueue: JobQueue | None = None
+    scale: int | None = None
+    adapt: Adapt | None = None
+
+    def __post_init__(self) -> None:
+        if bool(self.address) == (self.jobqueue is not None):
+            raise InvalidInputError("give either address or jobqueue")
+        if self.jobqueue is None:
+            if self.scale is not None or self.adapt is not None:
+                raise InvalidInputError("scale and adapt are for a jobqueue")
+            require_safe(self.address)
+            return
+        if (self.scale is None) == (self.adapt is None):
+            raise InvalidInputError("give either scale or adapt with a jobqueue")
+        if self.scale is not None and self.scale < 1:
+            raise FieldError(f"scale is {self.scale}; give 1 or more", "scale")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """What `--cluster` names.
+
+    Attributes:
+        local: number of workers on this machine; 0 if the document says where they are.
+        document: the document; made of an address if that was given.
+        tls: paths of the document's files.
+    """
+
+    local: int = 0
+    document: ClusterDocument | None = None
+    tls: TlsFiles | None = None
+
+
+def read_cluster(text: str) -> Cluster:
+    """What a text after `--cluster` names.
+
+    Args:
+        text: `local:4`, the address of a scheduler, or the path of a cluster file.
+
+    Raises:
+        InvalidInputError: it is none of them.
+        ClusterError: an address that is not safe.
+        DocumentError: the file does not fit the schema.
+        UnknownNameError: there is no such file.
+    """
+    if found := LOCAL.fullmatch(text):
+        if int(found[1]) < 1:
+            raise InvalidInputError(f"{text} has no workers; give local:1 or more")
+        return Cluster(local=int(found[1]))
+    if "://" in text:
+        require_safe(text)
+        return Cluster(document=ClusterDocument(address=text))
+    if Path(text).suffix not in (".yaml", ".yml"):
+        raise InvalidInputError(
+            f"{quoted(text)} is no cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
+        )
+    path = resolve(text)
+    document = load_document(path, ClusterDocument)
+    tls = document.tls
+    if tls is not None:
+        found_files = {}
+        for name in ("ca", "cert", "key"):
+            file = resolve(getattr(tls, name), base=path.parent)
+            found_files[name] = str(file)
+        tls = TlsFiles(**found_files)
+    return Cluster(document=document, tls=tls)
+
+
+def require_safe(address: str) -> None:
+    """Refuses an address at which anybody could listen, or run code.
+
+    Raises:
+        InvalidInputError: it is no address.
+        ClusterError: plain TCP beyond this machine.
+    """
+    found = ADDRESS.fullmatch(address)
+    if found is None:
+        raise InvalidInputError(
+            f"{quoted(address)} is no address of a scheduler; write tls://HOST:PORT"
+        )
+    if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
+        raise ClusterError(
+            f"{address} is not encrypted, and whoever reaches its port runs code as you: {HOW_TLS}"
+        )
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,66 @@
+"""What has to be the same on all machines, so that they come to the same verdicts."""
+
+from __future__ import annotations
+
+import functools
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+import burg_drake
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import ClusterError
+
+PACKAGES = ("drake", "numpy", "scipy", "trimesh")
+"""Packages that decide about verdicts."""
+
+
+@functools.cache
+def software() -> dict[str, str]:
+    """Versions by name; of burg_drake also a hash of its code, as releases under way differ."""
+    found = {"python": platform.python_version(), "burg_drake": burg_drake.__version__}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:  # a Drake that was built from source has no metadata
+            found[name] = "unknown"
+    package = Path(burg_drake.__file__).parent
+    files = sorted(package.rglob("*.py"))
+    names = [file.relative_to(package).as_posix() for file in files]
+    found["code of burg_drake"] = content_hash(names, files)[:12]
+    return found
+
+
+def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> None:
+    """Refuses workers with other versions than ours.
+
+    Args:
+        workers: what `software` returned, by the worker's address; an error if it could not.
+
+    Raises:
+        ClusterError: names the first such worker, and how many there are.
+    """
+    ours = software()
+    refused = []
+    for address, theirs in workers.items():
+        if isinstance(theirs, BaseException):
+            refused.append(f"worker {address} cannot run burg_drake ({_words(theirs)})")
+            continue
+        other = [
+            f"{name} {theirs.get(name, 'none')} (here {version})"
+            for name, version in ours.items()
+            if theirs.get(name) != version
+        ]
+        if other:
+            refused.append(f"worker {address} has {', '.join(other)}")
+    if refused:
+        more = f", and {len(refused) - 1} more differ" if len(refused) > 1 else ""
+        raise ClusterError(
+            f"{refused[0]}{more}; verdicts are the same only with the same versions: install the"
+            " same environment on all machines"
+        )
+
+
+def _words(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
