@@ -26,7 +26,6 @@ from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, re
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
-    from burg_drake.evaluation.summary import Summary
 
 DEFAULT_OUTPUT = "runs"
 DEFAULT_GRASPS = 100
@@ -179,13 +178,11 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def print_summary(run: Run) -> Summary:
-    """Prints the tables of a run; returns what they show."""
+def print_summary(run: Run) -> None:
+    """Prints the tables of a run."""
     from rich.console import Console
 
     from burg_drake.evaluation.summary import summarize
     from burg_drake.evaluation.summary_tables import summary_view
 
-    summary = summarize(run)
-    Console().print(summary_view(summary))
-    return summary
+    Console().print(summary_view(summarize(run)))

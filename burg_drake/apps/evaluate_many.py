@@ -76,8 +76,8 @@ def evaluate_many(
     return how_it_ended(campaign)
 
 
-def print_campaign(campaign: Campaign) -> Summary:
-    """Prints the tables of a run over many scenes, and where what is; returns what they show."""
+def print_campaign(campaign: Campaign) -> None:
+    """Prints the tables of a run over many scenes, and where what is."""
     from rich.console import Console
 
     from burg_drake.evaluation.part_store import PARTS_FOLDER
@@ -93,7 +93,6 @@ def print_campaign(campaign: Campaign) -> Summary:
     print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
     if campaign.report_path.exists():
         print(f"report  {campaign.report_path}")
-    return summary
 
 
 def how_it_ended(campaign: Campaign) -> int:

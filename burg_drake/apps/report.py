@@ -29,21 +29,19 @@ def add_to(verbs: Any) -> None:
 def run_report(arguments: argparse.Namespace) -> int:
     """Prints the tables of a run, of one scene or of many, and writes its report."""
     from burg_drake.apps.evaluate import print_summary
-    from burg_drake.apps.evaluate_many import print_campaign
+    from burg_drake.apps.evaluate_many import how_it_ended, print_campaign
     from burg_drake.evaluation.campaign import Campaign
     from burg_drake.evaluation.report import write_campaign_report, write_report
     from burg_drake.evaluation.results import open_results
 
-    found = open_results(arguments.run_folder)
-    if isinstance(found, Campaign):
-        write_campaign_report(found)
-        judged = print_campaign(found).total.judged
-        expected = sum(found.expected.values())
-    else:
-        write_report(found)
-        judged = print_summary(found).total.judged
-        expected = len(found.mine)
-        print(f"report  {found.report_path}")
-    if not found.complete:
-        print(f"{judged} of {expected} grasps are judged; evaluate goes on")
+    run = open_results(arguments.run_folder)
+    if isinstance(run, Campaign):
+        write_campaign_report(run)
+        print_campaign(run)
+        return how_it_ended(run)
+    write_report(run)
+    print_summary(run)
+    if not run.complete:
+        print(f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; evaluate goes on")
+    print(f"report  {run.report_path}")
     return 0

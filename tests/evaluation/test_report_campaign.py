@@ -208,7 +208,7 @@ def test_nothing_judged_and_shares_are_said(
     links = tuple(f"scenes/{n}/report.html" for n in campaign.names)
     root = read_page(campaign_page(empty), links)
     assert root.find("p", "lead")[0].text == "No grasp is judged yet."
-    assert "This is share 1/1 of a run" in root.find("p", "notice")[0].text
+    assert "This is shard 1 of 1" in root.find("p", "notice")[0].text
 
 
 def test_the_report_is_written_where_it_belongs(campaign: Campaign) -> None:
