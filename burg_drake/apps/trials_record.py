@@ -80,8 +80,9 @@ def _add_photo(group: Any) -> None:
 
 def run_record(arguments: argparse.Namespace) -> int:
     """Measures and records; 1 if the photo has no board."""
-    from burg_drake.experiment.trials.book import TrialBook, real_outcome
+    from burg_drake.experiment.trials.book import TrialBook
     from burg_drake.experiment.trials.evidence import keep_evidence, object_places
+    from burg_drake.experiment.trials.given_entry import real_outcome
 
     _require_sense(arguments)
     if arguments.outcome is not None:
