@@ -240,6 +240,8 @@ def test_texts_as_numbers() -> None:
     assert Factor.of(np.array([], dtype=str)).names == ()
     coded = Factor.of_codes(np.array([1, -1, 0]), ["mug", "box"])
     assert [coded[k] for k in range(3)] == ["box", "", "mug"]
+    assert Factor.of_codes(np.array([1, 0]), ["mug", "box"]).names == ("box", "mug")
+    assert Factor.of_codes(np.array([], dtype=int), []).names == ()
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -67,8 +67,11 @@ class Factor:
     @classmethod
     def of_codes(cls, codes: Rows, names: Sequence[str]) -> Factor:
         """From (N,) numbers and the texts that they stand for; -1 stands for an empty one."""
+        empty = codes < 0
+        if not empty.any():
+            return cls._sorted(np.array(names, dtype=np.str_), codes)
         known = list(names) if "" in names else [*names, ""]
-        return cls._sorted(np.array(known), np.where(codes < 0, known.index(""), codes))
+        return cls._sorted(np.array(known), np.where(empty, known.index(""), codes))
 
     @classmethod
     def _sorted(cls, names: NDArray[np.str_], index: Rows) -> Factor:
