@@ -126,7 +126,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     """Judges step by step and reports; 1 if some grasps could not be simulated."""
     from burg_drake.core.files import atomic_write
     from burg_drake.evaluation.run_store import RUN_FILE, load_run
-    from burg_drake.experiment.gap.changes import changes
+    from burg_drake.experiment.gap.changes import gap_changes
     from burg_drake.experiment.gap.report.page import REPORT_FILE, write_gap_report
     from burg_drake.experiment.gap.report.story import story
     from burg_drake.experiment.gap.report.tables import gap_json, reality_view, steps_view
@@ -141,7 +141,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     success = "lifted" if sheet is None else sheet.selection.success
     tried = [] if sheet is None else tried_grasps(sheet, ladder.first.document.scene.content)
     agreement = agreement_by_step(ladder, tried, success) if tried else ()
-    found = changes(ladder, success)
+    found = gap_changes(ladder, success)
     line = shlex.join(["burg-drake", *sys.argv[1:]])
     write_gap_report(ladder, success, agreement, line)
     text = json.dumps(gap_json(ladder, found, agreement, success), indent=1) + "\n"

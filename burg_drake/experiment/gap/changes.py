@@ -84,7 +84,7 @@ class Change:
         return Counter(move.blocker for move in self.lost if move.blocker)
 
 
-def changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
+def gap_changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
     """What each step but the first changes.
 
     Args:

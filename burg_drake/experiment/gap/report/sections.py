@@ -63,7 +63,8 @@ def objects_section(ladder: Ladder, success: Success) -> Html:
         cells: list[Child] = [grasps]
         for step, counts in zip(ladder.steps, by_step, strict=True):
             good, all = counts.get(name, (0, 0))
-            cells.append(f"{good} of {all}" if step.name == "placed" else good)
+            share = f"{good} of {all}" if all else "-"
+            cells.append(share if step.name == "placed" else good)
         numbers = [element("td", cell, class_="number") for cell in cells]
         rows.append(element("tr", element("th", name, scope="row"), *numbers))
     return section(
