@@ -26,6 +26,7 @@ from burg_drake.apps import (
     grasps,
     hand,
     library,
+    merge,
     printout,
     reach,
     replay,
@@ -35,6 +36,7 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    status,
     trials,
 )
 from burg_drake.apps.arguments import Parser, examples
@@ -56,6 +58,8 @@ VERBS = (
     grasps,
     reach,
     evaluate,
+    status,
+    merge,
     robustness,
     gap,
     replay,

@@ -137,7 +137,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     of_run = (Path(arguments.source) / RUN_FILE).is_file()
     run = load_run(arguments.source) if of_run else None
     with chosen_cluster(arguments) as cluster:
-        ladder = _climb(arguments, run, sheet, cluster)
+        ladder = _measure(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
     tried = [] if sheet is None else tried_grasps(sheet, ladder.first.document.scene.content)
     agreement = agreement_by_step(ladder, tried, success) if tried else ()
@@ -161,7 +161,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     return _failures(ladder)
 
 
-def _climb(
+def _measure(
     arguments: argparse.Namespace,
     run: Run | None,
     sheet: TrialSheet | None,
@@ -169,7 +169,7 @@ def _climb(
 ) -> Ladder:
     from burg_drake.core.processes import default_workers
     from burg_drake.evaluation.executor import LocalExecutor
-    from burg_drake.experiment.gap.ladder import climb
+    from burg_drake.experiment.gap.ladder import measure_gap
     from burg_drake.experiment.gap.placement_noise import PlacementNoise
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station
@@ -191,14 +191,14 @@ def _climb(
     require_file(arguments)
     if run is not None:
         _require_own(arguments, run)
-        return climb(run, arguments.output, **options)
+        return measure_gap(run, arguments.output, **options)
     require_sampled(arguments)
     scene = load_scene(arguments.source)
     station = load_station(arguments.station or DEFAULT_STATION)
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
     for note in given.notes if given else ():
         print(f"note: {note}", file=sys.stderr)
-    return climb(
+    return measure_gap(
         scene,
         arguments.output,
         station=station,

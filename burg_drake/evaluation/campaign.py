@@ -22,6 +22,7 @@ from burg_drake.evaluation.campaign_document import CampaignDocument
 from burg_drake.evaluation.ledger import Ledger, SceneState
 from burg_drake.evaluation.part_store import Place, Rows, read_rows
 from burg_drake.evaluation.run_store import REPORT_FILE, RUN_FILE, Run, load_run
+from burg_drake.evaluation.shard import share
 from burg_drake.evaluation.table import Columns
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class Campaign:
         Raises:
             MissingDependencyError: pyarrow is not installed.
         """
-        return read_rows(self.path, self.places, names)
+        return read_rows(self.path, self.places, names, self.document.instances)
 
     def columns(self, names: Sequence[str] | None = None) -> Columns:
         """Columns of all judged grasps, scene by scene; see `evaluation.table`.
@@ -152,7 +153,7 @@ class Campaign:
             state = self.states.get(entry.name)
             chosen = [n for n, o in entry.instances.items() if not only or n in only or o in only]
             asked = range((document.grasps.per_object or 0) * len(chosen))
-            mine = asked if shard is None else asked[shard.number - 1 :: shard.count]
+            mine = share(asked, shard)
             found[entry.name] = len(mine) if state is None or state.why else state.mine
         return found
 

@@ -112,6 +112,8 @@ def journal_lines(
         place = stream.seek(begin)
         for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
             here, place = place, place + len(line)
+            if not line.endswith(b"\n"):  # torn, or too long: cut off when the run goes on
+                continue
             if end is not None and place > end:
                 return
             try:

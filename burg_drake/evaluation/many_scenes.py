@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.ledger import Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.part_file import require_arrow
+from burg_drake.evaluation.report.campaign import renew_report
 from burg_drake.evaluation.request import Request, command, given_content
 from burg_drake.evaluation.run_document import begun_now, input_of, software_versions
 from burg_drake.evaluation.scene_crew import SceneCrew
@@ -90,7 +91,9 @@ def evaluate_scenes(
         if before is None or document != before.document:
             save_campaign(campaign)
         call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
-        return call.run()
+        judged = call.run()
+        renew_report(judged)
+        return judged
 
 
 def _document(scenes: Scenes, request: Request) -> CampaignDocument:
@@ -165,11 +168,9 @@ class _Call:
         )
         begun = time.monotonic()
         try:
-            with (
-                closing(self._jobs(left, crew)) as jobs,
-                closing(self.executor.judge(jobs)) as all_,
-            ):
-                for job, candidate, verdict in all_:
+            jobs = cast(Iterable[Job], self._jobs(left, crew))  # None only where it is polled
+            with closing(self.executor.judge(jobs, self._give_up)) as answers:
+                for job, candidate, verdict in answers:
                     self._take(job, candidate.id, verdict, crew)
         finally:
             for judging in list(self.judging.values()):

@@ -32,6 +32,7 @@ from burg_drake.evaluation.part_file import (
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.segments import Segment, chain, whole_lines
 from burg_drake.evaluation.table import Columns
+from burg_drake.evaluation.trial import MOVED, PUSHED
 
 PARTS_FOLDER = "parts"
 
@@ -128,13 +129,19 @@ class Rows:
         return np.repeat(np.arange(len(self.counts)), self.counts)
 
 
-def read_rows(folder: Path, places: Sequence[Place], names: Sequence[str] | None) -> Rows:
+def read_rows(
+    folder: Path,
+    places: Sequence[Place],
+    names: Sequence[str] | None,
+    instances: Sequence[str] = (),
+) -> Rows:
     """Columns of the judged grasps of runs.
 
     Args:
         folder: that has the parts.
         places: the runs, in the order of their rows.
         names: of the columns; all if None. What a run does not have is null.
+        instances: names of the free objects of all runs, for which all have columns.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
@@ -142,7 +149,7 @@ def read_rows(folder: Path, places: Sequence[Place], names: Sequence[str] | None
     """
     index = PartIndex.of(folder)
     while True:
-        found = _read(index, places, names)
+        found = _read(index, places, names, instances)
         if isinstance(found, Rows):
             return found
         index.drop(found)
@@ -167,7 +174,12 @@ def united(tables: Sequence[Any]) -> Any:
     return table.take(order[last]) if len(order) else table
 
 
-def _read(index: PartIndex, places: Sequence[Place], names: Sequence[str] | None) -> Rows | Part:
+def _read(
+    index: PartIndex,
+    places: Sequence[Place],
+    names: Sequence[str] | None,
+    instances: Sequence[str],
+) -> Rows | Part:
     """The rows, or a part that is damaged."""
     arrow = require_arrow("reading the results of many grasps")
     segments = index.segments()
@@ -178,7 +190,8 @@ def _read(index: PartIndex, places: Sequence[Place], names: Sequence[str] | None
         found = chain([segment for segment, _, _ in mine], place.journal)
         where = {segment: (part, row, segment.rows) for segment, part, row in mine}
         pieces.append([where[segment] for segment in found])
-        tails.append(_tail(place, found[-1].end if found else 0))
+        tail = _tail(place, found[-1].end if found else 0)
+        tails.append(None if tail is None else with_instances(tail, instances))
     used = {part.path: part for piece in pieces for part, _, _ in piece}
     if names is None:
         names = _all_names(list(used.values()), tails)
@@ -224,3 +237,19 @@ def _all_names(parts: Sequence[Part], tails: Sequence[Any | None]) -> list[str]:
         names |= dict.fromkeys([] if tail is None else tail.column_names)
     names.pop(CANDIDATE, None)
     return list(names)
+
+
+def with_instances(table: Any, instances: Sequence[str]) -> Any:
+    """A table with columns for all instances, each kind where its first one is."""
+    if not instances:
+        return table
+    arrow = require_arrow("a columnar table")
+    columns: dict[str, Any] = {}
+    for name in table.column_names:
+        for prefix in (MOVED, PUSHED):
+            if name.startswith(prefix) and name.removeprefix(prefix) in instances:
+                for instance in instances:
+                    columns.setdefault(prefix + instance, None)
+        columns[name] = table.column(name)
+    rows = table.num_rows
+    return arrow.table({n: empty_column(n, rows) if c is None else c for n, c in columns.items()})

@@ -13,15 +13,19 @@ from burg_drake.evaluation.part_file import (
     CANDIDATE,
     Part,
     column_names,
-    empty_column,
     read_part,
     require_arrow,
     write_part,
 )
-from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex, Place, segment_table
+from burg_drake.evaluation.part_store import (
+    PARTS_FOLDER,
+    PartIndex,
+    Place,
+    segment_table,
+    with_instances,
+)
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.segments import Segment, chain, segment_of, whole_lines
-from burg_drake.evaluation.trial import MOVED, PUSHED
 
 PART_ROWS = 50_000
 """Rows of a part: few enough to be made in a second or two, enough that parts are few."""
@@ -73,7 +77,7 @@ class PartWriter:
             return
         table = segment_table(run or load_run(place.folder), begin, end)
         segment = segment_of(scene, place.journal, begin, end, table.num_rows)
-        self._pending.append((_with_all(table, self._instances), segment))
+        self._pending.append((with_instances(table, self._instances), segment))
         self._ends[scene] = end
         if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
             self.flush()
@@ -158,19 +162,3 @@ class PartWriter:
             for segment in kept if table is None else ():  # damaged: made again
                 self._ends[segment.scene] = min(self._ends[segment.scene], segment.begin)
             part.path.unlink(missing_ok=True)
-
-
-def _with_all(table: Any, instances: Sequence[str]) -> Any:
-    """A table with columns for all instances, each kind where its first one is."""
-    if not instances:
-        return table
-    arrow = require_arrow("a columnar table")
-    columns: dict[str, Any] = {}
-    for name in table.column_names:
-        for prefix in (MOVED, PUSHED):
-            if name.startswith(prefix) and name.removeprefix(prefix) in instances:
-                for instance in instances:
-                    columns.setdefault(prefix + instance, None)
-        columns[name] = table.column(name)
-    rows = table.num_rows
-    return arrow.table({n: empty_column(n, rows) if c is None else c for n, c in columns.items()})

@@ -32,7 +32,7 @@ from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.rows import best_rows, unknown_grasp
 from burg_drake.evaluation.run_document import RunDocument, origin_of
-from burg_drake.evaluation.shard import as_shard
+from burg_drake.evaluation.shard import share
 from burg_drake.evaluation.table import Columns, make_columns, table_row
 from burg_drake.evaluation.trial import Trial
 from burg_drake.objects.library import ObjectLibrary, load_library
@@ -80,9 +80,7 @@ class Run:
     @property
     def mine(self) -> list[str]:
         """Ids of the grasps that are judged here: all, or those of a shard."""
-        shard = as_shard(self.document.shard or None)
-        ids = self.candidates.id
-        return ids if shard is None else ids[shard.number - 1 :: shard.count]
+        return list(share(self.candidates.id, self.document.shard))
 
     @property
     def complete(self) -> bool:

@@ -7,10 +7,13 @@ talk to each other; `merge` unites what they find.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from burg_drake.core.errors import InvalidInputError, quoted
 
+Item = TypeVar("Item")
 MOST = 1_000_000
 
 
@@ -66,3 +69,9 @@ def as_shard(shard: Shard | str | None) -> Shard | None:
     """
     found = Shard.parse(shard) if isinstance(shard, str) else shard
     return None if found is None or found.count == 1 else found
+
+
+def share(items: Sequence[Item], shard: Shard | str | None) -> Sequence[Item]:
+    """What of some items is in a shard; all of them without one."""
+    found = as_shard(shard or None)
+    return items if found is None else items[found.number - 1 :: found.count]

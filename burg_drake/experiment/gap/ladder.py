@@ -116,7 +116,7 @@ class Ladder:
         return self.steps[0].runs[0]
 
 
-def climb(
+def measure_gap(
     source: Run | Scene | str | Path,
     out: str | Path,
     *,

@@ -22,7 +22,7 @@ from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import gap_changes
-from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, climb
+from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.experiment.gap.report.sections import push_section
 from burg_drake.experiment.gap.report.tables import gap_json
@@ -37,13 +37,13 @@ ASKED: dict[str, Any] = {"noise": NONE, "executor": LocalExecutor(1), "progress"
 def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Ladder:
     """The grasps of a run by the hand alone, and in a scene that is displaced by nothing."""
     out = tmp_path_factory.mktemp("gap") / "steps"
-    return climb(run, out, last="hand", samples=1, **ASKED)
+    return measure_gap(run, out, last="hand", samples=1, **ASKED)
 
 
 @pytest.fixture(scope="module")
 def ladder(run: Run, by_hand: Ladder) -> Ladder:
     """The same folder with one step more."""
-    found = climb(run, by_hand.path, last="reach", samples=0, **ASKED)
+    found = measure_gap(run, by_hand.path, last="reach", samples=0, **ASKED)
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
@@ -90,9 +90,9 @@ def test_the_page_and_the_figures_tell_the_same(
 
 def test_other_steps_are_refused(run: Run, ladder: Ladder) -> None:
     with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '.*' there"):
-        climb("tabletop_six", ladder.path, last="reach", **ASKED)
+        measure_gap("tabletop_six", ladder.path, last="reach", **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
-        climb(run, ladder.path, last="reach", progress=False)
+        measure_gap(run, ladder.path, last="reach", progress=False)
 
 
 def test_options_of_a_scene_are_refused_with_a_run(
