@@ -33,7 +33,7 @@ from burg_drake.core.errors import InvalidInputError
 if TYPE_CHECKING:
     from burg_drake.evaluation.executor import Executor
     from burg_drake.evaluation.run_store import Run
-    from burg_drake.experiment.gap.ladder import Ladder
+    from burg_drake.experiment.gap.steps import Ladder
     from burg_drake.experiment.trials.sheet import TrialSheet
 
 DEFAULT_GRASPS = 20

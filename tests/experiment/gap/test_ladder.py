@@ -22,10 +22,11 @@ from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import gap_changes
-from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, measure_gap
+from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.experiment.gap.report.sections import push_section
 from burg_drake.experiment.gap.report.tables import gap_json
+from burg_drake.experiment.gap.steps import Ladder, Step
 from burg_drake.experiment.gap.steps_reality import agreement_by_step
 from burg_drake.experiment.trials.sheet import RealTrial
 

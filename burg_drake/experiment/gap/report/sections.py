@@ -16,9 +16,9 @@ from burg_drake.evaluation.summary import PUSH, pushes
 from burg_drake.evaluation.trial import PUSHED
 from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
-from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
 from burg_drake.experiment.gap.report.story import TITLES, replay_command, words
+from burg_drake.experiment.gap.steps import Ladder
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
 
