@@ -178,7 +178,7 @@ class Watch:
             judged += tail.lines
             last = max(last, tail.modified)
         working = is_locked(campaign.path / LOCK_FILE)
-        total = max(judged, sum(campaign.expected.values()))
+        total = max(judged, campaign.expected)
         now = open_results(campaign.path)
         rate = self._rate(judged, now.document.stretches, working)
         mine = set(campaign.names)
