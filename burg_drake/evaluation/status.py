@@ -114,13 +114,15 @@ class _Tail:
         found = LINE.findall(data)
         self.lines += len(found)
         self.outcomes.update(outcome for _, outcome in found)
-        if self.failed:
-            for id, _ in found:
-                if id in self.failed:  # judged again
-                    self.failed.discard(id)
-                    self.outcomes[FAILED] -= 1
-                    self.lines -= 1
-        self.failed |= {id for id, outcome in found if outcome == FAILED}
+        if not self.failed and self.outcomes[FAILED] == 0:
+            return
+        for id, outcome in found:
+            if id in self.failed:  # judged again
+                self.failed.discard(id)
+                self.outcomes[FAILED] -= 1
+                self.lines -= 1
+            if outcome == FAILED:
+                self.failed.add(id)
 
 
 class Watch:
