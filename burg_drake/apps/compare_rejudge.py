@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import Parser, workers
+from burg_drake.apps.cluster_option import add_cluster, chosen_cluster
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -27,12 +28,14 @@ def add_rejudge(parser: Parser) -> None:
         " goes on from there (default: the name of the trials file and of the run, beside that"
         " file)",
     )
-    group.add_argument(
+    who = group.add_mutually_exclusive_group()
+    who.add_argument(
         "--workers",
         metavar="N",
         type=workers,
         help="with --rejudge, processes (default: one a processor)",
     )
+    add_cluster(who)
     group.add_argument("--quiet", action="store_true", help="with --rejudge, no progress")
 
 
@@ -62,15 +65,16 @@ def rejudge_for(arguments: argparse.Namespace) -> Rejudging | None:
 
     sheet, path = load_trials(trials), Path(trials)
     folder = arguments.rejudge or path.with_name(f"{path.stem}_rejudged_{Path(run).resolve().name}")
-    return rejudge(
-        sheet,
-        path,
-        folder,
-        runs=runs_for(sheet, load_runs(run)),
-        success=arguments.success,
-        executor=LocalExecutor(arguments.workers or default_workers()),
-        progress=not arguments.quiet,
-    )
+    with chosen_cluster(arguments) as cluster:
+        return rejudge(
+            sheet,
+            path,
+            folder,
+            runs=runs_for(sheet, load_runs(run)),
+            success=arguments.success,
+            executor=cluster or LocalExecutor(arguments.workers or default_workers()),
+            progress=not arguments.quiet,
+        )
 
 
 def rejudge_words(arguments: argparse.Namespace) -> list[str]:

@@ -23,6 +23,7 @@ from burg_drake.apps.arguments import (
     positive_int,
     workers,
 )
+from burg_drake.apps.cluster_option import add_cluster, chosen_cluster
 from burg_drake.apps.evaluate import MODES
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.motion_options import NAMES, add_motion, chosen_motion
@@ -30,6 +31,7 @@ from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, re
 from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation.executor import Executor
     from burg_drake.evaluation.run_store import Run
     from burg_drake.experiment.gap.ladder import Ladder
     from burg_drake.experiment.trials.sheet import TrialSheet
@@ -81,9 +83,11 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--engine", choices=ENGINE_NAMES, help=f"with a scene (default: {DEFAULT_ENGINE})"
     )
-    parser.add_argument(
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
+    add_cluster(who)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     add_motion(parser)
     add_quiet(parser)
@@ -132,7 +136,8 @@ def run_gap(arguments: argparse.Namespace) -> int:
     sheet = None if arguments.trials is None else load_trials(arguments.trials)
     of_run = (Path(arguments.source) / RUN_FILE).is_file()
     run = load_run(arguments.source) if of_run else None
-    ladder = _climb(arguments, run, sheet)
+    with chosen_cluster(arguments) as cluster:
+        ladder = _climb(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
     tried = [] if sheet is None else tried_grasps(sheet, ladder.first.document.scene.content)
     agreement = agreement_by_step(ladder, tried, success) if tried else ()
@@ -156,7 +161,14 @@ def run_gap(arguments: argparse.Namespace) -> int:
     return _failures(ladder)
 
 
-def _climb(arguments: argparse.Namespace, run: Run | None, sheet: TrialSheet | None) -> Ladder:
+def _climb(
+    arguments: argparse.Namespace,
+    run: Run | None,
+    sheet: TrialSheet | None,
+    cluster: Executor | None,
+) -> Ladder:
+    from burg_drake.core.processes import default_workers
+    from burg_drake.evaluation.executor import LocalExecutor
     from burg_drake.experiment.gap.ladder import climb
     from burg_drake.experiment.gap.placement_noise import PlacementNoise
     from burg_drake.scene.scene import load_scene
@@ -173,7 +185,7 @@ def _climb(arguments: argparse.Namespace, run: Run | None, sheet: TrialSheet | N
         "noise": noise,
         "samples": arguments.samples,
         "tried": tried,
-        "workers": arguments.workers,
+        "executor": cluster or LocalExecutor(arguments.workers or default_workers()),
         "progress": not arguments.quiet,
     }
     require_file(arguments)

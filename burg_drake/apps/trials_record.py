@@ -80,8 +80,9 @@ def _add_photo(group: Any) -> None:
 
 def run_record(arguments: argparse.Namespace) -> int:
     """Measures and records; 1 if the photo has no board."""
-    from burg_drake.experiment.trials.book import TrialBook, real_outcome
+    from burg_drake.experiment.trials.book import TrialBook
     from burg_drake.experiment.trials.evidence import keep_evidence, object_places
+    from burg_drake.experiment.trials.given_entry import real_outcome
 
     _require_sense(arguments)
     if arguments.outcome is not None:
@@ -100,6 +101,8 @@ def run_record(arguments: argparse.Namespace) -> int:
     if check is not None and found:
         entry["placement"] = object_places(check)
     recorded = book.record(trial.number, correct=arguments.correct, again=arguments.again, **entry)
+    if arguments.photo and not (arguments.intrinsics or arguments.placement):
+        print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
     if check is not None and not found:
         print(

@@ -103,7 +103,6 @@ def run_serve(arguments: argparse.Namespace) -> int:
         server.on_admitted = lambda peer: _tell(
             f"{peer} came in; for another browser: {server.url}"
         )
-        shelf.start()
         closing.callback(shelf.close)
         server.start()
         closing.callback(server.close)

@@ -30,6 +30,11 @@ def add_to(group: Any) -> None:
     )
     add_sheet(parser)
     parser.add_argument("--all", action="store_true", help="a line a trial as well")
+    parser.add_argument(
+        "--show-simulated",
+        action="store_true",
+        help="with what was simulated; without, who carries out the trials does not know it",
+    )
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -41,7 +46,7 @@ def run_show(arguments: argparse.Namespace) -> int:
     for key, run in sheet.runs.items():
         print(f"run {key}: {run.hash}, scene {run.scene.name}, mode {run.mode}, in {run.path}")
     if arguments.all:
-        _print_trials(sheet.trials)
+        _print_trials(sheet.trials, arguments.show_simulated)
     _print_progress(sheet)
     for note in sheet.notes:
         print(f"note: {note}")
@@ -78,14 +83,15 @@ def _print_progress(sheet: TrialSheet) -> None:
     table.show()
 
 
-def _print_trials(trials: Sequence[RealTrial]) -> None:
+def _print_trials(trials: Sequence[RealTrial], simulated: bool) -> None:
     from burg_drake.core.text_table import TextTable
 
-    table = TextTable().numbers("trial", "block").texts("grasp", "simulated", "outcome", "note")
+    table = TextTable().numbers("trial", "block").texts("grasp", "outcome", "note")
+    table.texts(*(["simulated"] if simulated else []))
     for trial in trials:
         outcome = "" if trial.outcome is None else trial.outcome.value
-        numbers = (str(trial.number), str(trial.block))
-        table.row(*numbers, trial.grasp, trial.simulated.value, outcome, trial.note)
+        cells = [str(trial.number), str(trial.block), trial.grasp, outcome, trial.note]
+        table.row(*cells, *([trial.simulated.value] if simulated else []))
     table.show()
 
 

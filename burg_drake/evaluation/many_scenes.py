@@ -35,10 +35,10 @@ from burg_drake.evaluation.campaign_document import (
 )
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.ledger import LEDGER_FILE, Ledger, SceneState
+from burg_drake.evaluation.ledger import Ledger, SceneState
 from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.part_file import require_arrow
-from burg_drake.evaluation.report import write_campaign_report
+from burg_drake.evaluation.report.campaign import renew_report
 from burg_drake.evaluation.request import Request, command, given_content
 from burg_drake.evaluation.run_document import begun_now, input_of, software_versions
 from burg_drake.evaluation.scene_crew import SceneCrew
@@ -91,7 +91,9 @@ def evaluate_scenes(
         if before is None or document != before.document:
             save_campaign(campaign)
         call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
-        return call.run()
+        judged = call.run()
+        renew_report(judged)
+        return judged
 
 
 def _document(scenes: Scenes, request: Request) -> CampaignDocument:
@@ -113,16 +115,6 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
         versions=software_versions(),
     )
     return replace(document, hash=campaign_hash(document))
-
-
-def finish_campaign(campaign: Campaign) -> Campaign:
-    """Writes the report over all scenes, unless it is there already."""
-    ledger, report = campaign.path / LEDGER_FILE, campaign.report_path
-    if ledger.exists() and not (
-        report.exists() and report.stat().st_mtime_ns >= ledger.stat().st_mtime_ns
-    ):
-        write_campaign_report(campaign)
-    return campaign
 
 
 @dataclass
@@ -161,7 +153,7 @@ class _Call:
             if left:
                 self._judge(left, crew)
             crew.close()
-        return finish_campaign(load_campaign(self.folder))
+        return load_campaign(self.folder)
 
     def _judge(self, left: list[str], crew: SceneCrew) -> None:
         document = self.campaign.document

@@ -196,7 +196,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
     kill(process)  # somewhere in the middle of the second entry
     unanswered.join(TIMEOUT)
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
-    process = start(trials, port)
+    server = serve_again(trials, port)
     try:
         clients = [threading.Thread(target=post, args=(port, "/entry", e)) for e in sent.values()]
         for client in clients:
@@ -208,7 +208,15 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
         told = [e.number for e in read_entries(journal_path(trials)) if e.before != e.after]
         assert sorted(set(told)) == [1, 2] and told.count(1) == 1
     finally:
-        kill(process)
+        server.close()
+
+
+def serve_again(trials: Path, port: int) -> LabServer:
+    """The program started again, in this process."""
+    runs = TriedRuns(trials)
+    server = LabServer(LabBook(runs), PictureShelf(runs), port=port)
+    server.start()
+    return server
 
 
 def _careless(port: int, body: dict[str, object]) -> None:

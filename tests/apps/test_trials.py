@@ -95,8 +95,10 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
     capsys.readouterr()
     assert trials("show", sheet, "--all") == 0
     printed = capsys.readouterr().out
-    assert "next is 2" in printed and "wet" in printed
+    assert "next is 2" in printed and "wet" in printed and "simulated" not in printed
     assert printed.split("all  ")[1].split()[:3] == ["4", "1", "1"]
+    assert trials("show", sheet, "--all", "--show-simulated") == 0
+    assert "simulated" in capsys.readouterr().out
 
 
 def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:

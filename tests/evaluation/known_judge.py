@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import resource
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -98,7 +99,8 @@ class CrashingJudge(KnownJudge):
     """Ends its process on some grasps, in the stage `executed`.
 
     Attributes:
-        how: by grasp id: `segfault`, `exit`, `error`, `hang`, `spin`, or `once`, which crashes only
+        how: by grasp id: `segfault`, `exit`, `error`, `hang`, `spin`, `memory`, which asks for more
+            than it may have, `parent`, which ends the parent process, or `once`, which crashes only
             as long as the file `log` does not exist; `screen` and `screen_error` are `segfault` and
             `error` in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
     """
@@ -118,6 +120,12 @@ class CrashingJudge(KnownJudge):
             case "spin":
                 while True:
                     pass
+            case "memory":
+                resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.RLIM_INFINITY))
+                bytearray(8 << 30)
+            case "parent":
+                os.kill(os.getppid(), signal.SIGKILL)
+                time.sleep(3600.0)
             case "once" if self.log is not None and not self.log.exists():
                 self.log.touch()
                 os.kill(os.getpid(), signal.SIGKILL)

@@ -57,7 +57,7 @@ def test_motions_go_by_numbers_and_are_kept(
     save_trials(replace(sheet, trials=(good,)), path)
     with pytest.raises(InvalidInputError, match="has plans of something else"):
         export_trials(path, out)
-    with pytest.raises(InvalidInputError, match=r"is not empty, it has run, and no exported"):
+    with pytest.raises(InvalidInputError, match=r"is not empty, it has plans, and no exported"):
         export_trials(path, tmp_path)
 
 

@@ -184,10 +184,10 @@ def test_a_sheet_is_not_written_over_once_it_has_entries(hand: Run, tmp_path: Pa
     assert load_trials(path).selection.per_object == 3
     text = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
-    with pytest.raises(InvalidInputError, match=r"has entries for 1 trials; choose another -o"):
+    with pytest.raises(InvalidInputError, match=r"has entries for 1 trial; choose another -o"):
         plan_trials(hand, out=path)
     path.write_text(text)  # by an editor with an old buffer
-    with pytest.raises(InvalidInputError, match="has entries for 1 trials"):
+    with pytest.raises(InvalidInputError, match="has entries for 1 trial"):
         plan_trials(hand, out=path)
 
 

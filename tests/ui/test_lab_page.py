@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from burg_drake.core.outcome import RealOutcome
 from burg_drake.experiment.trials.entries import journal_path, read_entries
 from burg_drake.experiment.trials.sheet import load_trials
-from tests.apps.test_lab_server import free_port, kill, start
+from tests.apps.test_lab_server import free_port, kill, serve_again, start
 from tests.experiment.pages.conftest import made as made
 from tests.experiment.pages.conftest import trials as trials
 
@@ -42,7 +42,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     ]
     assert load_trials(trials).trial(2).outcome is None
 
-    process = start(trials, port)
+    server = serve_again(trials, port)
     try:
         expect(saved).to_have_text("All saved")
         trial = load_trials(trials).trial(2)
@@ -58,4 +58,5 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
         expect(page.locator("#entered")).to_contain_text("Entered: slipped, AB")
         expect(page.locator("#note")).to_have_value("<b>wet</b> & cold")
     finally:
-        kill(process)
+        server.shelf.close()
+        server.close()

@@ -140,47 +140,6 @@ function step(by) {
   if (plan.trials[place]) show(plan.trials[place].number);
 }
 
-// --- Entering
-
-function enter(outcome) {
-  if (!current || performance.now() - shownSince < SETTLE) return;  // a second tap of the same
-  const number = current;
-  put(number, fields(outcome));
-  show(firstOpen(number));
-}
-
-function fields(outcome) {
-  const width = Number.parseFloat($("width").value.replace(",", "."));
-  return {
-    outcome,
-    time: now(),
-    operator: $("operator").value.trim(),
-    note: $("note").value.trim(),
-    width_mm: Number.isFinite(width) && width >= 0 ? width : null,
-  };
-}
-
-function put(number, values, undoable = true) {
-  const known = entries.get(number), was = entryOf(number);
-  const { outcome, operator, note, width_mm, time } = was;
-  const before = undoable ? { outcome, operator, note, width_mm, time } : null;
-  outbox.add({ plan: plan.plan, number, ...values }, known.state, before);
-}
-
-function undo() {
-  const last = history.pop();
-  if (!last) return;
-  put(last.number, { ...last.before, time: last.before.time || now() }, false);
-  show(last.number);
-}
-
-function now() {  // as people here write the time, with its zone
-  const moment = new Date(), zone = -moment.getTimezoneOffset();
-  const local = new Date(moment.getTime() + 60000 * zone).toISOString().slice(0, 19);
-  const two = (value) => String(Math.floor(Math.abs(value))).padStart(2, "0");
-  return `${local}${zone < 0 ? "-" : "+"}${two(zone / 60)}:${two(zone % 60)}`;
-}
-
 // --- What is shown
 
 function buildOutcomes() {
@@ -202,27 +161,6 @@ function buildOutcomes() {
     $("others").value = "";
     if (value) enter(value);
   });
-}
-
-const chips = new Map(), bars = new Map();
-
-function buildList() {
-  for (const block of new Set(plan.trials.map((trial) => trial.block))) {
-    const trials = plan.trials.filter((trial) => trial.block === block);
-    const title = make("h3", "", `Block ${block}: ${trials[0].scene}`), count = make("span");
-    const bar = make("progress"), row = make("div", "chips");
-    bar.max = trials.length;
-    title.append(count);
-    bars.set(block, { bar, count, trials });
-    for (const { number, instance } of trials) {
-      const chip = make("button", "", String(number));
-      chip.title = `Trial ${number}: ${instance}`;
-      chip.addEventListener("click", () => show(number));
-      chips.set(number, chip);
-      row.append(chip);
-    }
-    $("all").append(title, bar, row);
-  }
 }
 
 function make(kind, className = "", text = "") {
@@ -330,118 +268,6 @@ function renderEntry() {
 }
 
 function clock(time) { return time ? time.slice(11, 16) : ""; }
-
-function kindOf(entry) {
-  if (!entry || !entry.outcome) return "open";
-  if (["not_attempted", "perception_failed"].includes(entry.outcome)) return "untried";
-  return entry.outcome.startsWith("lifted") ? "held" : "failed";
-}
-
-const MARKS = { open: "", held: "✓", failed: "✗", untried: "–" };
-
-function renderList() {
-  let total = 0;
-  for (const [number, chip] of chips) {
-    const entry = entryOf(number), kind = kindOf(entry);
-    chip.className = `${kind}${entry && entry.waiting ? " waiting" : ""}`;
-    chip.textContent = `${number}${MARKS[kind]}`;
-    if (number === current) chip.setAttribute("aria-current", "true");
-    else chip.removeAttribute("aria-current");
-  }
-  for (const { bar, count, trials } of bars.values()) {
-    const done = trials.filter(({ number }) => (entryOf(number) || {}).outcome).length;
-    bar.value = done;
-    count.textContent = ` ${done} of ${trials.length}`;
-    total += done;
-  }
-  $("progress").textContent = `${total} of ${plan.trials.length} carried out`;
-}
-
-// --- The camera
-
-async function showFrames() {
-  let number = 0, epoch = 0;
-  for (;;) {
-    await seen();
-    if (view !== "camera" || (camera && camera.checking)) { await sleep(200); continue; }
-    try {
-      const answer = await fetch(`frame.jpg?epoch=${epoch}&after=${number}`);
-      if (answer.status === 200) {
-        number = Number(answer.headers.get("X-Picture"));
-        epoch = Number(answer.headers.get("X-Epoch"));
-        await paint(await answer.blob());
-      } else if (answer.status !== 204) await sleep(1000);
-    } catch {
-      number = epoch = 0;
-      await sleep(1000);
-    }
-  }
-}
-
-async function paint(blob) {
-  if (view !== "camera") return;
-  const picture = $("picture"), before = picture.src;
-  picture.src = URL.createObjectURL(blob);
-  picture.alt = "camera with the scene drawn over it";
-  try { await picture.decode(); } catch { /* the next one will do */ }
-  if (before.startsWith("blob:")) URL.revokeObjectURL(before);
-}
-
-async function showCamera() {
-  for (;;) {
-    await seen();
-    try {
-      const answer = await fetch("camera");
-      if (answer.ok) { camera = await answer.json(); renderCamera(); }
-    } catch { /* the other loop tells */ }
-    await sleep(view === "camera" || (camera && camera.checking) ? 400 : 1500);
-  }
-}
-
-function renderCamera() {
-  const { check, checking } = camera;
-  if (view === "camera") {
-    $("line").hidden = false;
-    $("line").textContent = camera.fault || camera.line;
-  }
-  $("check").disabled = checking || !camera.scene;
-  $("check").textContent = checking ? "Measuring …" : "Check placement";
-  const mine = check && check.number === current;
-  $("checked").textContent = !mine ? keptText()
-    : check.problem || (check.kept ? "Kept with this trial." : "Not kept; press the button to keep it.");
-  const rows = mine ? Object.entries(check.objects) : Object.entries((entries.get(current) || {}).placement || {});
-  $("objects").replaceChildren(...rows.map(([name, placed]) => placeRow(name, placed)));
-  const slow = check && check.seconds > QUICK;
-  if ($("always").checked && !checking && !slow && camera.valid && view === "camera") {
-    post("check", { number: current, keep: false });
-  }
-}
-
-function keptText() {
-  const entry = entries.get(current);
-  return entry && entry.photo ? `Kept with this trial: ${entry.photo}` : "";
-}
-
-function placeRow(name, { status, within, mm, deg }) {
-  const row = make("tr"), text = status === "not_seen" || mm === null ? "not seen" : `${mm.toFixed(1)} mm`;
-  const kind = status !== "measured" ? "unsure" : within === undefined ? "" : within ? "within" : "off";
-  const mark = { within: "✓ ", off: "✗ ", unsure: "? " }[kind] || "";
-  row.append(make("th", "", name), make("td", kind, mark + text));
-  row.append(make("td", kind, deg === null ? "" : `${deg.toFixed(1)}°`));
-  return row;
-}
-
-async function post(path, body) {
-  try {
-    const answer = await fetch(path, {
-      method: "POST",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify(body),
-    });
-    const data = await answer.json();
-    if (data.error) $("checked").textContent = data.error;
-  } catch { /* the status tells */ }
-}
 
 // --- What the viewer does
 

@@ -1,6 +1,6 @@
 """Serves the page of the lab to browsers.
 
-    GET  /                    the page, with page.css, page.js and outbox.js
+    GET  /                    the page, with its style sheet and scripts
     GET  /plan                JSON: trials in their order, outcomes; does not change
     GET  /states              JSON: what was entered so far; with ?after=VERSION 204 if it is that
     GET  /picture/NAME.jpg    grasp/NUMBER, above/BLOCK or front/BLOCK
@@ -56,11 +56,11 @@ POLL = 0.05
 """Between two looks of whether to stop serving [s]."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
+SCRIPTS = ("page.js", "outbox.js", "entering.js", "list.js", "camera.js")
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
-    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
-    "/outbox.js": ("outbox.js", "text/javascript; charset=utf-8"),
+    **{f"/{name}": (name, "text/javascript; charset=utf-8") for name in SCRIPTS},
 }
 HEADERS = {
     **ACCESS_HEADERS,

@@ -82,10 +82,10 @@ def threads_by_address(client: Any) -> dict[str, int]:
     Raises:
         ClusterError: it does not answer.
     """
+    if client.status != "running":  # a scheduler that is started again knows nothing of us
+        raise lost_scheduler(client)
     try:
         found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=ANSWER)
-        if client.status != "running":
-            raise OSError(f"the connection is {client.status}")
         return found
     except OSError as error:
         raise lost_scheduler(client) from error

@@ -28,8 +28,8 @@ from burg_drake.evaluation.pool import Answer
 
 LOOK = 1.0
 """Between two looks for new and lost workers [s]."""
-FETCH = 10.0
-"""Time in which a result that is there has to come [s]."""
+FETCH = 3.0
+"""A result that is there is waited for so long at a time; its worker may be lost by now [s]."""
 PATIENCE = 600.0
 """So long the run waits without any worker: a batch system may have none free [s]."""
 
@@ -138,7 +138,12 @@ class Dispatch:
         chunk.job.sent += 1
         hand.chunks.append(chunk)
         self._sent[future.key] = (chunk, hand)
-        future.add_done_callback(self._done.put)
+
+        def came(future: Any) -> None:  # in another thread
+            chunk.done = True
+            self._done.put(future)
+
+        future.add_done_callback(came)
 
     def collect(self) -> Iterator[Answer]:
         """Waits a while for what comes, and takes all that has come."""
@@ -210,10 +215,11 @@ class Dispatch:
 
     def lose(self, hand: Hand) -> Iterator[Answer]:
         """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
-        for k, chunk in enumerate(list(hand.chunks)):
+        suspects = [chunk for chunk in hand.chunks if not chunk.done][: hand.threads]
+        for chunk in list(hand.chunks):
             self.forget(chunk, hand)
             chunk.future.cancel()
-            if k < hand.threads:
+            if chunk in suspects:
                 yield from self.doubt(chunk)
             else:
                 chunk.take_back()

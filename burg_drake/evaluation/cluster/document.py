@@ -114,6 +114,10 @@ class ClusterDocument:
             if self.scale is not None or self.adapt is not None:
                 raise InvalidInputError("scale and adapt are for a jobqueue")
             require_safe(self.address)
+            if self.tls is not None and not self.address.startswith("tls://"):
+                raise FieldError(
+                    f"address is {self.address} with tls files; write tls://", "address"
+                )
             return
         if (self.scale is None) == (self.adapt is None):
             raise InvalidInputError("give either scale or adapt with a jobqueue")

@@ -66,7 +66,7 @@ class Answers:
     error: BurgError | None = None
 
 
-class Supervisor(WorkerPlugin):  # type: ignore[misc]
+class Supervisor(WorkerPlugin):
     """The children of one worker, for one run.
 
     Attributes:

@@ -83,12 +83,14 @@ class SentChunk:
         grasps: the grasps.
         losses: workers that were lost at the one grasp.
         future: of Dask.
+        done: whether the worker has judged them; the answers may be lost with it nonetheless.
     """
 
     job: SentJob
     grasps: tuple[Candidate, ...]
     losses: int = 0
     future: Any = None
+    done: bool = False
 
     def take_back(self) -> None:
         """Returns the grasps to their job, as nothing is known of them."""

@@ -17,6 +17,7 @@ from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.campaign import SCENES_FOLDER, Campaign
 from burg_drake.evaluation.codes import Texts
+from burg_drake.evaluation.ledger import LEDGER_FILE
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.part_store import Rows as StoredRows
 from burg_drake.evaluation.report.campaign_pictures import object_pictures
@@ -45,6 +46,18 @@ def write_campaign_report(campaign: Campaign) -> None:
         MissingDependencyError: pyarrow is not installed.
     """
     atomic_write(campaign.report_path, campaign_page(campaign))
+
+
+def renew_report(campaign: Campaign) -> None:
+    """Writes the report, unless it is as new as what is known of the scenes.
+
+    Raises:
+        InvalidInputError: it cannot be written.
+    """
+    known, report = campaign.path / LEDGER_FILE, campaign.report_path
+    since = known.stat().st_mtime_ns if known.exists() else 0
+    if not report.exists() or report.stat().st_mtime_ns < since:
+        write_campaign_report(campaign)
 
 
 def campaign_page(campaign: Campaign) -> str:
@@ -89,9 +102,10 @@ def _about(campaign: Campaign) -> str:
 def _notice(campaign: Campaign, summary: Summary) -> Html | None:
     parts = []
     if campaign.document.shard:
-        parts.append(f"This is share {campaign.document.shard} of a run; others have the rest.")
+        number, _, whole = campaign.document.shard.partition("/")
+        parts.append(f"This is shard {number} of {whole}; burg-drake merge unites the shards.")
     if not campaign.complete:
-        judged, expected = count(summary.total.judged), count(campaign.expected)
+        judged, expected = count(summary.total.judged), count(sum(campaign.expected.values()))
         parts.append(
             f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
             " goes on with it."

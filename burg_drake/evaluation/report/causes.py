@@ -116,8 +116,8 @@ def causes_of(rows: Rows) -> list[Cause]:
     """Why grasps did not succeed, the most frequent cause first."""
     found = []
     for place, outcome in enumerate(Outcome):
-        mine = np.flatnonzero(rows.outcomes == place) if outcome in MEANING else np.empty(0)
-        if len(mine):
+        mine = np.flatnonzero(rows.outcomes == place).astype(np.int64)
+        if len(mine) and outcome in MEANING:
             objects = rows.objects.most_common(mine, NAMED)
             blockers = rows.blockers.most_common(mine, NAMED)
             typical = typical_row(rows.margins, mine, outcome)

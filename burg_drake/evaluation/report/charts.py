@@ -56,7 +56,7 @@ def stacked_bar(parts: Sequence[Part], whole: int) -> Html:
     segments = [
         element(
             "span",
-            str(part.count) if part.count >= 0.055 * whole else "",
+            f"{part.count:,}" if part.count >= 0.055 * whole else "",
             class_=f"part {part.style}",
             style=f"flex-grow:{part.count}",
             title=part.tip,

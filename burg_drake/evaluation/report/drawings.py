@@ -122,8 +122,9 @@ def grasp_drawing(name: str, solid: Solid, X_SO: Array, grasps: DrawnGrasps) -> 
     for place, (mask, text, count) in enumerate(
         ((lifted, "lifted", counts[0]), (~lifted, "not lifted", counts[1]))
     ):
+        number = f"{count:,}" if count else "none"
         panel = (
-            element("text", f"{text}: {count or 'none'}", x=PANEL / 2, y=15, class_="panel"),
+            element("text", f"{text}: {number}", x=PANEL / 2, y=15, class_="panel"),
             element(
                 "g",
                 behind,

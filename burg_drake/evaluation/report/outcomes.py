@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from burg_drake.core.figures import count as number
 from burg_drake.core.figures import duration, figure, percent
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.report.charts import Part, interval_mark, legend, stacked_bar
@@ -83,9 +84,9 @@ def group_row(group: Group, style: str = "", name: Child = None) -> Html:
     return element(
         "tr",
         element("th", group.name if name is None else name, scope="row"),
-        element("td", group.judged, class_="number"),
+        element("td", number(group.judged), class_="number"),
         element("td", stacked_bar(parts, group.judged), class_="wide"),
-        element("td", f"{group.lifted} / {group.executed}", class_="number"),
+        element("td", f"{number(group.lifted)} / {number(group.executed)}", class_="number"),
         element("td", share, class_="estimate"),
         class_=style or None,
     )

@@ -88,9 +88,10 @@ def _notice(run: Run) -> Html | None:
     judged, mine = len(run.results["id"]), len(run.mine)
     parts = []
     if run.document.shard:
+        number, _, whole = run.document.shard.partition("/")
         parts.append(
-            f"This is share {run.document.shard} of a run, {mine} of its {len(run.candidates)}"
-            " grasps; others have the rest."
+            f"This is shard {number} of {whole}: of {len(run.candidates)} grasps {mine} are judged"
+            " here. burg-drake merge unites the shards."
         )
     if judged < mine:
         parts.append(

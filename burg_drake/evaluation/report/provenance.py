@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import shlex
-from dataclasses import replace
 from pathlib import Path
 
 from burg_drake.core.figures import duration
-from burg_drake.core.schema import load_document
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.campaign_document import CampaignDocument
 from burg_drake.evaluation.motion_numbers import (
     motion_in,
-    motion_options,
     motion_text,
     without_motion,
 )
 from burg_drake.evaluation.origin import engine_label
+from burg_drake.evaluation.report.commands import reproduce_campaign_command, reproduce_command
 from burg_drake.evaluation.report.markup import Html, command, element, folded, join, section
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
-from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, STATION_FILE, Run
+from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
 from burg_drake.station.engine import ENGINES, Engine
-from burg_drake.station.station import StationDocument
 
 ASKED = {
     "hand": "the hand alone executes each grasp in simulation",
@@ -70,7 +66,9 @@ def repeat_campaign(campaign: Campaign) -> Html:
         *_common(document),
         ("run", f"{document.hash} (hash of all of that)"),
     ]
-    return section("How to repeat it", text, command(document.command), _list(facts))
+    return section(
+        "How to repeat it", text, command(reproduce_campaign_command(campaign)), _list(facts)
+    )
 
 
 def campaign_facts(campaign: Campaign) -> Html:
@@ -103,28 +101,6 @@ def _common(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
 def _list(facts: list[tuple[str, str]]) -> Html:
     pairs = (join(element("dt", name), element("dd", fact)) for name, fact in facts)
     return element("dl", *pairs, class_="facts")
-
-
-def reproduce_command(run: Run) -> str:
-    """The command line that makes this run; for given grasps their file is among the run's."""
-    document = run.document
-    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
-    words += ["--mode", document.mode]
-    if document.grasps.per_object is None:
-        words += ["--grasps", str(run.path / GRASPS_FILE)]
-    else:
-        words += ["--grasps-per-object", str(document.grasps.per_object)]
-        words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
-        words += ["--blind"] if document.grasps.blind else []
-        words += [word for name in document.grasps.only for word in ("--only", name)]
-    usual = load_document(run.path / STATION_FILE, StationDocument).motion
-    motion = motion_in(document.trial)
-    if document.mode == "hand":  # which does not begin before the grasp
-        motion = replace(motion, standoff=usual.standoff)
-    words += motion_options(motion, usual)
-    words += ["--engine", document.engine.name, "--seed", str(document.seed)]
-    words += [] if document.table == "csv" else ["--table", document.table]
-    return shlex.join([*words, "-o", str(run.path)])
 
 
 def _text(document: RunDocument) -> str:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core.frames import Array
-from burg_drake.experiment.comparison.measures import CELLS, MEASURES, Figure, share
+from burg_drake.experiment.comparison.arrays import Flags, Rows, Values
+from burg_drake.experiment.comparison.measures import MEASURES, Figure, share
 from burg_drake.experiment.comparison.resampling import DRAWS, bounds, draw_cells, draw_each
 
 MOST_DRAWN = 500_000
@@ -62,12 +63,12 @@ class Agreement:
         return found
 
 
-def matrix_of(predicted: Array, actual: Array) -> Array:
+def matrix_of(predicted: Flags, actual: Flags) -> Values:
     """Counts of (tp, fp, fn, tn) from N verdicts and outcomes, both (N,) truth values."""
     return grouped(predicted, actual, np.zeros(len(predicted), dtype=np.intp), 1)[0]
 
 
-def grouped(predicted: Array, actual: Array, group: Array, count: int) -> Array:
+def grouped(predicted: Flags, actual: Flags, group: Rows, count: int) -> Values:
     """Confusion matrices by group.
 
     Args:
@@ -82,7 +83,7 @@ def grouped(predicted: Array, actual: Array, group: Array, count: int) -> Array:
     return np.bincount(4 * group + cell, minlength=4 * count).reshape(count, 4)
 
 
-def agreement(counts: Array, *, population: Array | None = None, seed: int = 0) -> Agreement:
+def agreement(counts: Values, *, population: Array | None = None, seed: int = 0) -> Agreement:
     """Figures of one matrix. Its shares have Wilson's intervals, all others those of
     `resampling.draw_cells`.
 
@@ -109,7 +110,7 @@ def agreement(counts: Array, *, population: Array | None = None, seed: int = 0) 
     return _agreement(cells.tolist(), trials, _all_measures(cells), interval, weighted=True)
 
 
-def agreements(counts: Array, *, seed: int = 0) -> list[Agreement]:
+def agreements(counts: Values, *, seed: int = 0) -> list[Agreement]:
     """Figures of many matrices at once.
 
     Args:
@@ -132,7 +133,7 @@ def agreements(counts: Array, *, seed: int = 0) -> list[Agreement]:
     return found
 
 
-def _all_measures(cells: Array) -> Array:
+def _all_measures(cells: Values) -> Array:
     """(..., M) from (..., 4); what is undefined is not finite."""
     parts = [cells[..., k].astype(float) for k in range(4)]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -153,10 +154,10 @@ def _agreement(
         if interval is None or not np.isfinite(values[k]):
             figures[name] = Figure.undefined(measure.reason if trials else "no trials")
         elif measure.is_share and not weighted:
-            figures[name] = share(
-                *(sum(cells[c] for c in of) for of in (measure.part, measure.whole))
-            )
+            part, whole = (sum(cells[c] for c in of) for of in (measure.part, measure.whole))
+            figures[name] = share(part, whole)
         else:
             low, high = float(interval[0][k]), float(interval[1][k])
             figures[name] = Figure.between(float(values[k]), low, high)
-    return Agreement(trials=trials, **dict(zip(CELLS, cells, strict=True)), **figures)
+    tp, fp, fn, tn = cells
+    return Agreement(trials=trials, tp=tp, fp=fp, fn=fn, tn=tn, **figures)

@@ -9,6 +9,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.experiment.comparison.arrays import Flags
 from burg_drake.experiment.comparison.measures import Figure, share
 from burg_drake.experiment.comparison.ordered import Ordered
 from burg_drake.experiment.comparison.ranking import ranking
@@ -94,7 +95,7 @@ class Calibration:
 
 
 def calibrations(
-    margins: Mapping[str, Array], success: Array, weight: Array | None = None
+    margins: Mapping[str, Array], success: Flags, weight: Array | None = None
 ) -> tuple[Calibration, ...]:
     """Calibration of each margin that differs between trials.
 
@@ -110,7 +111,7 @@ def calibrations(
 def calibration(
     name: str,
     values: Array,
-    success: Array,
+    success: Flags,
     weight: Array | None = None,
     *,
     smaller_is_better: bool | None = None,

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.core.errors import InvalidInputError, nearest, quoted
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.judgement import Judgement
 from burg_drake.experiment.comparison.paired import Paired
@@ -74,8 +75,8 @@ class Comparison:
 
 
 def compare(
-    first: Run | str | Path,
-    second: Run | str | Path,
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
     trials: str | Path | None = None,
     *,
     success: Success | None = None,
@@ -121,6 +122,6 @@ def compare(
     )
 
 
-def is_trials(path: Run | str | Path) -> bool:
+def is_trials(path: Run | Campaign | str | Path) -> bool:
     """Whether it is a trials file rather than a run, going by its name."""
-    return not isinstance(path, Run) and Path(path).suffix in (".yaml", ".yml")
+    return isinstance(path, (str, Path)) and Path(path).suffix in (".yaml", ".yml")

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from burg_drake.core.frames import Array
 from burg_drake.experiment.comparison.pairs import Pairs
 from burg_drake.experiment.trials.sheet import RealTrial
 
@@ -51,7 +52,7 @@ def disagreements(
     scenes: Mapping[str, str],
     folders: Sequence[Mapping[str, str]],
     trials: Sequence[RealTrial] = (),
-    offset_mm: Sequence[float] = (),
+    offset_mm: Array | None = None,
 ) -> tuple[Disagreement, ...]:
     """Lists what was predicted wrongly, false successes first.
 
@@ -70,7 +71,7 @@ def disagreements(
         for row in np.flatnonzero(wrong)[:MOST_LISTED].tolist():
             scene, grasp = pairs.scene[row], str(pairs.id[row])
             trial = trials[row] if trials else None
-            offset = float(offset_mm[row]) if len(offset_mm) else np.nan
+            offset = np.nan if offset_mm is None else float(offset_mm[row])
             found.append(
                 Disagreement(
                     kind="fp" if kind == "fp" else "fn",

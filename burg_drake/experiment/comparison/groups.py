@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Stage
 from burg_drake.experiment.comparison.agreement import Agreement, agreements, grouped
+from burg_drake.experiment.comparison.arrays import Values
 from burg_drake.experiment.comparison.measures import Figure, share
 from burg_drake.experiment.comparison.pairs import Pairs
 from burg_drake.experiment.comparison.texts import Factor
@@ -98,7 +98,7 @@ def outcome_table(pairs: Pairs) -> dict[str, dict[str, int]]:
     }
 
 
-def _crossed(rows: Factor, columns: Factor) -> Array:
+def _crossed(rows: Factor, columns: Factor) -> Values:
     width = len(columns.names)
     flat = np.bincount(rows.index * width + columns.index, minlength=len(rows.names) * width)
     return flat.reshape(len(rows.names), width)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.frames import Array
 from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.arrays import Rows, Values
 from burg_drake.experiment.comparison.texts import text_keys
 
 KEY = ("scene_content", "id")
@@ -27,8 +27,8 @@ class Match:
         only_first, only_second: grasps of one table alone.
     """
 
-    first: Array
-    second: Array
+    first: Rows
+    second: Rows
     other_content: int
     only_first: int
     only_second: int
@@ -56,6 +56,6 @@ def match_rows(first: Columns, second: Columns) -> Match:
     )
 
 
-def _keys(columns: Columns) -> Array:
+def _keys(columns: Columns) -> Values:
     scenes, ids = (text_keys(columns[name]) for name in KEY)
     return ids + scenes * np.uint64(0x9E3779B97F4A7C15)

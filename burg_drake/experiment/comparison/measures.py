@@ -89,7 +89,8 @@ class Measure:
 
 def _share(name: str, part: tuple[int, ...], whole: tuple[int, ...], reason: str) -> Measure:
     def of(*cells: Array) -> Array:
-        return sum(cells[k] for k in part) / sum(cells[k] for k in whole)
+        added: list[Array] = [np.sum([cells[k] for k in of], axis=0) for of in (part, whole)]
+        return added[0] / added[1]
 
     return Measure(name, of, reason, part, whole)
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
-from burg_drake.evaluation.results import read_results
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.arrays import Rows
 from burg_drake.experiment.comparison.calibration import PROBABILITY
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
@@ -31,8 +31,8 @@ from burg_drake.experiment.trials.sheet import Success
 
 
 def compare_runs(
-    first: Run | str | Path,
-    second: Run | str | Path,
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
     *,
     success: Success = "lifted",
     robustness: str | Path | None = None,
@@ -41,7 +41,7 @@ def compare_runs(
     """Compares the verdicts of two runs; see `comparison.compare`."""
     sides = Judged.load(first), Judged.load(second)
     require_common_scene(*sides)
-    tables = read_results(sides[0].path, NAMES), read_results(sides[1].path, REFERENCE_NAMES)
+    tables = sides[0].columns(NAMES), sides[1].columns(REFERENCE_NAMES)
     found = match_rows(*tables)
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))
@@ -88,7 +88,7 @@ def pairs_of_runs(
     return pairs if keep.all() else pairs.take(keep), left_out
 
 
-def _rows(columns: Columns, rows: Array) -> Columns:
+def _rows(columns: Columns, rows: Rows) -> Columns:
     """Some rows of a table; the table itself if they are all of it, in order."""
     count = len(next(iter(columns.values())))
     if len(rows) == count and np.array_equal(rows, np.arange(count)):

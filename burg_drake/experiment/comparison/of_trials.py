@@ -10,6 +10,7 @@ import numpy as np
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import Columns
 from burg_drake.experiment.comparison.calibration import PROBABILITY
@@ -33,7 +34,7 @@ from burg_drake.experiment.trials.sheet import (
 
 
 def compare_trials(
-    runs: Sequence[Run | str | Path],
+    runs: Sequence[Run | Campaign | str | Path],
     path: Path,
     *,
     success: Success | None,
@@ -48,7 +49,7 @@ def compare_trials(
     tables = []
     left_out: Counter[str] = Counter()
     for k, side in enumerate(sides):
-        columns, missing = find_tried(sheet, path, side.runs, str(side.path))
+        columns, missing = find_tried(sheet, path, side)
         tables.append(columns)
         which = "the run" if len(sides) == 1 else f"the {('first', 'second')[k]} run"
         left_out.update({f"grasp {reason} in {which}": n for reason, n in missing.items()})
@@ -94,8 +95,8 @@ def _telling(
     left_out: Counter[str] = Counter()
     silent: dict[int, str] = {}
     for columns in tables:
-        for outcome, rows in undecided(Factor.of(columns["outcome"])).items():
-            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {outcome}")
+        for verdict, rows in undecided(Factor.of(columns["outcome"])).items():
+            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {verdict}")
     chosen = []
     for k in indices:
         outcome = sheet.trials[k].outcome
@@ -162,7 +163,7 @@ def _notes(
     notes = []
     hashes = {source.hash for source in sheet.runs.values()}
     for side, columns in zip(sides, tables, strict=True):
-        own = {run.document.hash for run in side.runs} & hashes
+        own = set(columns["run"].tolist()) & hashes
         if not own:
             notes.append(
                 f"the grasps were not chosen from {side.path}, but from another run of them"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.experiment.comparison.arrays import Flags, Rows, Values
 
 FINEST = 20_000
 """Rows; of more the trials with neighbouring numbers share one, which changes a share of trials by
@@ -35,7 +36,7 @@ class Ordered:
     good_squares: Array
 
     @classmethod
-    def of(cls, values: Array, good: Array, weight: Array | None = None) -> Ordered:
+    def of(cls, values: Array, good: Flags, weight: Array | None = None) -> Ordered:
         """Sorts trials.
 
         Args:
@@ -52,7 +53,7 @@ class Ordered:
         edges = np.r_[first, len(ordered)]
         ends = ordered[first], ordered[edges[1:] - 1]
 
-        def sums(column: Array) -> Array:
+        def sums(column: Values) -> Array:
             return np.diff(np.r_[0.0, np.cumsum(column)][edges])
 
         count, well = np.diff(edges).astype(float), sums(good[order])
@@ -61,7 +62,7 @@ class Ordered:
         w, g = weight[order], good[order]
         return cls(*ends, count, well, sums(w), sums(w * g), sums(w * w), sums(w * w * g))
 
-    def parts(self, number: int) -> Array:
+    def parts(self, number: int) -> Rows:
         """Index of the first row of each of `number` parts with about equally many trials; fewer
         where ties leave fewer, as equal numbers are never parted."""
         if not len(self.value):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.experiment.comparison.arrays import Flags
 from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.comparison.resampling import DRAWS, PRIOR, bounds
 
@@ -32,7 +32,7 @@ class Paired:
     p_value: float | None
 
 
-def paired(first: Array, second: Array, *, seed: int = 0) -> Paired:
+def paired(first: Flags, second: Flags, *, seed: int = 0) -> Paired:
     """Compares answers.
 
     Args:

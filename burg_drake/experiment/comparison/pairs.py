@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.arrays import Flags, Values
 from burg_drake.experiment.comparison.calibration import MARGINS
 from burg_drake.experiment.comparison.matching import CONTENT, KEY
 from burg_drake.experiment.comparison.texts import Factor
@@ -35,7 +36,7 @@ class Pairs:
         margins: (N,) numbers of the verdicts by name.
     """
 
-    id: Array
+    id: Values
     run: Factor
     scene: Factor
     object: Factor
@@ -43,8 +44,8 @@ class Pairs:
     stage: Factor
     blocker: Factor
     ended: Factor
-    predicted: Array
-    actual: Array
+    predicted: Flags
+    actual: Flags
     margins: Mapping[str, Array]
 
     def __len__(self) -> int:
@@ -54,7 +55,7 @@ class Pairs:
         """With one more number of each verdict, (N,)."""
         return replace(self, margins={**self.margins, name: values})
 
-    def take(self, rows: Array) -> Pairs:
+    def take(self, rows: Values) -> Pairs:
         """Some rows, as indices or truth values."""
         factors = ("run", "scene", "object", "simulated", "stage", "blocker", "ended")
         return replace(
@@ -67,7 +68,7 @@ class Pairs:
         )
 
 
-def make_pairs(verdicts: Columns, ended: Factor, actual: Array, success: Success) -> Pairs:
+def make_pairs(verdicts: Columns, ended: Factor, actual: Flags, success: Success) -> Pairs:
     """Pairs from rows of results.
 
     Args:
@@ -92,12 +93,12 @@ def make_pairs(verdicts: Columns, ended: Factor, actual: Array, success: Success
     )
 
 
-def successes(simulated: Factor, success: Success) -> Array:
+def successes(simulated: Factor, success: Success) -> Flags:
     """(N,) whether verdicts are success."""
     return simulated.where([succeeded(Outcome(name), success) for name in simulated.names])
 
 
-def undecided(simulated: Factor) -> dict[str, Array]:
+def undecided(simulated: Factor) -> dict[str, Flags]:
     """Which rows have a verdict that predicts nothing, by the verdict."""
     return {
         outcome.value: simulated.where([name == outcome.value for name in simulated.names])

@@ -9,12 +9,14 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.evaluation.robustness import TABLE_FILE
+from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table_file import read_table
+from burg_drake.experiment.comparison.arrays import Values
 from burg_drake.experiment.comparison.side import Judged
 
 
 def predicted_probability(
-    judged: Judged, ids: Array, table: str | Path | None = None
+    judged: Judged, ids: Values, table: str | Path | None = None
 ) -> Array | None:
     """Share of the perturbed repeats that were lifted.
 
@@ -31,7 +33,7 @@ def predicted_probability(
     """
     if table is None:
         table = judged.path / TABLE_FILE
-        if len(judged.runs) != 1 or not table.is_file():
+        if not isinstance(judged.found, Run) or not table.is_file():
             return None
     columns = read_table(Path(table))
     if not {"id", "success"} <= set(columns):

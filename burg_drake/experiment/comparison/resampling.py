@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.core.frames import Array
+from burg_drake.experiment.comparison.arrays import Values
 
 DRAWS = 4000
 TAILS = (0.025, 0.975)
@@ -23,7 +24,7 @@ PRIOR = 0.5
 
 
 def draw_cells(
-    counts: Array, population: Array, rng: np.random.Generator, draws: int = DRAWS
+    counts: Values, population: Array, rng: np.random.Generator, draws: int = DRAWS
 ) -> Array:
     """Confusion matrices that may stand behind the one that was seen.
 
@@ -65,7 +66,7 @@ def prior(counts: Array, population: Array) -> Array:
     return PRIOR * shares
 
 
-def draw_each(counts: Array, rng: np.random.Generator, draws: int = DRAWS) -> Array:
+def draw_each(counts: Values, rng: np.random.Generator, draws: int = DRAWS) -> Array:
     """As `draw_cells` for many matrices that have nothing to do with each other.
 
     Args:

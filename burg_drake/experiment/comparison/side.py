@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.results import load_runs
-from burg_drake.evaluation.run_document import HASH_DIGITS, differences, identity
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.results import open_results, read_results
+from burg_drake.evaluation.run_document import HASH_DIGITS, differences, what_is_asked
+from burg_drake.evaluation.run_store import RUN_FILE, Run, load_run
+from burg_drake.evaluation.table import Columns
 from burg_drake.experiment.trials.sheet import TrialSheet
 
 MOST_NAMED = 3
@@ -45,46 +48,61 @@ class Judged:
     """The runs in a folder.
 
     Attributes:
-        path: the folder.
-        runs: one for each scene.
+        found: a run of one scene or of many.
     """
 
-    path: Path
-    runs: Sequence[Run]
+    found: Run | Campaign
 
     @classmethod
-    def load(cls, path: str | Path | Run) -> Judged:
-        """The runs in a folder; see `load_runs`."""
-        if isinstance(path, Run):
-            return cls(path.path, [path])
-        return cls(Path(path), load_runs(path))
+    def load(cls, path: str | Path | Run | Campaign) -> Judged:
+        """The runs in a folder; see `evaluation.results`."""
+        return cls(path if isinstance(path, (Run, Campaign)) else open_results(path))
 
     @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.found.path
+
+    @cached_property
     def scenes(self) -> dict[str, str]:
         """Names of the scenes by content, as tables have it."""
-        inputs = [run.document.scene for run in self.runs]
-        return {scene.content[:HASH_DIGITS]: scene.name for scene in inputs}
+        if isinstance(self.found, Run):
+            scene = self.found.document.scene
+            return {scene.content[:HASH_DIGITS]: scene.name}
+        return {e.content[:HASH_DIGITS]: e.name for e in self.found.document.mine}
 
-    @property
+    @cached_property
     def folders(self) -> dict[str, str]:
         """Folders of the runs by content of the scene."""
-        runs = reversed(self.runs)
-        return {run.document.scene.content[:HASH_DIGITS]: str(run.path) for run in runs}
+        if isinstance(self.found, Run):
+            return dict.fromkeys(self.scenes, str(self.path))
+        return {content: str(self.found.folder(name)) for content, name in self.scenes.items()}
+
+    def runs_of(self, contents: Collection[str]) -> list[Run]:
+        """The runs of some scenes by their content, in full; only these are opened."""
+        if isinstance(self.found, Run):
+            return [self.found]
+        wanted = {content[:HASH_DIGITS] for content in contents}
+        folders = [Path(self.folders[content]) for content in self.scenes if content in wanted]
+        return [load_run(folder) for folder in folders if (folder / RUN_FILE).exists()]
+
+    def columns(self, names: Sequence[str]) -> Columns:
+        """Columns of all judged grasps; see `evaluation.results.read_results`."""
+        return read_results(self.path, names)
 
     @property
     def side(self) -> Side:
         """What it is, for people."""
-        documents = [run.document for run in self.runs]
-        mode = _joined(d.mode for d in documents)
-        engine = _joined(engine_label(d.engine) for d in documents)
+        document = self.found.document
+        engine = engine_label(document.engine)
         return Side(
             kind="run",
             path=str(self.path),
-            label=f"{mode}, {engine}",
-            scenes=tuple(dict.fromkeys(d.scene.name for d in documents)),
-            hashes=tuple(d.hash for d in documents),
-            station=_joined(d.station.name for d in documents),
-            mode=mode,
+            label=f"{document.mode}, {engine}",
+            scenes=tuple(self.scenes.values()),
+            hashes=(document.hash,),
+            station=document.station.name,
+            mode=document.mode,
             engine=engine,
         )
 
@@ -105,17 +123,12 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
 
 
 def settings_apart(first: Judged, second: Judged) -> tuple[str, ...]:
-    """In what the runs of two folders differ, in words, by their first scene in common."""
-    theirs = {run.document.scene.content: run for run in second.runs}
-    for run in first.runs:
-        other = theirs.get(run.document.scene.content)
-        if other is not None:
-            found = differences(identity(run.document), identity(other.document))
-            return tuple(
-                text.replace(" there, ", " in the first, ").removesuffix(" here") + " in the second"
-                for text in found
-            )
-    return ()
+    """In what the runs of two folders differ, in words."""
+    asked = [what_is_asked(judged.found.document) for judged in (first, second)]
+    return tuple(
+        text.replace(" there, ", " in the first, ").removesuffix(" here") + " in the second"
+        for text in differences(*asked)
+    )
 
 
 def require_common_scene(first: Judged, second: Judged) -> None:
@@ -126,13 +139,14 @@ def require_common_scene(first: Judged, second: Judged) -> None:
     """
     if not set(first.scenes) & set(second.scenes):
         raise InvalidInputError(
-            f"{first.path} is of scene {_named(first)}, {second.path} of {_named(second)}; runs to"
-            " be compared judge the same grasps on the same scene"
+            f"{first.path} is of scene {named(first.scenes)}, {second.path} of"
+            f" {named(second.scenes)}; runs to be compared judge the same grasps on the same scene"
         )
 
 
-def _named(judged: Judged) -> str:
-    names = [f"{name} ({content})" for content, name in judged.scenes.items()]
+def named(scenes: Mapping[str, str]) -> str:
+    """Names of scenes by content, for messages; of many the first few."""
+    names = [f"{name} ({content})" for content, name in scenes.items()]
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return ", ".join(names[:MOST_NAMED]) + more
 

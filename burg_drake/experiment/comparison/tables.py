@@ -37,8 +37,9 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
         if len(judged.scenes) > 1:
             yield group_table(f"By scene{name}", "scene", judged.scenes)
         yield stopped_table(judged, name)
-        if judged.calibration:
-            yield calibration_table(judged.calibration, name)
+        telling = [c for c in judged.calibration if c.auroc.value is not None]
+        if telling:
+            yield calibration_table(telling, name)
         if judged.placement is not None:
             yield placement_table(judged, name)
     yield coverage_words(c)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.experiment.comparison.arrays import Flags, Values
 
 SAMPLE = 4096
 """Rows that are looked at first; where they have all texts, nothing needs sorting."""
@@ -67,13 +67,13 @@ class Factor:
         rank[order] = np.arange(len(order))
         return cls(tuple(names[order].tolist()), rank[index] if len(keys) else index)
 
-    def take(self, rows: Array) -> Factor:
+    def take(self, rows: Values) -> Factor:
         """The column of some rows."""
         return Factor(self.names, self.index[rows])
 
     def __getitem__(self, row: int) -> str:
         return self.names[self.index[row]]
 
-    def where(self, wanted: list[bool]) -> Array:
+    def where(self, wanted: list[bool]) -> Flags:
         """(N,) truth values from one for each name."""
         return np.array(wanted, dtype=bool)[self.index]

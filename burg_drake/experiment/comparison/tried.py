@@ -4,7 +4,7 @@ with the same grasps."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.errors import InvalidInputError, listing
-from burg_drake.evaluation.run_document import HASH_DIGITS, Input
+from burg_drake.evaluation.run_document import HASH_DIGITS
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import Columns
 from burg_drake.experiment.comparison.pairs import NAMES
+from burg_drake.experiment.comparison.side import Judged, named
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 from burg_drake.experiment.trials.sources import grasp_content
 
@@ -46,16 +47,13 @@ class _Table:
         return grasp_content(instance, grasps.X_OG[k], float(grasps.width[k]))
 
 
-def find_tried(
-    sheet: TrialSheet, path: Path, runs: Sequence[Run], folder: str
-) -> tuple[Columns, Counter[str]]:
+def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, Counter[str]]:
     """Rows of the results about the grasps that were tried.
 
     Args:
         sheet: contents of the trials file.
         path: the trials file, for messages.
-        runs: what the folder holds.
-        folder: of the runs.
+        side: the run, of one scene or of many.
 
     Returns:
         Columns `NAMES` for the trials that have a row, with their index in the sheet as `trial`;
@@ -65,7 +63,7 @@ def find_tried(
         InvalidInputError: none has one, or a grasp is not the one that was planned with.
     """
     tables: dict[str, list[_Table]] = {}
-    for run in runs:
+    for run in side.runs_of({source.scene.content for source in sheet.runs.values()}):
         tables.setdefault(run.document.scene.content, []).append(_Table(run))
     found: list[tuple[int, _Table, int]] = []
     missing: Counter[str] = Counter()
@@ -82,7 +80,7 @@ def find_tried(
             what = "is not judged" if holds else "is not there" if there else "is of another scene"
             missing[what] += 1
     if not found:
-        raise InvalidInputError(_nothing_in_common(sheet, path, runs, folder, missing))
+        raise InvalidInputError(_nothing_in_common(sheet, path, side, missing))
     return _columns(found), missing
 
 
@@ -97,24 +95,17 @@ def _refuse_changed(trial: RealTrial, own: Sequence[_Table], path: Path) -> None
             )
 
 
-def _nothing_in_common(
-    sheet: TrialSheet, path: Path, runs: Sequence[Run], folder: str, missing: Counter[str]
-) -> str:
+def _nothing_in_common(sheet: TrialSheet, path: Path, side: Judged, missing: Counter[str]) -> str:
     if not sheet.trials:
         return f"{path} has no trials; burg-drake trials plan chooses some"
-    theirs = _scenes(source.scene for source in sheet.runs.values())
-    here = _scenes(run.document.scene for run in runs)
+    sources = sheet.runs.values()
     if set(missing) == {"is of another scene"}:
-        what = f"{path} is about scene {theirs}, but {folder} holds scene {here}"
+        theirs = {s.scene.content[:HASH_DIGITS]: s.scene.name for s in sources}
+        what = f"{path} is about scene {named(theirs)}, but {side.path} holds {named(side.scenes)}"
     else:
-        what = f"none of the grasps of {path} is judged in {folder}, which is on the same scene"
-    meant = listing([f"{s.path} ({s.hash})" for s in sheet.runs.values()])
+        what = f"no grasp of {path} is judged in {side.path}, which is on the same scene"
+    meant = listing([f"{source.path} ({source.hash})" for source in sources])
     return f"{what}; give the run that the trials are from, {meant}, or one of the same grasps"
-
-
-def _scenes(scenes: Iterable[Input]) -> str:
-    names = [f"{scene.name} ({scene.content[:HASH_DIGITS]})" for scene in scenes]
-    return listing(list(dict.fromkeys(names)))
 
 
 def _columns(found: Sequence[tuple[int, _Table, int]]) -> Columns:

@@ -87,15 +87,17 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     b = (judged or comparison.judgement).bias
     if b.difference.value is None:
         return "no trials"
-    more = "more" if b.difference.value >= 0 else "less"
+    more = "more" if b.difference.value > 0 else "less"
+    size = f"{100 * abs(b.difference.value):.1f} percentage points {more} success than"
+    if b.difference.value == 0:
+        size = "just as much success as"
     who, other = ("simulator promises", "the robot achieved")
     if comparison.kind == "runs":
         who, other = "first run sees", "the second"
     return (
-        f"The {who} {100 * abs(b.difference.value):.1f} percentage points {more} success than"
-        f" {other} {interval(b.difference, percent=True)}: {b.only_first:,} predicted successes did"
-        f" not come true, {b.only_second:,} came about against the prediction (McNemar's exact"
-        f" test: p = {figure(b.p_value)})."
+        f"The {who} {size} {other} {interval(b.difference, percent=True)}: {b.only_first:,}"
+        f" predicted successes did not come true, {b.only_second:,} came about against the"
+        f" prediction (McNemar's exact test: p = {figure(b.p_value)})."
     )
 
 

@@ -25,13 +25,12 @@ from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import Listener
 from burg_drake.core.references import portable_reference
 from burg_drake.core.schema import load_document, save_document
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.evaluation.executor import Executor, LocalExecutor
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
 from burg_drake.evaluation.mode import MODES, Mode, mode_for
 from burg_drake.evaluation.motion_numbers import motion_in
@@ -126,7 +125,7 @@ def climb(
     noise: PlacementNoise = USUAL_NOISE,
     samples: int = DEFAULT_SAMPLES,
     tried: Sequence[str] = (),
-    workers: int | None = None,
+    executor: Executor | None = None,
     progress: bool | Listener = True,
     **evaluation: Any,
 ) -> Ladder:
@@ -142,7 +141,7 @@ def climb(
         samples: number of displaced scenes; 0 leaves the step out.
         tried: ids of grasps of real trials, which are judged in displaced scenes even if they fail
             in the last mode.
-        workers: number of processes.
+        executor: who judges; as many processes as there are processors if None.
         progress: as for `evaluate`.
         evaluation: for `evaluate`, with a scene: engine, motion, grasps and how to sample them.
 
@@ -165,7 +164,7 @@ def climb(
     mode_for(station, last)
     if samples < 0:
         raise InvalidInputError(f"samples is {samples}; give 0 or more")
-    workers = default_workers() if workers is None else workers
+    executor = LocalExecutor.of_this_machine() if executor is None else executor
     path = Path(out)
     document = GapDocument(
         source="" if run is None else run.document.hash,
@@ -180,7 +179,7 @@ def climb(
     )
     _require_same(path, document)
     writable_folder(path)
-    options = {"workers": workers, "progress": progress}
+    options = {"executor": executor, "progress": progress}
     steps: list[Step] = []
     for mode in MODES[: MODES.index(last) + 1]:
         made = _mode_step(mode, run, steps, scene, station, path, options, evaluation)
@@ -286,10 +285,7 @@ def _begin_reach(
     journal = folder / JOURNAL_FILE
     known = read_journal(journal)
     with Journal(journal) as lines:
-        found = reach_verdicts(
-            hand, known, executor=LocalExecutor(options["workers"]), progress=options["progress"]
-        )
-        for id, verdict in found.items():
+        for id, verdict in reach_verdicts(hand, known, **options):
             lines.append(id, verdict)
 
 

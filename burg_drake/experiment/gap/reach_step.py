@@ -8,18 +8,18 @@ executed again only where the arm has less room to lift than the hand has.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.judge import LIFT_HEIGHT, Decision, Judge, Verdict
 from burg_drake.evaluation.run_document import origin_of
 from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
 
 
@@ -32,7 +32,7 @@ class ReachOfHandFactory:
         trials: executed ones by grasp id.
     """
 
-    build: SceneJudgeFactory
+    build: Callable[[], StationJudge]
     trials: Mapping[str, Verdict]
 
     def __call__(self) -> Judge:
@@ -68,7 +68,7 @@ def reach_verdicts(
     *,
     executor: Executor | None = None,
     progress: bool | Listener = True,
-) -> dict[str, Verdict]:
+) -> Iterator[tuple[str, Verdict]]:
     """What a run in mode `reach` says of the grasps of a run of the hand, bit for bit.
 
     Args:
@@ -77,10 +77,10 @@ def reach_verdicts(
         executor: who judges.
         progress: see `evaluate`.
 
-    Returns:
-        The others.
+    Yields:
+        Ids and verdicts of the others.
     """
-    executor = LocalExecutor(default_workers()) if executor is None else executor
+    executor = LocalExecutor.of_this_machine() if executor is None else executor
     origin = origin_of(hand.document)
     build = SceneJudgeFactory(
         hand.scene(), hand.station(), origin.engine, "reach", origin.settings(f"{hand.path}: trial")
@@ -88,17 +88,15 @@ def reach_verdicts(
     trials = {id: v for id, v in hand.verdicts.items() if _executed(v)}
     todo = [candidate for candidate in hand.candidates if candidate.id not in known]
     if not todo:
-        return {}
-    found: dict[str, Verdict] = {}
+        return
     with Reporter(progress) as reporter:
         begin = Progress(STARTING, len(known), len(hand.candidates))
         pace = Pace(reporter.show, begin, "asking the arm")
-        job = Job("reach", ReachOfHandFactory(build, trials), todo)
+        job = Job("reach", ReachOfHandFactory(build.plain, trials), todo)
         with closing(executor.judge([job])) as judged:
             for _, candidate, verdict in judged:
-                found[candidate.id] = _with_cost(verdict, trials.get(candidate.id))
                 pace.step(outcome=verdict.outcome)
-    return found
+                yield candidate.id, _with_cost(verdict, trials.get(candidate.id))
 
 
 def _executed(verdict: Verdict) -> bool:

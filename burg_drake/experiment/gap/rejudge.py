@@ -185,7 +185,7 @@ def _judge(
         if one.trial.candidate.id not in known:
             key = one.factory.content
             held = jobs[key].candidates if key in jobs else ()
-            jobs[key] = Job(key, one.factory, (*held, one.trial.candidate))
+            jobs[key] = Job(key, one.factory.plain, (*held, one.trial.candidate))
     if not jobs:
         return
     todo = sum(len(job.candidates) for job in jobs.values())

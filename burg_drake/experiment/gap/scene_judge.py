@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from burg_drake.core.content import content_hash
 from burg_drake.evaluation.mode import Mode
-from burg_drake.evaluation.station_judge import StationJudge
+from burg_drake.evaluation.station_judge import StationJudge, StationJudgeFactory
 from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import Engine
 from burg_drake.station.station import Station
@@ -39,6 +40,16 @@ class SceneJudgeFactory:
             mode=self.mode,
             settings=self.settings,
         )
+
+    @property
+    def plain(self) -> Callable[[], StationJudge]:
+        """The usual factory where it does the same: clusters know how to send that one."""
+        from burg_drake.simulation.trial_settings import TrialSettings
+
+        if self.settings != TrialSettings(motion=self.settings.motion):
+            return self
+        motion = self.settings.motion
+        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, motion)
 
     @property
     def content(self) -> str:

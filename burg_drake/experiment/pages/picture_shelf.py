@@ -15,7 +15,7 @@ GRASP_SIZE, SETUP_SIZE = (880, 660), (900, 592)
 
 
 class PictureShelf:
-    """Holds the pictures; `start` it, and `close` it.
+    """Holds the pictures; makes them from the moment on that somebody asks for one. `close` it.
 
     Pictures are called `grasp/NUMBER`, of a trial, and `above/BLOCK` and `front/BLOCK`.
 
@@ -45,10 +45,6 @@ class PictureShelf:
             found.append(f"grasp/{number}")
         return found
 
-    def start(self) -> None:
-        """Begins to make pictures."""
-        self._thread.start()
-
     def close(self) -> None:
         """Ends the thread."""
         with self._changed:
@@ -70,6 +66,8 @@ class PictureShelf:
         if len(number) > 9 or int(number) not in known:
             return None
         with self._changed:
+            if not self._over and self._thread.ident is None:
+                self._thread.start()
             if name not in self._made:
                 self._wanted.append(name)
                 self._changed.notify_all()

@@ -155,7 +155,7 @@ def _figure(data: bytes, alt: str, caption: str) -> Html:
 
 def _places(scene: Scene) -> Html:
     """Where each object stands."""
-    heads = ("object", "x [mm]", "y [mm]", "turned [°]", "high [mm]")
+    heads = ("object", "x [mm]", "y [mm]", "turned [°]", "height [mm]")
     rows = []
     for name in (*scene.background, *scene.instances):
         X_SO, thing = scene.X_SO(name), scene.instance(name).object

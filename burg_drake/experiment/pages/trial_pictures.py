@@ -98,6 +98,7 @@ class _Scenery:
 
     def __init__(self, bodies: SceneBodies) -> None:
         self.bodies = bodies
+        self._surfaces: dict[str, Array] = {}
 
     def with_hand(self, X_SG: Array, width: float) -> tuple[PlacedBody, ...]:
         return (*self.bodies.standing, *self.bodies.hand(X_SG, width))
@@ -105,10 +106,12 @@ class _Scenery:
     def viewpoint(
         self, instance: str, X_SG: Array, width: float, size: tuple[int, int]
     ) -> Viewpoint:
-        scene = self.bodies.scene
-        surface = scene.library.surface(scene.instance(instance).object)
-        target = transform_points(scene.X_SO(instance), np.asarray(surface.triangles_center))
-        subject = Subject(X_SG, width, target, self.bodies.corners(X_SG))
+        if instance not in self._surfaces:
+            scene = self.bodies.scene
+            surface = scene.library.surface(scene.instance(instance).object)
+            corners = np.asarray(surface.triangles_center)
+            self._surfaces[instance] = transform_points(scene.X_SO(instance), corners)
+        subject = Subject(X_SG, width, self._surfaces[instance], self.bodies.corners(X_SG))
         return grasp_viewpoint(subject, self._rays, self._hand_rays, inverse(X_SG), size)
 
     @cached_property

@@ -19,15 +19,11 @@ from typing import Any, Literal
 from burg_drake.core.document_text import read_text
 from burg_drake.core.errors import (
     InvalidInputError,
-    UnknownNameError,
-    nearest,
     quoted,
 )
 from burg_drake.core.files import atomic_write
-from burg_drake.core.outcome import RealOutcome
 from burg_drake.core.schema import parse_document
 from burg_drake.experiment.trials.entries import (
-    FIELDS,
     Entry,
     How,
     Lacking,
@@ -39,20 +35,27 @@ from burg_drake.experiment.trials.entries import (
     sync_folder,
     with_values,
 )
-from burg_drake.experiment.trials.sheet import RealTrial, RobotReport, TrialSheet
+from burg_drake.experiment.trials.given_entry import EMPTY, checked, includes, merged
+from burg_drake.experiment.trials.given_entry import real_outcome as real_outcome
+from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 from burg_drake.experiment.trials.trial_text import with_trial
 
-EMPTY: dict[str, Any] = {
-    **dict.fromkeys(("time", "operator", "note", "photo"), ""),
-    "outcome": None,
-    "placement": {},
-    "robot": None,
-}
-"""Fields of a trial that nothing has been entered for."""
 WAIT = 30.0
 """Time to wait for other writers, each of which takes some hundredths of a second [s]."""
 TURN = 0.01
 """Time between two attempts to get the lock [s]."""
+
+
+class TrialChanged(InvalidInputError):
+    """A trial is not what it was taken for.
+
+    Attributes:
+        trial: as it is.
+    """
+
+    def __init__(self, message: str, trial: RealTrial) -> None:
+        super().__init__(message)
+        self.trial = trial
 
 
 class TrialBook:
@@ -97,6 +100,7 @@ class TrialBook:
         *,
         correct: bool = False,
         again: bool = False,
+        expected: RealTrial | None = None,
         **entry: Any,
     ) -> RealTrial:
         """Enters what is known of a trial; all else in the file stays as it is, byte for byte.
@@ -107,6 +111,7 @@ class TrialBook:
             number: of the trial; `next` for the first one without an outcome.
             correct: the entry replaces what contradicts it.
             again: the trial was carried out once more: the entry replaces all that there is.
+            expected: only if the trial still is this one, and nobody has changed it meanwhile.
             entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and nothing
                 else is said), `operator`, `note`, `photo`, `placement`, `robot`, a `RobotReport`
                 or its fields that are known.
@@ -116,15 +121,20 @@ class TrialBook:
 
         Raises:
             UnknownNameError: there is no such field.
+            TrialChanged: it is not as expected.
             InvalidInputError: there is no such trial, or no such outcome; the trial has another
                 entry already; or the file cannot be written.
         """
-        given = _checked(entry)
+        given = checked(entry)
 
         def change(trial: RealTrial) -> RealTrial:
+            if expected is not None and trial != expected:
+                raise TrialChanged(
+                    f"{self.path}: trial {trial.number} was changed meanwhile", trial
+                )
             self.require_open(trial, given, correct=correct, again=again)
             base = replace(trial, **EMPTY) if again else trial
-            new = replace(base, **_merged(base, given))
+            new = replace(base, **merged(base, given))
             if new.outcome is not None and "time" not in given:
                 same = not again and new.outcome is trial.outcome and trial.time
                 new = replace(new, time=trial.time if same else _now())
@@ -186,12 +196,12 @@ class TrialBook:
             UnknownNameError: there is no such field.
             InvalidInputError: it contradicts, or cannot be read.
         """
-        given = _merged(trial, _checked(entry))
+        given = merged(trial, checked(entry))
         if correct or again:
             return
         for name, value in given.items():
             present = getattr(trial, name)
-            if present != EMPTY[name] and not _includes(value, present):
+            if present != EMPTY[name] and not includes(value, present):
                 told = f" {quoted(str(present))}" if isinstance(present, str) else ""
                 raise InvalidInputError(
                     f"{self.path}: trial {trial.number} has {name}{told} already; say that this"
@@ -266,44 +276,6 @@ class TrialBook:
                     f"{self.path} is on a file system without locks ({error.strerror}), where two"
                     " writers could lose entries; move it to another one"
                 ) from error
-
-
-def real_outcome(name: str) -> RealOutcome:
-    """The outcome of a name.
-
-    Raises:
-        InvalidInputError: there is none; the message names the nearest.
-    """
-    known = [outcome.value for outcome in RealOutcome]
-    if name not in known:
-        raise InvalidInputError(f"there is no outcome {quoted(name)}; {nearest(name, known)}")
-    return RealOutcome(name)
-
-
-def _checked(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """An entry whose fields exist, with the outcome as such."""
-    for name, value in entry.items():
-        if name not in EMPTY:
-            raise UnknownNameError(f"a trial has no entry {quoted(name)}; {nearest(name, FIELDS)}")
-        if isinstance(value, str) and "\0" in value:
-            raise InvalidInputError(f"{name} has a NUL character: {quoted(value)}")
-    outcome = entry.get("outcome")
-    return {**entry, **({} if outcome is None else {"outcome": real_outcome(outcome)})}
-
-
-def _merged(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, Any]:
-    """With a report of the robot that has what is told besides what is known."""
-    robot = given.get("robot")
-    if not isinstance(robot, Mapping):
-        return dict(given)
-    return {**given, "robot": replace(trial.robot or RobotReport(), **robot)}
-
-
-def _includes(value: Any, present: Any) -> bool:
-    """Whether a value says all that is there."""
-    if isinstance(value, RobotReport) and isinstance(present, RobotReport):
-        return all(v in (None, getattr(value, k)) for k, v in vars(present).items())
-    return bool(value == present)
 
 
 def _now() -> str:

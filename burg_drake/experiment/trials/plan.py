@@ -17,6 +17,7 @@ import numpy as np
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_document import software_versions
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.trials.entries import entered, journal_path, read_entries
@@ -40,7 +41,7 @@ MARGIN = "margin:"
 
 
 def plan_trials(
-    runs: Run | str | Path | Iterable[Run | str | Path],
+    runs: Run | Campaign | str | Path | Iterable[Run | Campaign | str | Path],
     *,
     per_object: int = 10,
     balance: str = "outcome",
@@ -56,8 +57,8 @@ def plan_trials(
     """Chooses grasps for trials on the robot.
 
     Args:
-        runs: one or several, or folders that hold one, or one a scene. A grasp that several of them
-            have judged on the same scene and station is tried once.
+        runs: one or several, of one scene or of many, or their folders. A grasp that several have
+            judged on the same scene and station is tried once.
         per_object: how many grasps of each object of a run, if there are as many.
         balance: what each object's grasps are balanced by, as far as there are enough: `outcome`,
             success and failure in simulation; `stage`, each outcome by itself; `margin:NAME`, bins
@@ -83,7 +84,7 @@ def plan_trials(
             exist; or the file has entries already.
         UnknownNameError: there is no such margin.
     """
-    given = [runs] if isinstance(runs, (Run, str, Path)) else list(runs)
+    given = [runs] if isinstance(runs, (Run, Campaign, str, Path)) else list(runs)
     selection = _selection(
         balance,
         per_object=per_object,
@@ -137,8 +138,9 @@ def require_unused(path: str | Path) -> None:
     trials = load_trials(path).trials if path.exists() else ()
     filled = sum(bool(entered(trial)) for trial in trials)
     if filled or recorded:
+        count = max(filled, len({entry.number for entry in recorded}))
         raise InvalidInputError(
-            f"{path} has entries for {max(filled, len({e.number for e in recorded}))} trials;"
+            f"{path} has entries for {count} {'trial' if count == 1 else 'trials'};"
             " choose another -o, or move it and its journal away"
         )
 

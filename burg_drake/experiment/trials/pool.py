@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.names import name_from
 from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.mode import MODES
 from burg_drake.evaluation.results import load_runs
 from burg_drake.evaluation.run_store import Run
@@ -54,11 +55,11 @@ class Pool:
         return np.asarray(self.run.results[name][self.rows])
 
 
-def gather_runs(given: Iterable[Run | str | Path]) -> dict[str, Run]:
+def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
     """Runs by short keys that do not depend on their order; each run once.
 
     Args:
-        given: runs, or folders that hold one, or one a scene.
+        given: runs, of one scene or of many, or their folders.
 
     Raises:
         InvalidInputError: there is no run, nothing is judged yet, or a run is given in two copies.
@@ -66,7 +67,7 @@ def gather_runs(given: Iterable[Run | str | Path]) -> dict[str, Run]:
     runs: dict[str, Run] = {}
     places = []
     for one in given:
-        for run in [one] if isinstance(one, Run) else load_runs(one):
+        for run in _runs(one):
             places.append(str(run.path))
             if not run.document.hash or not len(run.results["id"]):
                 continue
@@ -129,6 +130,12 @@ def contents(run: Run, only: Collection[str] | None = None) -> dict[str, str]:
         for id, name, X_OG, width in cells
         if only is None or id in only
     }
+
+
+def _runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
+    if isinstance(one, Run):
+        return [one]
+    return one.runs if isinstance(one, Campaign) else load_runs(one)
 
 
 def _pool(key: str, run: Run, among: Among, notes: list[str]) -> Pool:

@@ -141,16 +141,22 @@ def power_table(sheet: TrialSheet) -> TextTable:
 
 def difference_text(trials: int) -> str:
     """Which difference between two methods will show, in a sentence."""
-    found = [smallest_difference(trials, worse) for worse in AGAINST]
-    sizes = ["none" if math.isnan(size) else f"{100 * size:.0f} points" for size in found]
-    more = "; ".join(
-        f"{size} if it is so in {100 * worse:.0f} % of the trials"
-        for size, worse in zip(sizes[1:], AGAINST[1:], strict=True)
-    )
+    found = {worse: smallest_difference(trials, worse) for worse in AGAINST}
+    if all(math.isnan(size) for size in found.values()):
+        return (
+            f"{trials} trials are too few for McNemar's exact test (5 %) to tell two methods apart"
+            " with a chance of 80 %, however much they differ."
+        )
+    told = [
+        f"{100 * size:.0f} points"
+        + (f", if it is so in {100 * worse:.0f} % of the trials" if worse else "")
+        for worse, size in found.items()
+        if not math.isnan(size)
+    ]
     return (
-        f"Two methods on the same {trials} trials: which of them is right more often,"
-        f" McNemar's exact test (5 %) finds with a chance of 80 % if they differ by {sizes[0]} and"
-        f" the worse one is never right alone; {more}."
+        f"Two methods on the same {trials} trials: which of them is right more often, McNemar's"
+        " exact test (5 %) finds with a chance of 80 % if the worse one is never right alone and"
+        f" they differ by {'; by '.join(told)}."
     )
 
 

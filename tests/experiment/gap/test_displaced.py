@@ -12,13 +12,13 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import Candidates, given_candidates
+from burg_drake.experiment.gap import placement_noise
 from burg_drake.experiment.gap.displaced import (
     commanded,
     commanded_candidates,
     displaced_scene,
 )
 from burg_drake.experiment.gap.placement_noise import (
-    MOST_DRAWS,
     PlacementNoise,
     moved,
     noisy_scene,
@@ -86,7 +86,7 @@ def test_candidates_keep_ids_and_all_but_their_poses(scene: Scene) -> None:
 
 def test_errors_of_placement_are_normal_and_follow_from_content(scene: Scene) -> None:
     noise = PlacementNoise(place=0.002, turn=math.radians(2.0), seed=3)
-    scenes = [noisy_scene(scene, noise, k, lambda _: ()).scene for k in range(150)]
+    scenes = [noisy_scene(scene, noise, k, lambda _: ()).scene for k in range(60)]
     errors, turns = [], []
     for one in scenes:
         for name in scene.instances:
@@ -99,10 +99,10 @@ def test_errors_of_placement_are_normal_and_follow_from_content(scene: Scene) ->
             turns.append(turn[2])
     xy = np.array(errors)
     assert np.abs(xy[:, 2]).max() < 1e-9
-    # 900 draws: standard errors are 2.4 % of the deviation, and 3.3 % of it for the mean
-    assert xy[:, :2].std(axis=0) == pytest.approx(0.002, rel=0.1)
-    assert np.std(turns) == pytest.approx(math.radians(2.0), rel=0.1)
-    assert np.abs(xy[:, :2].mean(axis=0)).max() < 3e-4
+    # 360 draws: standard errors are 3.7 % of the deviation, and 5.3 % of it for the mean
+    assert xy[:, :2].std(axis=0) == pytest.approx(0.002, rel=0.13)
+    assert np.std(turns) == pytest.approx(math.radians(2.0), rel=0.13)
+    assert np.abs(xy[:, :2].mean(axis=0)).max() < 4e-4
     again = noisy_scene(scene, noise, 7, lambda _: ()).scene
     assert again.content == scenes[7].content
     assert len({one.content for one in scenes}) == len(scenes)
@@ -116,7 +116,9 @@ def test_no_noise_is_the_scene_itself(scene: Scene) -> None:
         PlacementNoise(turn=-1.0)
 
 
-def test_what_collides_is_drawn_again_and_counted(scene: Scene) -> None:
+def test_what_collides_is_drawn_again_and_counted(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Of a mug that may only stand further right, half of the draws are refused."""
     x = scene.X_SO("mug")[0, 3]
     noise = PlacementNoise(turn=0.0)
@@ -126,18 +128,19 @@ def test_what_collides_is_drawn_again_and_counted(scene: Scene) -> None:
         issue = SceneIssue(instance="mug", kind="overlap", amount=0.01, message="", other="table")
         return [issue] if bad else []
 
-    found = [noisy_scene(scene, noise, k, issues) for k in range(100)]
+    found = [noisy_scene(scene, noise, k, issues) for k in range(40)]
     assert all(one.scene.X_SO("mug")[0, 3] >= x for one in found)
     assert all(one.draws["box"] == 0 for one in found)
     # the number of refused draws is geometric: mean 1, variance 2
-    assert 60 <= sum(one.redrawn for one in found) <= 145
+    assert 18 <= sum(one.redrawn for one in found) <= 70
+    monkeypatch.setattr(placement_noise, "MOST_DRAWS", 5)
     never = noisy_scene(
         scene,
         noise,
         0,
         lambda drawn: issues(scene) if drawn.X_SO("mug")[0, 3] == x else issues_of("mug"),
     )
-    assert never.kept == ("mug",) and never.draws["mug"] == MOST_DRAWS
+    assert never.kept == ("mug",) and never.draws["mug"] == 5
 
 
 def issues_of(name: str) -> list[SceneIssue]:

@@ -18,13 +18,15 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.executor import LocalExecutor
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import changes
-from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, climb
+from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, climb
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
+from burg_drake.experiment.gap.report.sections import push_section
 from burg_drake.experiment.gap.report.tables import gap_json
 from burg_drake.experiment.gap.steps_reality import agreement_by_step
 from burg_drake.experiment.trials.sheet import RealTrial
@@ -40,7 +42,7 @@ NONE = PlacementNoise(place=0.0, turn=0.0)
 ASKED: dict[str, Any] = {
     "grasps": {"box": GraspSet.create(GRASPS, object="box", width=0.06)},
     "engine": "screening",
-    "workers": 1,
+    "executor": LocalExecutor(1),
     "progress": False,
 }
 
@@ -212,3 +214,24 @@ def test_the_page_shows_all_sections(ladder: Ladder) -> None:
     counts = re.findall(r"<text[^>]*>(\d+) (lifted|arm cannot reach|hand collides)</text>", page)
     assert ("1", "arm cannot reach") in counts
     assert "burg-drake replay" in page
+
+
+def test_what_the_approach_pushes_is_told_by_object(known: Ladder) -> None:
+    """Five trials of the arm, as a table has them; one has failed."""
+    arm = Run(known.first.path, known.first.document)
+    arm.__dict__["results"] = {
+        "instance": np.array(["box", "box", "mug", "mug", "mug"]),
+        "object": np.array(["box", "box", "mug", "mug", "mug"]),
+        "outcome": np.array(["lifted", "slipped", "lifted", "lifted", "simulation_failed"]),
+        "pushed": np.array([0.0, 0.004, 0.03, 0.0, np.nan]),
+        "pushed_box": np.array([0.0, 0.004, 0.0, 0.0, np.nan]),
+        "pushed_mug": np.array([0.0, 0.0, 0.03, 0.0, np.nan]),
+    }
+    page = push_section(replace(known, steps=(*known.steps, Step("arm", (arm,)))))
+    assert page is not None and "in 2 of 4 trials (largest 30.0 mm)" in page
+    rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in page.split("<tr>")[2:]]
+    assert rows == [
+        ["box", "2", "1", "2.0", "4.0", "0 of 1", "1 of 1"],
+        ["mug", "2", "1", "15.0", "30.0", "1 of 1", "1 of 1"],
+    ]
+    assert push_section(known) is None

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor, OnFailure
+from burg_drake.evaluation.journal import decode
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.experiment.gap.measured import measured_scene, upright
 from burg_drake.experiment.gap.rejudge import rejudge
 from burg_drake.experiment.gap.rejudged import Rejudging
+from burg_drake.experiment.gap.report.rejudged import rejudged_section, rejudged_words
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
@@ -31,6 +35,7 @@ from burg_drake.experiment.trials.sheet import (
     SourceRun,
     Stratum,
     TrialSheet,
+    save_trials,
 )
 from burg_drake.experiment.trials.sources import grasp_content
 from burg_drake.scene.scene import Scene
@@ -122,7 +127,7 @@ def unseen() -> ObjectPlace:
 @pytest.fixture(scope="module")
 def found(run: Run, sheet: TrialSheet) -> Rejudging:
     out = run.path.parent / "again"
-    return rejudge(sheet, "trials.yaml", out, executor=LocalExecutor(2), progress=False)
+    return rejudge(sheet, "trials.yaml", out, executor=LocalExecutor(1), progress=False)
 
 
 def test_each_trial_is_judged_where_its_objects_stood(run: Run, found: Rejudging) -> None:
@@ -166,14 +171,75 @@ def test_reality_slipped_and_only_the_displaced_scene_says_so(found: Rejudging) 
     assert [t.cause("lifted") for t in found.trials] == ["physics", "placement", None, "physics"]
 
 
+def test_an_answer_that_is_lost_is_asked_for_again(
+    run: Run, sheet: TrialSheet, found: Rejudging, tmp_path: Path
+) -> None:
+    """Killed within the last line: that trial alone goes to the judge, who knows it already."""
+    whole = (found.path / "journal.jsonl").read_bytes()
+    *kept, last = whole.splitlines(keepends=True)
+    (tmp_path / "journal.jsonl").write_bytes(b"".join(kept) + last[:20])
+    lost, verdict = decode(last)
+    asked: list[str] = []
+
+    class Knowing:
+        workers = 1
+
+        def judge(self, jobs: Iterable[Job], on_failure: OnFailure) -> Iterator[Any]:
+            for job in jobs:
+                for candidate in job.candidates:
+                    asked.append(candidate.id)
+                    yield job, candidate, verdict
+
+    again = rejudge(sheet, "trials.yaml", tmp_path, executor=Knowing(), progress=False)  # type: ignore[arg-type]
+    assert asked == [lost] and again.causes == found.causes
+    assert (tmp_path / "journal.jsonl").read_bytes() == whole
+
+
+def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
+    sheet: TrialSheet, tmp_path: Path
+) -> None:
+    class Failing:
+        workers = 1
+
+        def judge(self, jobs: Iterable[Job], on_failure: OnFailure) -> Iterator[Any]:
+            for job in jobs:
+                on_failure(JobFailed(job, SimulationError("no such world")))
+            yield from ()
+
+    found = rejudge(sheet, "trials.yaml", tmp_path, executor=Failing(), progress=False)  # type: ignore[arg-type]
+    assert found.judged == () and found.paired.p_value is None
+    assert found.trials[0].why_not == "SimulationError: no such world"
+    assert "None of the trials could be judged again." in rejudged_words(found)[0]
+    assert "no such world" in rejudged_section(found)
+
+
+def test_compare_tells_it_all(
+    sheet: TrialSheet, found: Rejudging, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """All is known: nothing is simulated here."""
+    folder = found.path.parent
+    save_trials(sheet, folder / "trials.yaml")
+    words = ["compare", str(folder / "run"), str(folder / "trials.yaml")]
+    words += ["--rejudge", str(found.path), "--quiet"]
+    page = tmp_path / "page.html"
+    assert main([*words, "--html", str(page)]) == 0
+    told = capsys.readouterr().out
+    assert "Of the 3 that disagree as planned, placement explains 1 (33.3 %" in " ".join(
+        told.split()
+    )
+    assert "<h2>Judged again where objects stood</h2>" in page.read_text()
+    assert f"<span>--rejudge</span> <span>{found.path}</span>" in page.read_text()
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rejudged"]["causes"]["physics"] == 2
+    assert main(["compare", str(folder / "run"), str(folder / "run"), "--rejudge"]) == 2
+    assert "--rejudge judges real trials again; give a trials file" in capsys.readouterr().err
+
+
 def test_the_folder_goes_on_and_tells_all(run: Run, sheet: TrialSheet, found: Rejudging) -> None:
     journal = found.path / "journal.jsonl"
     before = journal.read_bytes()
     again = rejudge(sheet, "trials.yaml", found.path, executor=Nobody(), progress=False)  # type: ignore[arg-type]
     assert journal.read_bytes() == before and again.causes == found.causes
-    journal.write_bytes(before[: before.rindex(b"\n", 0, -1) + 20])  # killed within the last line
-    whole = rejudge(sheet, "trials.yaml", found.path, executor=LocalExecutor(1), progress=False)
-    assert len(journal.read_bytes().splitlines()) == 3 and whole.causes == found.causes
     told = json.loads((found.path / "rejudged.json").read_text())
     assert told["causes"]["placement"] == 1 and told["judged"] == 3
     assert told["agree"]["measured"]["count"] == 1 and told["trials"][2]["measured"] is None

@@ -6,10 +6,12 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
@@ -26,7 +28,6 @@ from burg_drake.experiment.pages.lab_camera import LabCamera
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import load_trials
-from tests.apps.ar_views import Camera
 
 TIME = "2026-05-05T10:02:11+02:00"
 
@@ -135,7 +136,8 @@ def test_a_photo_and_the_placement_are_kept_before_a_trial(lab: LabBook, trials:
     camera = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
     board = lab.runs.of(lab.runs.sheet.trial(5)).scene.board
     photo = board_image(board, camera, make_pose(np.diag([1.0, -1.0, -1.0]), (0.3, 0.21, 0.6)))
-    over = LabCamera(lab, lambda scene: Camera(photo), camera)
+    cv2.imwrite(str(trials.parent / "photo.png"), photo[..., ::-1])
+    over = LabCamera(lab, lambda scene: open_source(trials.parent / "photo.png"), camera)
     try:
         over.watch(5)
         assert over.next_picture(0, 0, 30.0) is not None

@@ -20,6 +20,7 @@ from burg_drake.experiment.pages.words import SHORT_LIST, approach_text, closing
 from burg_drake.experiment.trials.sheet import RealTrial, RobotReport
 
 VOID = {"meta", "br", "img"}
+SMALL = (260, 195)
 NOTE = "<script>alert('1')</script> & \"co\""
 
 
@@ -63,7 +64,7 @@ class Twice:
 
     def grasp(self, trial: RealTrial) -> bytes:
         if trial.grasp not in self._made:
-            self._made[trial.grasp] = self._pictures.grasp(trial)
+            self._made[trial.grasp] = self._pictures.grasp(trial, SMALL)
         return self._made[trial.grasp]
 
     def setup(self, trial: RealTrial) -> tuple[bytes, bytes]:

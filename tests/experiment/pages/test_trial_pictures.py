@@ -69,12 +69,12 @@ def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
 def test_pictures_follow_from_the_grasps_alone(
     runs: TriedRuns, pictures: TrialPictures, by_rays: TrialPictures
 ) -> None:
-    seen = [pictures.grasp(trial) for trial in runs.sheet.trials]
+    seen = [pictures.grasp(trial, SMALL) for trial in runs.sheet.trials[:3]]
     assert len(set(seen)) == len(seen)
-    assert pictures.grasp(runs.sheet.trials[0]) == seen[0]  # others came between
+    assert pictures.grasp(runs.sheet.trials[0], SMALL) == seen[0]  # others came between
     assert TrialPictures(runs, rays=True).grasp(runs.sheet.trials[1], SMALL) == by_rays.grasp(
         runs.sheet.trials[1], SMALL
     )
-    assert max(map(len, seen)) < 40_000
+    assert len(pictures.grasp(runs.sheet.trials[0])) < 40_000
     above, front = pictures.setup(runs.sheet.trials[0])
     assert above != front and max(len(above), len(front)) < 80_000

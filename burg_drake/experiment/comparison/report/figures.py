@@ -101,8 +101,8 @@ def _how(judged: Named) -> str:
         text = (
             "The grasps were chosen from strata. Figures of the selected trials describe the"
             " experiment; figures for all grasps, in which each trial stands for its share of a"
-            " stratum, describe what a user of the simulator meets. 95 % intervals: Wilson's for shares"
-            " of the selected trials; a Bayesian bootstrap within strata for all others."
+            " stratum, describe what a user of the simulator meets. 95 % intervals: Wilson's for"
+            " shares of the selected trials; a Bayesian bootstrap within strata for all others."
         )
     return text
 

@@ -17,24 +17,21 @@ MOST_PLOTS = 4
 
 def margin_section(judged: Judgement) -> Html | None:
     """What margins tell about success; nothing where there are none."""
-    found = sorted(judged.calibration, key=_telling, reverse=True)
+    defined = [c for c in judged.calibration if c.auroc.value is not None]
+    found = sorted(defined, key=_telling, reverse=True)
     if not found:
         return None
     weighted = any(c.auroc_weighted is not None for c in found)
     head = ["margin", "trials", "AUROC"]
     head += ["AUROC, all grasps"] if weighted else []
     rows = [_row(c, weighted) for c in found]
-    plots = [
-        reliability_plot(c, "actual success")
-        for c in found[:MOST_PLOTS]
-        if c.auroc.value is not None
-    ]
+    plots = [reliability_plot(c, "actual success") for c in found[:MOST_PLOTS]]
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
         "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
-        f" margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes among {trials} in bins of about"
-        " equally many trials, with Wilson's intervals; line: the monotone curve that fits best;"
-        " dashes: all of them."
+        " margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes"
+        f" among {trials} in bins of about equally many trials, with Wilson's intervals; line: the"
+        " monotone curve that fits best; dashes: all of them."
     )
     return section(
         "Do margins tell what will succeed?",

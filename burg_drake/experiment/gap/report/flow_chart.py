@@ -21,6 +21,7 @@ STYLE = """
   stroke-width: 3px; stroke-linejoin: round; }
 .flow .head { font-weight: 600; font-size: 14px; }
 .flow path { opacity: 0.38; }
+.scroll + .scroll { margin-top: 20px; }
 """
 Flow = Counter[tuple[Outcome, Outcome]]
 Place = tuple[float, float]

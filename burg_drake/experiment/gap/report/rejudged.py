@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shlex
+from collections import Counter
 from collections.abc import Sequence
 
 from burg_drake.core.figures import percent
+from burg_drake.core.outcome import Stage
 from burg_drake.core.text_table import TextTable
 from burg_drake.evaluation.report.charts import interval_mark
 from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section, table
@@ -24,7 +26,7 @@ def rejudged_words(found: Rejudging) -> list[str]:
     """What came of it, in sentences."""
     whole = len(found.judged)
     if not whole:
-        return [f"None of the trials could be judged again{_skipped(found)}."]
+        return ["None of the trials could be judged again.", *_skipped(found)]
     of, p = found.causes, found.paired.p_value
     planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
     count, wrong, low, high = found.explained
@@ -40,17 +42,23 @@ def rejudged_words(found: Rejudging) -> list[str]:
             f" {of['physics']} are left to physics."
         )
     if of["worsened"]:
-        told.append(f"{of['worsened']} agreed as planned and do not as measured.")
+        told.append(f"Worsened: {of['worsened']} that agreed as planned.")
+    within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
+    if within:
+        told.append(
+            f"In {within} the open hand would be within a displaced object, which counts as a"
+            " collision, though a robot may push it aside."
+        )
     not_judged = [trial for trial in found.trials if trial not in found.judged]
-    if not_judged or found.skipped:
-        told.append(f"{len(not_judged)} could not be judged{_skipped(found)}.")
-    return told
+    if not_judged:
+        told.append(f"{len(not_judged)} could not be judged again.")
+    return [*told, *_skipped(found)]
 
 
-def _skipped(found: Rejudging) -> str:
-    reasons = dict.fromkeys(found.skipped.values())
-    counts = [f"{list(found.skipped.values()).count(why)} {why}" for why in reasons]
-    return f"; left out: {', '.join(counts)}" if counts else ""
+def _skipped(found: Rejudging) -> list[str]:
+    counts = Counter(found.skipped.values())
+    parts = [f"{count} {why}" for why, count in counts.items()]
+    return [f"Left out: {', '.join(parts)}."] if parts else []
 
 
 def rejudged_view(found: Rejudging) -> TextTable:
@@ -69,12 +77,15 @@ def rejudged_section(found: Rejudging) -> Html:
     return section(
         "Judged again where objects stood",
         " ".join(rejudged_words(found)),
-        _counts(found),
-        _cube(found),
-        _listing(found),
+        *_spread(_counts(found), _cube(found), _listing(found)),
         element("p", f"Rows of {TABLE_FILE} can be replayed in the scene as measured:"),
         command(replay_line(found, 1)),
     )
+
+
+def _spread(*parts: Html | None) -> list[Html]:
+    """Tables with some room between them."""
+    return [element("div", part, style="margin-top:20px") for part in parts if part is not None]
 
 
 def _counts(found: Rejudging) -> Html:

@@ -36,16 +36,16 @@ def _sentence(change: Change, document: GapDocument) -> str:
     lost, whole = len(change.lost), change.successes
     share = f" ({percent(lost / whole)})"
     left = whole - lost + len(change.won)
-    won = f", {len(change.won)} are won" if change.won else ""
+    won = f", {len(change.won)} {_are(len(change.won))} won" if change.won else ""
     if change.step == "reach":
         return (
-            f"Of these {whole}, {lost}{share} are lost to the arm{_why(change)}{won};"
-            f" {left} are left."
+            f"Of these {whole}, {lost}{share} {_are(lost)} lost to the arm{_why(change)}{won};"
+            f" {left} {_are(left)} left."
         )
     if change.step == "arm":
         return (
-            f"Of these {whole}, {lost}{share} are lost when the whole arm executes them"
-            f"{_why(change)}{won}; {left} are left."
+            f"Of these {whole}, {lost}{share} {_are(lost)} lost when the whole arm executes them"
+            f"{_why(change)}{won}; {left} {_are(left)} left."
         )
     low, high = change.share_lost
     return (
@@ -54,6 +54,10 @@ def _sentence(change: Change, document: GapDocument) -> str:
         f" {document.samples} displaced scenes fail{_why(change)}; the 95 % interval is"
         f" {100 * low:.0f} to {100 * high:.0f} %."
     )
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
 
 
 def _noise(document: GapDocument) -> str:

@@ -66,7 +66,7 @@ def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
 def _share(found: Figure) -> str:
     if found.value is None:
         return "-"
-    return f"{100 * found.value:.0f} ({interval(found, percent=True)}) %"
+    return f"{100 * found.value:.0f} {interval(found, percent=True)} %"
 
 
 def gap_json(

@@ -1,0 +1,226 @@
+"""A real local cluster of Dask, and what happens when parts of it fail."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, expected, refuse
+
+import burg_drake
+from burg_drake.core.errors import ClusterError, InvalidInputError
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executor import Job, JobFailed
+from burg_drake.evaluation.limits import Limits
+
+distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+
+from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect  # noqa: E402
+from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
+
+LIMITS = Limits(cpu=0.5, wall=4.0)
+
+
+class Cluster:
+    """Two workers, and an executor on them."""
+
+    def __init__(self) -> None:
+        self.nodes = LocalNodes(2)
+        self.client = distributed.Client(self.nodes.address, set_as_default=False, timeout=30)
+        self.executor = DaskExecutor(self.client, LIMITS, self.nodes.mend)
+
+    def close(self) -> None:
+        self.client.close(timeout=2)
+        self.nodes.close()
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.2)
+        cluster = Cluster()
+        yield cluster
+        cluster.close()
+
+
+def grasps(n: int, scene: str = "cube") -> list[Candidate]:
+    return [Candidate(f"{scene}-{i:04d}", scene, np.eye(4)) for i in range(n)]
+
+
+def outcomes(answers: list[Any]) -> dict[str, Outcome]:
+    assert len({grasp.id for _, grasp, _ in answers}) == len(answers)
+    return {grasp.id: verdict.outcome for _, grasp, verdict in answers}
+
+
+def executed(n: int) -> list[str]:
+    """Ids of the first grasps that are executed."""
+    return [c.id for c in grasps(200) if expected(c.id).value.startswith("lifted")][:n]
+
+
+def test_jobs_are_judged_as_they_are_here(cluster: Cluster, tmp_path: Path) -> None:
+    log = tmp_path / "built"
+    jobs = [
+        Job(name, MakeAndTell(KnownJudge(), log, name), grasps(n, name))
+        for name, n in (("a", 70), ("empty", 0), ("b", 9))
+    ]
+    found = outcomes(list(cluster.executor.judge(jobs)))
+    assert found == {g.id: expected(g.id) for job in jobs for g in job.candidates}
+    built = [line.split() for line in log.read_text().splitlines()]
+    assert len({tuple(line) for line in built}) == len(built)  # once a child
+    assert len({process for _, process in built}) == 2
+
+
+def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
+    kinds = ("segfault", "exit", "hang", "spin", "memory")
+    how = dict(zip(executed(len(kinds)), kinds, strict=True))
+    judge = CrashingJudge(how=tuple(how.items()))
+    answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(60))]))
+    failed = dict.fromkeys(how, Outcome.SIMULATION_FAILED)
+    assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(60)} | failed
+    reasons = {g.id: v.reason for _, g, v in answers if g.id in how}
+    assert [reasons[id] for id in how] == [
+        "the worker process was ended by SIGSEGV",
+        "the worker process ended: SystemExit: a condition of Drake failed",
+        "took longer than 4 s",
+        "took longer than 0.5 s of CPU time",
+        "MemoryError",
+    ]
+    assert not any(verdict.interrupted for _, _, verdict in answers)
+
+
+def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
+    jobs = [Job("bad", refuse, grasps(5, "bad")), Job("good", Make(KnownJudge()), grasps(5))]
+    failed: list[JobFailed] = []
+    found = outcomes(list(cluster.executor.judge(jobs, failed.append)))
+    assert found == {g.id: expected(g.id) for g in grasps(5)}
+    assert [(f.job.key, str(f.error)) for f in failed] == [("bad", "no such model")]
+    with pytest.raises(InvalidInputError, match="no such model"):
+        list(cluster.executor.judge(jobs))
+
+
+def test_lost_workers_cost_nothing(cluster: Cluster) -> None:
+    job = Job("job", Make(KnownJudge(pause=0.03)), grasps(120))
+    answers = []
+    for k, answer in enumerate(cluster.executor.judge([job])):
+        answers.append(answer)
+        if k in (5, 40):
+            cluster.nodes.workers[k % 2].kill()
+    assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(120)}
+
+
+def test_a_grasp_at_which_workers_are_lost_is_tried_alone_and_is_not_blamed(
+    cluster: Cluster,
+) -> None:
+    (guilty,) = executed(1)
+    judge = CrashingJudge(how=((guilty, "parent"),))
+    answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(20))]))
+    failed = {guilty: Outcome.SIMULATION_FAILED}
+    assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(20)} | failed
+    verdict = next(v for _, g, v in answers if g.id == guilty)
+    assert verdict.interrupted
+    assert verdict.reason == "3 workers of the cluster were lost at it, one after the other"
+
+
+def test_leaving_early_ends_the_children(cluster: Cluster, tmp_path: Path) -> None:
+    log = tmp_path / "built"
+    job = Job("job", MakeAndTell(KnownJudge(pause=0.05), log, "job"), grasps(400))
+    judged = cluster.executor.judge([job])
+    next(judged)
+    children = [int(line.split()[1]) for line in log.read_text().splitlines()]
+    assert children
+    judged.close()
+    wait_for(lambda: not any(map(is_alive, children)))
+
+
+def test_other_versions_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker whose release of the package differs in one comment."""
+    package = Path(burg_drake.__file__).parent
+    shutil.copytree(package, tmp_path / package.name, ignore=shutil.ignore_patterns("*.pyc"))
+    with (tmp_path / package.name / "core/content.py").open("a") as file:
+        file.write("# another release\n")
+    with monkeypatch.context() as patch:
+        patch.syspath_prepend(tmp_path)
+        nodes = LocalNodes(1)
+    try:
+        with connect(nodes.address) as executor:
+            job = Job("job", Make(KnownJudge()), grasps(3))
+            other = r"^worker tcp://127\S+ has code of burg_drake \w{12} \(here \w{12}\); verdicts"
+            with pytest.raises(ClusterError, match=other):
+                list(executor.judge([job]))
+    finally:
+        nodes.close()
+
+
+def test_a_scheduler_that_dies_is_said_in_one_line() -> None:
+    nodes = LocalNodes(1)
+    job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
+    answers = []
+    try:
+        lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
+        with pytest.raises(ClusterError, match=lost), connect(nodes.address) as executor:
+            for answer in executor.judge([job]):
+                answers.append(answer)
+                nodes.scheduler.kill()
+        assert answers
+    finally:
+        nodes.close()
+
+
+DRIVER = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_cluster import *
+with connect("local:2") as executor:
+    job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps(400))
+    for answer in executor.judge([job]):
+        print(answer[1].id, flush=True)
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="looks for processes in /proc")
+def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
+    log = tmp_path / "built"
+    program = DRIVER.format(tests=str(Path(__file__).parent), log=str(log))
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as driver:
+        assert driver.stdout is not None
+        assert driver.stdout.readline()
+        nodes = Path(f"/proc/{driver.pid}/task/{driver.pid}/children").read_text().split()
+        children = [line.split()[1] for line in log.read_text().splitlines()]
+        processes = [int(pid) for pid in (*nodes, *children)]
+        assert len(nodes) == 3
+        driver.send_signal(signal.SIGKILL)
+    wait_for(lambda: not any(map(is_alive, processes)))
+
+
+def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
+    start = time.monotonic()
+    reached = r"^no scheduler of Dask is reached at tcp://127.0.0.1:9 within 1 s: .*refused"
+    with pytest.raises(ClusterError, match=reached), connect("tcp://127.0.0.1:9"):
+        pass
+    assert time.monotonic() - start < 5.0
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(true: Callable[[], bool], limit: float = 10.0) -> None:
+    end = time.monotonic() + limit
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
