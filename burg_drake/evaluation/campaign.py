@@ -143,7 +143,12 @@ class Campaign:
         return self.path / REPORT_FILE
 
     @property
-    def expected(self) -> dict[str, int]:
+    def expected(self) -> int:
+        """Number of grasps that are judged here; see `expected_by_scene`."""
+        return sum(self.expected_by_scene.values())
+
+    @property
+    def expected_by_scene(self) -> dict[str, int]:
         """Number of grasps that are judged here, by scene; of scenes that have not been begun as
         many as are asked for, and 0 if grasps are given."""
         document, shard = self.document, self.document.shard_of_grasps

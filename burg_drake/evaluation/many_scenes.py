@@ -157,7 +157,7 @@ class _Call:
 
     def _judge(self, left: list[str], crew: SceneCrew) -> None:
         document = self.campaign.document
-        self.expected = self.campaign.expected
+        self.expected = self.campaign.expected_by_scene
         there = sum(n for name, n in self.expected.items() if name not in left)
         event = Progress(STARTING, there, sum(self.expected.values()), outcomes=self._found())
         self.pace = Pace(self.reporter.show, event, "judging")

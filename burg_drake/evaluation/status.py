@@ -114,13 +114,15 @@ class _Tail:
         found = LINE.findall(data)
         self.lines += len(found)
         self.outcomes.update(outcome for _, outcome in found)
-        if self.failed:
-            for id, _ in found:
-                if id in self.failed:  # judged again
-                    self.failed.discard(id)
-                    self.outcomes[FAILED] -= 1
-                    self.lines -= 1
-        self.failed |= {id for id, outcome in found if outcome == FAILED}
+        if not self.failed and self.outcomes[FAILED] == 0:
+            return
+        for id, outcome in found:
+            if id in self.failed:  # judged again
+                self.failed.discard(id)
+                self.outcomes[FAILED] -= 1
+                self.lines -= 1
+            if outcome == FAILED:
+                self.failed.add(id)
 
 
 class Watch:
@@ -178,7 +180,7 @@ class Watch:
             judged += tail.lines
             last = max(last, tail.modified)
         working = is_locked(campaign.path / LOCK_FILE)
-        total = max(judged, sum(campaign.expected.values()))
+        total = max(judged, campaign.expected)
         now = open_results(campaign.path)
         rate = self._rate(judged, now.document.stretches, working)
         mine = set(campaign.names)

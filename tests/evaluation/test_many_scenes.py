@@ -32,8 +32,14 @@ OPTIONS = {"grasps_per_object": 5, "blind": True, "progress": False}
 
 
 @pytest.fixture
-def scenes(scene: Scene, tmp_path: Path) -> list[Path]:
-    """Three scenes of the same library: one moved, one without the bar."""
+def scenes(scene: Scene, tmp_path: Path, request: pytest.FixtureRequest) -> list[Path]:
+    """Three scenes of the same library: one moved, one without the bar. Unless a test asks for
+    `reports`, pages take no time."""
+    if "reports" not in request.fixturenames:
+        patch = request.getfixturevalue("monkeypatch")
+        for place in ("preparation.write_report", "many_scenes.write_campaign_report"):
+            patch.setattr(f"burg_drake.evaluation.{place}", write_nothing)
+        patch.setattr("burg_drake.evaluation.merge_campaigns.write_campaign_report", write_nothing)
     document = scene.document
     moved = replace(document.instances[0], X_SO=Pose((0.12, 0.2, 0.025)))
     folder = tmp_path / "scenes"
@@ -46,6 +52,15 @@ def scenes(scene: Scene, tmp_path: Path) -> list[Path]:
         changed = replace(document, name=name, library="../shapes", instances=instances)
         save_scene(changed, folder / f"{name}.yaml")
     return sorted(folder.iterdir())
+
+
+def write_nothing(run: Run | Campaign) -> None:
+    run.report_path.write_text("")
+
+
+@pytest.fixture
+def reports() -> None:
+    """Reports are written."""
 
 
 def run_all(scenes: list[Path], station: Station, out: Path, **options) -> Campaign:
@@ -61,9 +76,10 @@ def same(a: Columns, b: Columns) -> bool:
 
 
 def test_each_scene_is_as_on_its_own(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, reports: None
 ) -> None:
     campaign = run_all(scenes, station, tmp_path / "all")
+    assert "3 scenes" in campaign.report_path.read_text()
     assert campaign.names == ["cubes", "moved", "three"] and campaign.complete
     alone: list[Run] = [
         evaluate(path, station, tmp_path / path.stem, executor=Inline(1), **OPTIONS)

@@ -105,7 +105,7 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
         number, _, whole = campaign.document.shard.partition("/")
         parts.append(f"This is shard {number} of {whole}; burg-drake merge unites the shards.")
     if not campaign.complete:
-        judged, expected = count(summary.total.judged), count(sum(campaign.expected.values()))
+        judged, expected = count(summary.total.judged), count(campaign.expected)
         parts.append(
             f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
             " goes on with it."

@@ -1,0 +1,104 @@
+"""`status` from another process than the one that works, and a campaign that is killed."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from inline_executor import Inline
+from test_many_scenes import OPTIONS, run_all, same, scenes
+
+from burg_drake.apps.cli import main
+from burg_drake.evaluation.campaign import load_campaign
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.journal import JOURNAL_FILE
+from burg_drake.evaluation.status import Watch, read_status
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+__all__ = ["scenes"]
+SCRIPT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+import known_judge
+from inline_executor import Inline
+from burg_drake.evaluation import cascade, many_scenes
+def patch(place, value):
+    module, _, name = place.rpartition(".")
+    if "reachability" not in place:
+        setattr(__import__(module, fromlist=[name]), name, value)
+known_judge.install(patch, pause=0.04)
+cascade.evaluate({scenes!r}, "panda_tabletop", {out!r}, executor=Inline(3),
+    grasps_per_object=5, blind=True, progress=False)
+"""
+
+
+def test_of_a_run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> None:
+    out = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(scene, station, out, executor=Inline(stop=6), **OPTIONS)
+    watch = Watch(out)
+    status = watch.look()
+    assert (status.judged, status.total, status.complete, status.working) == (6, 15, False, False)
+    run = evaluate(scene, station, out, executor=Inline(), **OPTIONS)
+    status = watch.look()
+    assert (status.judged, status.complete, status.left) == (15, True, None)
+    assert status.outcomes == Counter(run.results["outcome"].tolist())
+    journal = out / JOURNAL_FILE
+    lines = journal.read_bytes().splitlines(keepends=True)
+    fail = b'{"id":"new","outcome":"simulation_failed","stage":"executed"}\n'
+    journal.write_bytes(b"".join(lines[:-2]) + fail)
+    assert read_status(out).outcomes["simulation_failed"] == 1
+    journal.write_bytes(b"".join(lines[:-2]) + fail + fail.replace(b"simulation_failed", b"lifted"))
+    again = read_status(out)
+    assert again.outcomes["simulation_failed"] == 0 and again.judged == 14
+
+
+def test_of_a_campaign_that_is_killed(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, capsys
+) -> None:
+    out = tmp_path / "killed"
+    names = [str(path) for path in scenes]
+    text = SCRIPT.format(tests=str(Path(__file__).parent), scenes=names, out=str(out))
+    process = subprocess.Popen([sys.executable, "-c", text], cwd=tmp_path)
+    try:
+        while not (out / "campaign.yaml").exists():
+            assert process.poll() is None
+            time.sleep(0.02)
+        watch = Watch(out)
+        while (status := watch.look()).judged < 13:
+            assert process.poll() is None
+            time.sleep(0.01)
+        assert status.working and status.total == 40 and status.scenes == 3
+        assert 13 <= sum(status.outcomes.values()) == status.judged < 40
+        assert "being written" in str(refused(scenes, station, out))
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    there = read_status(out)
+    assert not there.working and there.judged >= status.judged and not there.complete
+    assert len(load_campaign(out).columns(["id"])["id"]) == there.judged
+    again = run_all(scenes, station, out)
+    whole = run_all(scenes, station, tmp_path / "whole")
+    assert same(whole.results, again.results)
+    capsys.readouterr()
+    assert main(["status", str(out), "--json", "--follow"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["complete"] and told["judged"] == told["total"] == 40 and told["done"] == 3
+    assert main(["status", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("40 of 40 grasps judged (100 %)\noutcomes  ")
+    assert "scenes    3 of 3 done\nprocess   none, and nothing is left to do; last" in text
+
+
+def refused(scenes: list[Path], station: Station, out: Path) -> Exception:
+    with pytest.raises(ValueError) as error:
+        run_all(scenes, station, out)
+    return error.value
