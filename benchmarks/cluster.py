@@ -32,7 +32,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "evaluation"))
 from known_judge import Make, TimedJudge
 
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.dask_executor import connect
+from burg_drake.evaluation.cluster.dask_executor import connect_cluster
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 
 SLOWEST = 1800.0
@@ -164,7 +164,7 @@ def table(folder: Path) -> dict[str, Any]:
 
 def overhead(workers: int) -> None:
     """Measures what is lost between trials."""
-    with connect(f"local:{workers}") as cluster:
+    with connect_cluster(f"local:{workers}") as cluster:
         for name, executor in (("cluster", cluster), ("local pool", LocalExecutor(workers))):
             lost(name, executor, workers)
 

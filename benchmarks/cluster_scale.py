@@ -7,7 +7,7 @@ place of a child with Drake they sleep for as long as a grasp takes on average (
 is sent is what is sent otherwise, and verdicts have the size of real ones. It prints, for each
 time, how much longer it took than the workers slept, the CPU time of scheduler and driver a chunk,
 the bytes a grasp there and back, and at how many workers the busier of the two would be busy all
-the time.
+the time if all chunks were whole. CPU times hold on a busy machine, too; how long it took does not.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from known_judge import KnownJudge, Make
 from burg_drake.core.processes import start_worker
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster import remote
-from burg_drake.evaluation.cluster.dask_executor import connect
+from burg_drake.evaluation.cluster.dask_executor import connect_cluster
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes
 from burg_drake.evaluation.cluster.node import LOOPBACK, NO_WEB
 from burg_drake.evaluation.cluster.recipe import Recipe
@@ -40,6 +40,9 @@ from burg_drake.evaluation.cluster.sent_job import MOST
 from burg_drake.evaluation.executor import Job
 from burg_drake.evaluation.judge import judge_grasp
 from burg_drake.evaluation.limits import Limits
+
+IDLE = 10.0
+"""For so long the scheduler is watched with nothing to do [s]."""
 
 
 def main() -> None:
@@ -55,19 +58,38 @@ def main() -> None:
     nodes = LocalNodes(0)
     sleepers, connection = start_worker("cluster_scale")
     try:
-        with connect(nodes.address) as executor:
+        with connect_cluster(nodes.address) as executor:
             connection.send((nodes.address, arguments.workers))
             while executor.workers < arguments.workers:
                 time.sleep(0.5)
+            idle = idle_share(nodes.scheduler.pid)
+            print(f"idle, the scheduler uses {100 * idle:.1f} % of a processor", flush=True)
             for seconds in arguments.seconds:
-                measure(executor, nodes.scheduler.pid, arguments, seconds)
+                measure(executor, nodes.scheduler.pid, idle, arguments, seconds)
     finally:
         sleepers.kill()
         nodes.close()
 
 
-def measure(executor: Any, scheduler: int, arguments: argparse.Namespace, seconds: float) -> None:
-    """Prints what one run costs."""
+def idle_share(scheduler: int) -> float:
+    """CPU time of the scheduler a second, with nothing to do but to hear of its workers."""
+    begin, cpu = time.monotonic(), cpu_time(scheduler)
+    time.sleep(IDLE)
+    return (cpu_time(scheduler) - cpu) / (time.monotonic() - begin)
+
+
+def measure(
+    executor: Any, scheduler: int, idle: float, arguments: argparse.Namespace, seconds: float
+) -> None:
+    """Prints what one run costs.
+
+    Args:
+        executor: on the cluster.
+        scheduler: its process.
+        idle: see `idle_share`.
+        arguments: of the command.
+        seconds: that a grasp takes.
+    """
     count = arguments.workers * arguments.grasps
     grasps = [Candidate(f"cube-{k:06d}", "cube", np.eye(4)) for k in range(count)]
     job = Job("sleep", Make(KnownJudge(pause=seconds)), grasps)
@@ -81,13 +103,16 @@ def measure(executor: Any, scheduler: int, arguments: argparse.Namespace, second
     used = [
         cpu_time(pid) - before for pid, before in zip((scheduler, os.getpid()), cpu, strict=True)
     ]
+    used[0] = max(0.0, used[0] - idle * took)
     ideal = seconds * arguments.grasps
-    full = [ideal * arguments.workers / max(u, 1e-9) for u in used]
+    # with whole chunks, and what idle workers cost besides
+    each = [u / chunks / (MOST * seconds) for u in used]  # of a processor, a worker
+    full = min(1.0 / (each[0] + idle / arguments.workers), 1.0 / each[1])
     print(
         f"{seconds:g} s a grasp: {judged} grasps in {chunks} chunks, {took:.1f} s for {ideal:.1f} s"
         f" a worker; CPU time of the scheduler {used[0]:.2f} s ({1e3 * used[0] / chunks:.1f} ms a"
         f" chunk), of the driver {used[1]:.2f} s ({1e3 * used[1] / chunks:.1f} ms a chunk);"
-        f" full at {min(full):,.0f} workers",
+        f" with chunks of {MOST} grasps full at {full:,.0f} workers",
         flush=True,
     )
 
