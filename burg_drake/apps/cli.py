@@ -19,11 +19,14 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    compare,
     evaluate,
     frames,
+    gap,
     grasps,
     hand,
     library,
+    merge,
     printout,
     reach,
     replay,
@@ -33,6 +36,8 @@ from burg_drake.apps import (
     scene,
     setup,
     station,
+    status,
+    trials,
 )
 from burg_drake.apps.arguments import Parser, examples
 from burg_drake.core.errors import BurgError, shown
@@ -53,9 +58,14 @@ VERBS = (
     grasps,
     reach,
     evaluate,
+    status,
+    merge,
     robustness,
+    gap,
     replay,
     report,
+    trials,
+    compare,
     station,
     hand,
     frames,

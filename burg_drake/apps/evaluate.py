@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
     DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
     ENGINE_NAMES,
+    SCENE_NAMES,
     add_quiet,
-    add_scene,
     add_station,
     add_verb,
     workers,
 )
 from burg_drake.apps.cluster_option import add_cluster, chosen_cluster
+from burg_drake.apps.evaluate_many import evaluate_many
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.motion_options import add_motion, chosen_motion, require_standoff_of_arm
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
@@ -38,7 +40,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "evaluate",
         run_evaluate,
-        "judge grasps of a scene on a station: clear, reachable, planned, executed",
+        "judge grasps of scenes on a station: clear, reachable, planned, executed",
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
         "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
@@ -48,16 +50,25 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
         "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
+        "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
+        "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
         "",
         "The same command goes on where an interrupted one stopped.",
     )
-    add_scene(parser)
+    parser.add_argument(
+        "scenes",
+        metavar="SCENE",
+        nargs="+",
+        help="scene file, folder of scenes, or name of a built-in one:"
+        f" {', '.join(SCENE_NAMES)}; several make one run over all of them",
+    )
     add_station(parser)
     parser.add_argument(
         "-o",
         "--output",
         metavar="RUN",
-        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE)",
+        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE; for several scenes"
+        " it has to be given)",
     )
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
@@ -86,6 +97,12 @@ def add_to(verbs: Any) -> None:
         " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
         " there is no arm)",
     )
+    parser.add_argument(
+        "--shard",
+        metavar="K/N",
+        help="judge a share of the work, such as 2/8, on one of several machines: every N-th scene,"
+        " or of fewer than N scenes every N-th grasp; burg-drake merge unites them",
+    )
     add_motion(parser)
     add_retry_failed(parser, "grasps")
     add_quiet(parser)
@@ -99,13 +116,18 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation.motion_numbers import motion_text
     from burg_drake.motion.usable_arm import require_usable_arm
     from burg_drake.scene.scene import load_scene
+    from burg_drake.scene.scene_files import scene_references
     from burg_drake.station.grasp_motion import GraspMotion
     from burg_drake.station.sound_scene import require_sound_scene
     from burg_drake.station.station import load_station
 
     require_file(arguments)
     require_sampled(arguments)
-    scene = load_scene(arguments.scene)
+    references = scene_references(arguments.scenes)
+    if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
+        with chosen_cluster(arguments) as executor:
+            return evaluate_many(arguments, references, executor=executor)
+    scene = load_scene(references[0])
     station = load_station(arguments.station)
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
@@ -131,6 +153,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             workers=arguments.workers,
             executor=executor,
+            shard=arguments.shard,
             table=arguments.table,
             mode=mode,
             motion=motion,
@@ -138,6 +161,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             progress=not arguments.quiet,
         )
     print_summary(run)
+    if run.document.shard:
+        print(f"shard   {run.document.shard}; burg-drake merge unites all of them")
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     print(f"table   {run.table_path}")

@@ -16,20 +16,32 @@ def add_to(verbs: Any) -> None:
         run_report,
         "print what a run found so far, and write its report again",
         "burg-drake report runs/first",
+        "burg-drake report runs/many",
+        "burg-drake report runs/many/scenes/kitchen_3",
     )
-    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
+    parser.add_argument(
+        "run_folder",
+        metavar="RUN",
+        help="folder of a run, of one scene or of many, or RUN/scenes/NAME for one of these",
+    )
 
 
 def run_report(arguments: argparse.Namespace) -> int:
-    """Prints the tables of a run and writes its report."""
+    """Prints the tables of a run, of one scene or of many, and writes its report."""
     from burg_drake.apps.evaluate import print_summary
-    from burg_drake.evaluation.report import write_report
-    from burg_drake.evaluation.run_store import load_run
+    from burg_drake.apps.evaluate_many import how_it_ended, print_campaign
+    from burg_drake.evaluation.campaign import Campaign
+    from burg_drake.evaluation.report import write_campaign_report, write_report
+    from burg_drake.evaluation.results import open_results
 
-    run = load_run(arguments.run_folder)
+    run = open_results(arguments.run_folder)
+    if isinstance(run, Campaign):
+        write_campaign_report(run)
+        print_campaign(run)
+        return how_it_ended(run)
     write_report(run)
     print_summary(run)
     if not run.complete:
-        print(f"{len(run.verdicts)} of {len(run.candidates)} grasps are judged; evaluate goes on")
+        print(f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; evaluate goes on")
     print(f"report  {run.report_path}")
     return 0

@@ -133,6 +133,10 @@ class Pace:
         """Takes results that cost nothing: the pace is that of the others, from now on."""
         self._begin(count, None, note)
 
+    def expect(self, total: float) -> None:
+        """Says how many results there are in all, where that has become known better."""
+        self._event = replace(self._event, total=total)
+
     def _begin(self, count: float, outcome: Outcome | None, note: str) -> None:
         self._started = self._clock()
         self._event = replace(self._event, before=self._event.done + count, elapsed=0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import functools
 import math
 import re
 import types
@@ -129,7 +130,7 @@ class Reader:
 
     def read_dataclass(self, node: yaml.Node, kind: type, where: str) -> Any:
         entries = self.entries(node, where)
-        hints = typing.get_type_hints(kind)
+        hints = _hints(kind)
         fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
         prefix = f"{where}." if where else ""
         for name, (key, _) in entries.items():
@@ -179,6 +180,12 @@ class Reader:
         if abs(value) < math.inf:
             raise self.fail(node, where, f"{quoted(node.value)} is too large a number")
         raise self.fail(node, where, f"{quoted(node.value)} is not {expected[kind]}")
+
+
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    """Types of a dataclass's fields: to find them takes longer than to read one."""
+    return typing.get_type_hints(kind)
 
 
 def _inside(node: yaml.Node, place: Sequence[str | int]) -> yaml.Node:

@@ -130,7 +130,9 @@ def save_document(document: Any, path: str | Path, header: str = "") -> None:
 
 def dump_document(document: Any) -> str:
     """The YAML text that `save_document` writes."""
-    return yaml.dump(plain_data(document), Dumper=_Dumper, sort_keys=False, width=100)
+    return yaml.dump(
+        plain_data(document), Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True
+    )
 
 
 class _Dumper(yaml.SafeDumper):

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core.frames import Array
 
 Z_95 = 1.959963984540054
 """Quantile of the normal distribution that leaves 2.5 % on either side."""
 
 
-def wilson_interval(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
+def wilson_interval(successes: float, trials: float, z: float = Z_95) -> tuple[float, float]:
     """Wilson's score interval for a proportion (E. B. Wilson, JASA 22, 1927).
 
     Args:
-        successes, trials: counts.
+        successes, trials: counts, or effective ones of weighted trials.
         z: quantile of the normal distribution; 95 % by default.
 
     Returns:
@@ -28,3 +33,38 @@ def wilson_interval(successes: int, trials: int, z: float = Z_95) -> tuple[float
     lower = 0.0 if successes == 0 else max(0.0, center - half)
     upper = 1.0 if successes == trials else min(1.0, center + half)
     return lower, upper
+
+
+def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple[float, float]:
+    """95 % interval for a proportion whose trials come in clusters that may differ, such as scenes:
+    the linearised variance of a ratio of totals (W. G. Cochran, Sampling Techniques, 1977, ch. 6)
+    with Student's quantile; never narrower than Wilson's, which takes all trials as independent.
+
+    Args:
+        successes, trials: (S,) counts of each cluster.
+
+    Returns:
+        Lower and upper bound in [0, 1]; all of it if there were no trials.
+    """
+    k, n = np.asarray(successes, dtype=float), np.asarray(trials, dtype=float)
+    k, n = k[n > 0.0], n[n > 0.0]
+    whole = float(n.sum())
+    low, high = wilson_interval(int(k.sum()), int(whole))
+    if len(n) < 2:
+        return low, high
+    share = float(k.sum()) / whole
+    half = _student_95(len(n) - 1) * _ratio_error(k, n, share)
+    return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
+
+
+def _ratio_error(k: Array, n: Array, share: float) -> float:
+    """Standard error of a ratio of totals over clusters."""
+    clusters = len(n)
+    spread = float(((k - share * n) ** 2).sum()) * clusters / (clusters - 1)
+    return math.sqrt(spread) / float(n.sum())
+
+
+def _student_95(freedom: int) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975))

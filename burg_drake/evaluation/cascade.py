@@ -1,4 +1,4 @@
-"""The main job: judges grasps of a scene on a station, stage by stage, and records it all.
+"""The main job: judges grasps of scenes on a station, stage by stage, and records it all.
 
 Every grasp goes candidate → clear → reachable → planned → executed, as far as the run's mode asks,
 and ends with exactly one outcome. What is judged is on disk at once; the same call on the same
@@ -7,65 +7,96 @@ folder goes on where an earlier one stopped.
 
 from __future__ import annotations
 
-import shlex
-import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import asdict, replace
-from datetime import UTC, datetime
+from dataclasses import replace
 from pathlib import Path
+from typing import overload
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import GraspSet
 from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
-from burg_drake.core.references import portable_reference
-from burg_drake.core.resources import PACKAGE_URI
-from burg_drake.evaluation.candidate_files import by_names
-from burg_drake.evaluation.candidate_sampling import sample_candidates
-from burg_drake.evaluation.candidates import Candidate, Candidates, given_candidates
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
-from burg_drake.evaluation.instance_names import chosen_instances, on_chosen
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
-from burg_drake.evaluation.report import write_report
-from burg_drake.evaluation.run_document import (
-    Grasps,
-    Library,
-    RunDocument,
-    Stretch,
-    TableFormat,
-    input_of,
-    numbers,
-    require_same_run,
-    run_hash,
-    software_versions,
-)
+from burg_drake.evaluation.preparation import finish_run, open_grasps, open_run
+from burg_drake.evaluation.preparation import require_sound as _require_sound
+from burg_drake.evaluation.request import Given, Request, names
+from burg_drake.evaluation.run_document import TableFormat, begun_now
 from burg_drake.evaluation.run_store import (
     JOURNAL_FILE,
     RUN_FILE,
     Run,
-    create_run,
-    load_run,
     require_run_folder,
     save_run,
-    write_copies,
 )
-from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG, SamplingSettings
-from burg_drake.evaluation.screens import arm_settings
+from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.evaluation.shard import Shard, as_shard
 from burg_drake.evaluation.station_judge import StationJudgeFactory
-from burg_drake.evaluation.table_file import require_writer, write_table
+from burg_drake.evaluation.table_file import require_writer
 from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.station.engine import ENGINES, Engine, engine_preset
 from burg_drake.station.grasp_motion import GraspMotion
 from burg_drake.station.station import Station, load_station
 
+SceneReference = Scene | str | Path
+
+
+@overload
+def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts, too
+    scene: SceneReference,
+    station: Station | str | Path,
+    out: str | Path,
+    *,
+    grasps_per_object: int = ...,
+    approach_angle_deg: float = ...,
+    blind: bool = ...,
+    only: Iterable[str] | None = ...,
+    grasps: Given | None = ...,
+    engine: Engine | str = ...,
+    seed: int = ...,
+    workers: int | None = ...,
+    executor: Executor | None = ...,
+    shard: Shard | str | None = ...,
+    table: TableFormat = ...,
+    mode: Mode | None = ...,
+    motion: GraspMotion | None = ...,
+    retry_failed: bool = ...,
+    progress: bool | Listener = ...,
+) -> Run: ...
+
+
+@overload
+def evaluate(
+    scene: Sequence[SceneReference],
+    station: Station | str | Path,
+    out: str | Path,
+    *,
+    grasps_per_object: int = ...,
+    approach_angle_deg: float = ...,
+    blind: bool = ...,
+    only: Iterable[str] | None = ...,
+    grasps: Given | None = ...,
+    engine: Engine | str = ...,
+    seed: int = ...,
+    workers: int | None = ...,
+    executor: Executor | None = ...,
+    shard: Shard | str | None = ...,
+    table: TableFormat = ...,
+    mode: Mode | None = ...,
+    motion: GraspMotion | None = ...,
+    retry_failed: bool = ...,
+    progress: bool | Listener = ...,
+) -> Campaign: ...
+
 
 def evaluate(
-    scene: Scene | str | Path,
+    scene: SceneReference | Sequence[SceneReference],
     station: Station | str | Path,
     out: str | Path,
     *,
@@ -73,18 +104,19 @@ def evaluate(
     approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
     blind: bool = False,
     only: Iterable[str] | None = None,
-    grasps: GraspSet | Mapping[str, GraspSet] | None = None,
+    grasps: Given | None = None,
     engine: Engine | str = ENGINES["standard"],
     seed: int = 0,
     workers: int | None = None,
     executor: Executor | None = None,
+    shard: Shard | str | None = None,
     table: TableFormat = "csv",
     mode: Mode | None = None,
     motion: GraspMotion | None = None,
     retry_failed: bool = False,
     progress: bool | Listener = True,
-) -> Run:
-    """Judges grasps and writes a run.
+) -> Run | Campaign:
+    """Judges grasps and writes a run, or a run over many scenes.
 
     Results do not depend on the number of workers or on the order in which they finish. A grasp
     that Drake cannot simulate ends as `simulation_failed`, and the others go on. An interrupted
@@ -93,7 +125,9 @@ def evaluate(
     for example because the memory ran out.
 
     Args:
-        scene, station: as loaded, or references for `load_scene` and `load_station`.
+        scene: as loaded, or a reference for `load_scene`; or several of them. Each is judged as it
+            is on its own, in a folder of its own, and all by the same workers.
+        station: likewise, for `load_station`.
         out: folder of the run; made if need be.
         grasps_per_object: antipodal grasps to sample for each free instance; the same ones as
             those of `sample_grasps` with these settings. Of an object that has fewer,
@@ -106,12 +140,14 @@ def evaluate(
             all if None.
         grasps: the user's own grasps in the object frame; nothing is sampled then. A set goes to
             the instances that its column `instance` names, or else to all instances of its objects;
-            a mapping has sets by instance, such as those of `read_grasps`.
+            a mapping has sets by instance, such as those of `read_grasps`; a function gets the
+            scene, and has such a mapping. Of many scenes each gets those of its own objects.
         engine: how trials are stepped; an engine or the name of a preset.
         seed: of the sampling.
         workers: number of processes; as many as there are processors if None.
-        executor: judges in place of processes of this machine, such as those of a cluster;
-            `workers` is not given then.
+        executor: who judges, in place of so many processes of this machine.
+        shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
+            fewer every eighth grasp of each. `merge_runs` unites the shares.
         table: format of the results file.
         mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
             execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
@@ -121,230 +157,97 @@ def evaluate(
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
-        The complete run. Its `failures` lists grasps that could not be simulated.
+        The complete run. Its `failures` lists grasps that could not be simulated. Of several scenes
+        a `Campaign`; its `failed` has those that could not be judged.
 
     Raises:
         InvalidInputError: bad argument, unsound scene, a mode that needs an arm where there is
             none, or one that stands in something, collides in its home posture or does not reach
             the board, unwritable folder, or a folder that holds another run or is being written.
         UnknownNameError: a reference to something that does not exist.
-        MissingDependencyError: Parquet without pyarrow.
+        MissingDependencyError: Parquet, or several scenes, without pyarrow.
         SimulationError: the simulation of the scene cannot be built.
     """
     if grasps is None and grasps_per_object < 1:
         raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)
-    mode = mode_for(station, mode)
-    motion = motion or station.document.motion
-    engine = engine if isinstance(engine, Engine) else engine_preset(engine)
-    chosen = chosen_instances(scene, only)
-    if grasps is not None:
-        grasps = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
-        grasps = on_chosen(scene, grasps, only)
     if executor is None:
         executor = LocalExecutor(default_workers() if workers is None else workers)
     elif workers is not None:
-        raise InvalidInputError("give workers or an executor, not both")
+        raise InvalidInputError("give workers or an executor, which has its own, not both")
+    request = Request(
+        station=station,
+        engine=engine if isinstance(engine, Engine) else engine_preset(engine),
+        mode=mode_for(station, mode),
+        motion=motion or station.document.motion,
+        seed=seed,
+        per_object=grasps_per_object,
+        approach_angle_deg=float(approach_angle_deg),
+        blind=blind,
+        only=names(only),
+        grasps=grasps,
+        table=table,
+        shard=as_shard(shard),
+        retry_failed=retry_failed,
+    )
     require_writer(table)
-    folder = Path(out)
+    if isinstance(scene, (Scene, str, Path)):
+        return _evaluate_one(scene, request, Path(out), executor, progress)
+    from burg_drake.evaluation.many_scenes import evaluate_scenes
+
+    return evaluate_scenes(
+        scene, request, Path(out), executor, StationJudgeFactory, _require_sound, progress
+    )
+
+
+def _evaluate_one(
+    scene: SceneReference,
+    request: Request,
+    folder: Path,
+    executor: Executor,
+    progress: bool | Listener,
+) -> Run:
+    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    station, mode = request.station, request.mode
+    request.asked(scene)
+    given = request.given(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
         _require_sound(scene, station, mode)
-    given = None if grasps is None else given_candidates(scene, grasps)
+    if given is not None:
+        given_candidates(scene, given)  # refuses what does not fit before the folder is made
     writable_folder(folder)
-    asked = Grasps(origin="given", count=0, objects={}, content="")
-    if grasps is None:
-        angle = float(approach_angle_deg)
-        asked = replace(
-            asked,
-            origin="sampled",
-            per_object=grasps_per_object,
-            approach_angle_deg=angle,
-            blind=blind,
-            only=() if chosen == tuple(scene.instances) else chosen,
-        )
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
-        run = _open(
-            folder,
-            scene,
-            station,
-            given,
-            _document(
-                folder,
-                scene,
-                station,
-                asked,
-                engine,
-                seed=seed,
-                mode=mode,
-                motion=motion,
-                table=table,
-            ),
-            reporter,
-        )
-        make_judge = StationJudgeFactory(scene, station, engine, mode, motion)
+        run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
+        make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.motion)
         remove_unfinished(folder)
-        left = _open_grasps(run, retry_failed)
-        run = _judge(run, left, make_judge, journal, executor, reporter)
-        return _finish(run, table)
+        left = open_grasps(run, retry_failed=request.retry_failed)
+        if left:
+            run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
+        return finish_run(run, request.table)
 
 
-def _document(
-    folder: Path,
-    scene: Scene,
-    station: Station,
-    grasps: Grasps,
-    engine: Engine,
-    *,
-    seed: int,
-    mode: Mode,
-    motion: GraspMotion,
-    table: TableFormat,
-) -> RunDocument:
-    """What this call asks for; what comes of the grasps is filled in later."""
-    from burg_drake.simulation.trial_settings import TrialSettings
-
-    instances = [*scene.instances.values(), *scene.background.values()]
-    library = portable_reference(scene.library.root, folder)
-    return RunDocument(
-        command=_command(),
-        scene=input_of(scene, "scenes"),
-        station=input_of(station, "stations"),
-        library=Library(
-            name=scene.library.name,
-            path=library if library.startswith(PACKAGE_URI) else str(scene.library.root.resolve()),
-            objects={i.object: scene.library.entry(i.object).build for i in instances},
-        ),
-        grasps=grasps,
-        engine=engine,
-        trial=numbers(TrialSettings(motion=motion)),
-        mode=mode,
-        arm={} if mode == "hand" else numbers(arm_settings(motion)),
-        seed=seed,
-        table=table,
-        versions=software_versions(),
-    )
-
-
-def _open(
-    folder: Path,
-    scene: Scene,
-    station: Station,
-    candidates: Candidates | None,
-    document: RunDocument,
-    reporter: Reporter,
-) -> Run:
-    """Goes on with the run in the folder, or begins a new one there; samples if no candidates are
-    given."""
-    if candidates is not None:
-        document = _with_grasps(document, scene, candidates, 0.0)
-    if (folder / RUN_FILE).exists():
-        run = load_run(folder)
-        require_same_run(folder, run.document, document)
-        write_copies(folder, scene, station)
-        return run
-    if candidates is None:
-        reporter.show(Progress("sampling"))
-        start = time.process_time()
-        asked = document.grasps
-        assert asked.per_object is not None
-        settings = SamplingSettings(approach_angle_deg=asked.approach_angle_deg, blind=asked.blind)
-        candidates = sample_candidates(
-            scene, station, asked.per_object, document.seed, settings, asked.only or None
-        )
-        cpu = time.process_time() - start
-        document = _with_grasps(document, scene, candidates, cpu)
-    document = replace(document, hash=run_hash(document))
-    return create_run(folder, document, scene, station, candidates)
-
-
-def _with_grasps(
-    document: RunDocument, scene: Scene, candidates: Candidates, cpu: float
-) -> RunDocument:
-    names = document.grasps.only or scene.instances
-    counts = Counter({scene.instance(name).object: 0 for name in names})
-    counts.update(scene.instance(name).object for name in candidates.instance.tolist())
-    return replace(
-        document,
-        grasps=replace(
-            document.grasps,
-            count=len(candidates),
-            objects=dict(counts),
-            content=candidates.content,
-            cpu=cpu,
-        ),
-    )
-
-
-def _require_sound(scene: Scene, station: Station, mode: Mode) -> None:
-    from burg_drake.motion.usable_arm import require_usable_arm
-    from burg_drake.station.check import require_sound_scene
-
-    require_sound_scene(scene, station)
-    if mode != "hand":
-        require_usable_arm(scene, station)
-
-
-def _open_grasps(run: Run, retry_failed: bool) -> list[Candidate]:
-    """Grasps without a verdict, and those that are to be tried again."""
-    verdicts = run.verdicts
-    known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
-    return [candidate for candidate in run.candidates if candidate.id not in known]
-
-
-def _judge(
-    run: Run,
-    open_grasps: list[Candidate],
-    make_judge: StationJudgeFactory,
-    journal: Journal,
-    executor: Executor,
-    reporter: Reporter,
-) -> Run:
+def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: Reporter) -> Run:
     """Judges what is left and keeps each verdict at once; returns the run as it is then."""
-    if not open_grasps:
-        return run
-    done, total = len(run.candidates) - len(open_grasps), len(run.candidates)
-    again = {grasp.id for grasp in open_grasps}
+    total = len(run.mine)
+    done = total - len(job.candidates)
+    again = {grasp.id for grasp in job.candidates}
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
-    stretch = Stretch(
-        started=datetime.now(UTC).isoformat(timespec="seconds"), workers=executor.workers
-    )
+    stretch = begun_now(executor.workers)
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = time.monotonic()
+    judged = 0
     try:
-        job = Job(run.document.hash, make_judge, open_grasps)
-        with closing(executor.judge([job])) as judged:
-            for _, candidate, verdict in judged:
+        with closing(executor.judge([job])) as verdicts:
+            for _, candidate, verdict in verdicts:
                 journal.append(candidate.id, verdict)
-                done += 1
+                judged += 1
                 pace.step(outcome=verdict.outcome)
     finally:
         seconds = round(time.monotonic() - begun, 3)
-        stretch = replace(stretch, judged=done - total + len(open_grasps), seconds=seconds)
+        stretch = replace(stretch, judged=judged, seconds=seconds)
         document = replace(run.document, stretches=(*stretches, stretch))
         run = save_run(Run(run.path, document))
     return run
-
-
-def _finish(run: Run, table: TableFormat) -> Run:
-    """Writes table and report, unless they are there already."""
-    if run.document.table != table:
-        run = save_run(Run(run.path, replace(run.document, table=table)))
-    journal = run.path / JOURNAL_FILE
-    for path, write in ((run.table_path, _write_table), (run.report_path, write_report)):
-        if not path.exists() or path.stat().st_mtime_ns < journal.stat().st_mtime_ns:
-            write(run)
-    return run
-
-
-def _write_table(run: Run) -> None:
-    write_table(run.table_path, run.results, asdict(run.document))
-
-
-def _command() -> str:
-    """The command that is running, as one can type it again."""
-    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
-    return shlex.join([program, *sys.argv[1:]])

@@ -30,12 +30,13 @@ class Executor(Protocol):
         ...
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """Judges all grasps of all jobs.
 
         Args:
-            jobs: asked for one after the other, when workers run out of work.
+            jobs: asked for one after the other, when workers run out of work. None says that no
+                job is ready yet, and that there are others to work on meanwhile.
             on_failure: told of a job that cannot be done, such as one whose judge cannot be built;
                 no more verdicts come for it, and the other jobs go on. If None, its error is
                 raised.
@@ -72,7 +73,7 @@ class LocalExecutor:
         return cls(default_workers())
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
         pool = Pool(self.workers, self.limits)

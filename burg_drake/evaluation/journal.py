@@ -6,11 +6,11 @@ one at the end, which is cut off when the run goes on.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,6 +20,7 @@ from burg_drake.core.files import open_regular
 from burg_drake.core.json_text import parse_json
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.evaluation.judge import Verdict
+from burg_drake.evaluation.lock import being_written, lock
 
 JOURNAL_FILE = "journal.jsonl"
 LONGEST_LINE = 1 << 20
@@ -40,14 +41,9 @@ class Journal:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
         except OSError as error:
             raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        if not lock(self._file):
             os.close(self._file)
-            raise InvalidInputError(
-                f"{path.parent} is being written by another process; wait for it,"
-                " or choose another folder"
-            ) from error
+            raise being_written(path.parent)
         if not stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
             raise InvalidInputError(f"cannot write {path}: it is no file; choose another folder")
@@ -89,22 +85,42 @@ class Journal:
         self.close()
 
 
-def read_journal(path: Path) -> dict[str, Verdict]:
+def read_journal(path: Path, begin: int = 0, end: int | None = None) -> dict[str, Verdict]:
     """The last verdict about each grasp by id; lines that cannot be read count as not judged.
+
+    Args:
+        path: of the journal; one that does not exist has none.
+        begin, end: bytes to read, if not all; each at the end of a line.
 
     Raises:
         InvalidInputError: it is a folder, for example.
     """
-    verdicts: dict[str, Verdict] = {}
-    if path.exists():
-        with open_regular(path) as stream:
-            for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
-                try:
-                    id, verdict = decode(line)
-                except (ValueError, KeyError, TypeError, AttributeError):
-                    continue
-                verdicts[id] = verdict
-    return verdicts
+    return {id: verdict for _, id, verdict in journal_lines(path, begin, end)}
+
+
+def journal_lines(
+    path: Path, begin: int = 0, end: int | None = None
+) -> Iterator[tuple[int, str, Verdict]]:
+    """The verdicts of a journal, in its order, one at a time; see `read_journal`.
+
+    Yields:
+        Where its line begins, the id of the grasp, and the verdict.
+    """
+    if not path.exists():
+        return
+    with open_regular(path) as stream:
+        place = stream.seek(begin)
+        for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
+            here, place = place, place + len(line)
+            if not line.endswith(b"\n"):  # torn, or too long: cut off when the run goes on
+                continue
+            if end is not None and place > end:
+                return
+            try:
+                id, verdict = decode(line)
+            except (ValueError, KeyError, TypeError, AttributeError):
+                continue
+            yield here, id, verdict
 
 
 def encode(id: str, verdict: Verdict) -> bytes:

@@ -65,11 +65,11 @@ class Pool:
         self.jobs: list[OpenJob] = []
         self.deadly: list[str] = []
         self.stopped = False
-        self._coming: Iterator[Job] = iter(())
+        self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
 
     def run(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[Answer, None, None]:
         """Judges all grasps of all jobs; see `executor.Executor.judge`. Workers that are idle at
         the end stay, for another call; whatever else ends it, ends them."""
@@ -116,6 +116,8 @@ class Pool:
         if worker is not None and worker.job is not None and worker.job.waiting:
             return worker.job
         for job in self._coming:
+            if job is None:  # none is ready yet; asked again when something has happened
+                break
             if job.candidates:
                 self.jobs.append(OpenJob(job))
                 return self.jobs[-1]

@@ -7,8 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
+from burg_drake.evaluation.campaign import Campaign, is_campaign, load_campaign
+from burg_drake.evaluation.part_store import PARTS_FOLDER, Place, read_rows
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import Columns
+from burg_drake.evaluation.table import TEXT, Columns
+
+
+def open_results(path: str | Path) -> Run | Campaign:
+    """The run in a folder, of one scene or of many.
+
+    Raises:
+        InvalidInputError: there is no run.
+        DocumentError: its document does not fit the schema.
+    """
+    return load_campaign(path) if is_campaign(path) else load_run(path)
 
 
 def load_runs(path: str | Path) -> list[Run]:
@@ -18,7 +30,8 @@ def load_runs(path: str | Path) -> list[Run]:
         InvalidInputError: there is no run.
         DocumentError: its document does not fit the schema.
     """
-    return [load_run(path)]
+    found = open_results(path)
+    return list(found.runs) if isinstance(found, Campaign) else [found]
 
 
 def read_results(path: str | Path, names: Sequence[str] | None = None) -> Columns:
@@ -27,12 +40,21 @@ def read_results(path: str | Path, names: Sequence[str] | None = None) -> Column
 
     Args:
         path: folder of a run, of one scene or of many.
-        names: of the columns; all if None. What a run does not have is NaN, or an empty text.
+        names: of the columns, which is all that is read where there are many grasps; all if None.
+            What a run does not have is NaN, or an empty text.
 
     Raises:
         InvalidInputError: there is no run.
         DocumentError: its document does not fit the schema.
+        MissingDependencyError: a run over many scenes without pyarrow.
     """
-    tables = [run.results for run in load_runs(path)]
-    wanted = names or list(dict.fromkeys(name for table in tables for name in table))
-    return {name: np.concatenate([table[name] for table in tables]) for name in wanted}
+    found = open_results(path)
+    if isinstance(found, Campaign):
+        return found.columns(names)
+    if (found.path / PARTS_FOLDER).is_dir():
+        rows = read_rows(found.path, [Place("", found.path)], names)
+        return rows.columns(rows.table.column_names)
+    table = found.results
+    count = len(table["id"])
+    missing = {name: np.full(count, "" if name in TEXT else np.nan) for name in names or ()}
+    return table if names is None else {name: {**missing, **table}[name] for name in names}

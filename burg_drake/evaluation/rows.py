@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from burg_drake.core.errors import UnknownNameError, listing
 from burg_drake.core.frames import Array
@@ -54,8 +55,8 @@ def best_rows(
     """
     chosen = are_of(only, "the table", columns["object"], columns["instance"])
     lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & chosen)
-    clearance = columns["clearance"][lifted] if "clearance" in columns else np.full(len(lifted), 0)
-    room = np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-np.inf)
+    lifted = _roomiest(columns, lifted, count, each=each)
+    room = _room(columns, lifted)
     penalty = (
         _rounded(columns["slip"][lifted], LENGTH_STEP) / SLIP_SCALE
         + _rounded(columns["tilt"][lifted], ANGLE_STEP) / TILT_SCALE
@@ -74,6 +75,29 @@ def best_rows(
         for name in dict.fromkeys(objects.tolist())
         for row in [row for row in ranked if objects[row] == name][:count]
     ]
+
+
+def _room(columns: Columns, rows: NDArray[np.int64]) -> Array:
+    """Clearances of some rows in whole steps."""
+    clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
+    return np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-np.inf)
+
+
+def _roomiest(
+    columns: Columns, rows: NDArray[np.int64], count: int, *, each: bool
+) -> NDArray[np.int64]:
+    """Those of some rows that can be among the first `count`, of each object or of all together:
+    the others have less room than so many. To rank a million takes seconds."""
+    groups = [rows]
+    if each:
+        objects = columns["object"][rows]
+        groups = [rows[objects == name] for name in set(objects.tolist())]
+    kept = []
+    for mine in groups:
+        room = _room(columns, mine)
+        least = np.partition(room, len(room) - count)[-count] if 0 < count < len(room) else -np.inf
+        kept.append(mine[room >= least])
+    return np.sort(np.concatenate(kept)) if kept else rows
 
 
 def _rounded(values: Array, step: float) -> Array:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import platform
 from dataclasses import dataclass, field, is_dataclass
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from burg_drake import __version__
 from burg_drake.core.content import content_hash
@@ -21,6 +22,8 @@ from burg_drake.station.station import Station
 
 TableFormat = Literal["csv", "parquet"]
 
+SETTINGS = "settings of engine, trial and arm"
+"""A topic of `identity`."""
 HASH_DIGITS = 12
 """Digits of a hash that people get to see."""
 
@@ -113,6 +116,7 @@ class RunDocument:
         mode: what was asked about each grasp.
         arm: settings of the search for the arm's motions; none in mode `hand`.
         seed: of the sampling.
+        shard: which share of the grasps is judged here, as `K/N`; all of them if empty.
         table: format of the results file.
         versions: of the software and the machine.
         stretches: who worked on it when.
@@ -130,9 +134,15 @@ class RunDocument:
     mode: Mode
     arm: dict[str, float] = field(default_factory=dict)
     seed: int
+    shard: str = ""
     table: TableFormat = "csv"
     versions: dict[str, str] = field(default_factory=dict)
     stretches: tuple[Stretch, ...] = ()
+
+
+def begun_now(workers: int) -> Stretch:
+    """A stretch of work that begins now."""
+    return Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
 
 
 def software_versions() -> dict[str, str]:
@@ -149,18 +159,43 @@ def software_versions() -> dict[str, str]:
     }
 
 
+class Asked(Protocol):
+    """What a call asks about each scene; documents of runs say it, see `RunDocument`."""
+
+    @property
+    def station(self) -> Input: ...
+    @property
+    def grasps(self) -> Grasps: ...
+    @property
+    def engine(self) -> Engine: ...
+    @property
+    def trial(self) -> dict[str, float]: ...
+    @property
+    def mode(self) -> Mode: ...
+    @property
+    def arm(self) -> dict[str, float]: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def versions(self) -> dict[str, str]: ...
+
+
 def identity(document: RunDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same run, in words, by topic."""
+    return {"scene": f"content {document.scene.content[:HASH_DIGITS]}", **what_is_asked(document)}
+
+
+def what_is_asked(document: Asked) -> dict[str, str]:
+    """The same of all scenes that it is asked about, in words, by topic."""
     grasps, engine = document.grasps, document.engine
     others = [without_motion(values) for values in (document.trial, document.arm)]
     settings = content_hash(vars(engine), *others)[:HASH_DIGITS]
     sampled = grasps.origin == "sampled"
     approach = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
     return {
-        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
-        "settings of engine, trial and arm": settings,
+        SETTINGS: settings,
         "motion": motion_text(motion_in(document.trial)),
         "mode": document.mode,
         "grasps": (
@@ -206,19 +241,34 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
     Raises:
         InvalidInputError: names every difference.
     """
-    old, new = identity(there), identity(here)
-    if old["engine"] != new["engine"] or old["mode"] != new["mode"]:
-        del old["settings of engine, trial and arm"]  # they differ too, which says nothing more
-    found = differences(old, new)
+    found = differences(identity(there), identity(here))
     if found:
         raise InvalidInputError(
             f"{folder} holds another run ({'; '.join(found)}); choose another -o, or delete it"
+        )
+    require_same_shard(folder, there.shard, here.shard)
+
+
+def require_same_shard(folder: Path, there: str, here: str) -> None:
+    """Refuses to go on with another share of the same run.
+
+    Raises:
+        InvalidInputError: names both.
+    """
+    if there != here:
+        held = f"shard {there} of this run" if there else "all of this run"
+        asked = f"--shard {here}" if here else "no --shard"
+        raise InvalidInputError(
+            f"{folder} holds {held}, and {asked} is given; choose another -o, and burg-drake merge"
+            " unites shards"
         )
 
 
 def differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
     """Topics that two identities have in common and differ in, in words."""
     topics = [k for k in there if k in here and there[k] != here[k]]
+    if "engine" in topics or "mode" in topics:  # settings differ too, which says nothing more
+        topics = [k for k in topics if k != SETTINGS]
     return [f"{k} is {there[k]} there, {here[k]} here" for k in topics]
 
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,11 +32,15 @@ from burg_drake.evaluation.journal import read_journal
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.rows import best_rows, unknown_grasp
 from burg_drake.evaluation.run_document import RunDocument, origin_of
+from burg_drake.evaluation.shard import share
 from burg_drake.evaluation.table import Columns, make_columns, table_row
 from burg_drake.evaluation.trial import Trial
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.scene import Scene, SceneDocument, save_scene
 from burg_drake.station.station import Station, StationDocument, load_station
+
+if TYPE_CHECKING:
+    import pandas
 
 RUN_FILE = "run.yaml"
 SCENE_FILE = "scene.yaml"
@@ -74,9 +78,14 @@ class Run:
         return read_journal(self.path / JOURNAL_FILE)
 
     @property
+    def mine(self) -> list[str]:
+        """Ids of the grasps that are judged here: all, or those of a shard."""
+        return list(share(self.candidates.id, self.document.shard))
+
+    @property
     def complete(self) -> bool:
-        """Whether every grasp is judged."""
-        return all(id in self.verdicts for id in self.candidates.id)
+        """Whether every grasp that is judged here is judged."""
+        return all(id in self.verdicts for id in self.mine)
 
     @property
     def table_path(self) -> Path:
@@ -98,6 +107,30 @@ class Run:
             instances=self._instances,
             joints=self._joints,
         )
+
+    def frame(self, names: Sequence[str] | None = None) -> pandas.DataFrame:
+        """Judged grasps as a data frame; see `evaluation.frame`.
+
+        Args:
+            names: of the columns; all if None.
+
+        Raises:
+            MissingDependencyError: pandas is not installed.
+        """
+        from burg_drake.evaluation.frame import frame_of_columns
+
+        return frame_of_columns(self.results, names)
+
+    def with_verdicts(self, verdicts: dict[str, Verdict]) -> Run:
+        """The same run as if only these grasps had been judged."""
+        part = Run(self.path, self.document)
+        part.__dict__.update(
+            candidates=self.candidates,
+            verdicts=verdicts,
+            _instances=self._instances,
+            _joints=self._joints,
+        )
+        return part
 
     @property
     def failures(self) -> list[str]:
@@ -195,13 +228,13 @@ class Run:
             )
         return station
 
-    @property
+    @cached_property
     def _instances(self) -> list[str]:
         """Names of the free objects of the scene that was judged."""
         document = load_document(self.path / SCENE_FILE, SceneDocument)
         return [instance.name or instance.object for instance in document.instances]
 
-    @property
+    @cached_property
     def _joints(self) -> int:
         """Number of the arm's joints, if it was asked."""
         arm = load_document(self.path / STATION_FILE, StationDocument).arm

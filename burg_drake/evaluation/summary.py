@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from burg_drake.core.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.evaluation.codes import member_codes
 from burg_drake.evaluation.judge import LIFT_HEIGHT
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.motion_numbers import motion_in
@@ -18,6 +20,9 @@ from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.short_lifts import ShortLifts, short_lifts
 from burg_drake.evaluation.table import CPU_COLUMNS, Columns
 from burg_drake.evaluation.trial import PUSHED
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.campaign import Campaign
 
 ARM_STAGES = (Stage.REACHABLE.value, Stage.PLANNED.value)
 """Counts of the funnel that a run without the arm does not have."""
@@ -28,6 +33,7 @@ STAGES: dict[Mode, tuple[Stage, ...]] = {
 }
 """Stages whose cost is known by mode; that of `reachable` includes the search for motions, that of
 `planned` is their timing."""
+OUTCOMES, ALL_STAGES = tuple(Outcome), tuple(Stage)
 PUSH = 0.001
 """Objects that the approach moved by more than this were pushed [m]."""
 
@@ -161,6 +167,7 @@ class Summary:
         pushes: what the arm's approaches pushed; None where no arm executed anything.
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
         notes: what is missing, and why, one sentence each; see `run_notes`.
+        scenes: by scene, in a run over many, in their order.
     """
 
     objects: tuple[Group, ...]
@@ -170,6 +177,7 @@ class Summary:
     pushes: Pushes | None = None
     lifts: ShortLifts | None = None
     notes: tuple[str, ...] = ()
+    scenes: tuple[Group, ...] = ()
 
     @property
     def steps(self) -> list[str]:
@@ -177,17 +185,23 @@ class Summary:
         return [n for n in self.total.funnel if self.mode != "hand" or n not in ARM_STAGES]
 
 
-def summarize(run: Run) -> Summary:
-    """Counts what a run has found so far."""
+def summarize(run: Run | Campaign) -> Summary:
+    """Counts what a run, of one scene or of many, has found so far."""
+    if not isinstance(run, Run):
+        from burg_drake.evaluation.campaign_summary import summarize_campaign
+
+        return summarize_campaign(run)
     columns, document = run.results, run.document
-    names = document.grasps.objects
+    outcome = member_codes(columns["outcome"], OUTCOMES)
+    stage = member_codes(columns["stage"], ALL_STAGES)
+    mine = {name: columns["object"] == name for name in document.grasps.objects}
     sampling = document.grasps
-    costs = [_stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
+    costs = [stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
     if sampling.origin == "sampled" and sampling.count:
         costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
     return Summary(
-        objects=tuple(_group(columns, name, columns["object"] == name) for name in names),
-        total=_group(columns, "all", np.ones(len(columns["id"]), dtype=bool)),
+        objects=tuple(_group(name, outcome[own], stage[own]) for name, own in mine.items()),
+        total=_group("all", outcome, stage),
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(columns),
@@ -217,14 +231,25 @@ def pushes(columns: Columns) -> Pushes | None:
     )
 
 
-def _group(columns: Columns, name: str, mask: np.ndarray) -> Group:
-    outcomes = Counter(Outcome(o) for o in columns["outcome"][mask])
-    decided = Counter(Stage(s) for s in columns["stage"][mask])
-    failed = columns["stage"][mask & (columns["outcome"] == Outcome.SIMULATION_FAILED)]
-    return Group(name, int(mask.sum()), outcomes, decided, Counter(Stage(s) for s in failed))
+def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> Group:
+    """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`."""
+    failed = stage[outcome == OUTCOMES.index(Outcome.SIMULATION_FAILED)]
+    return Group(
+        name,
+        len(outcome),
+        _counter(OUTCOMES, outcome),
+        _counter(ALL_STAGES, stage),
+        _counter(ALL_STAGES, failed),
+    )
 
 
-def _stage_cost(columns: Columns, stage: Stage) -> StageCost:
+def _counter(members: tuple[Any, ...], codes: np.ndarray) -> Counter[Any]:
+    counts = np.bincount(codes, minlength=len(members)).tolist()
+    return Counter({member: n for member, n in zip(members, counts, strict=True) if n})
+
+
+def stage_cost(columns: Columns, stage: Stage) -> StageCost:
+    """CPU time of a stage, from its column."""
     cpu = columns[CPU_COLUMNS[stage]]
     cpu = cpu[np.isfinite(cpu)]
     median = float(np.median(cpu)) if len(cpu) else math.nan

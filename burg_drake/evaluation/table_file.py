@@ -80,7 +80,8 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
     Args:
         path: the file.
         columns: equally long arrays by name.
-        metadata: JSON values that Parquet files carry along; CSV has no place for them.
+        metadata: JSON values that Parquet files carry along; of those of a CSV file the shard is
+            told in the file beside it.
 
     Raises:
         MissingDependencyError: Parquet without pyarrow.
@@ -90,8 +91,15 @@ def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None
         atomic_write(path, _parquet_bytes(columns, metadata or {}))
     else:
         meant = {n: (DATATYPES[v.dtype.kind], describe(n)) for n, v in columns.items()}
-        description = json.dumps(csv_metadata(path.name, meant), indent=1) + "\n"
+        notes = [{"dc:description": note} for note in _notes(metadata or {})]
+        description = json.dumps(csv_metadata(path.name, meant, notes), indent=1) + "\n"
         atomic_write_all({metadata_path(path): description, path: _csv_text(columns)})
+
+
+def _notes(metadata: Mapping[str, Any]) -> list[str]:
+    """What a reader of a CSV file has to know of its run."""
+    shard = metadata.get("shard")
+    return [f"shard {shard}: only these grasps of the run are judged here"] if shard else []
 
 
 def read_table(path: Path) -> Columns:

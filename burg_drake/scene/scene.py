@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -140,11 +141,16 @@ class Scene:
         )
 
 
-def load_scene(reference: str | Path) -> Scene:
+def load_scene(
+    reference: str | Path,
+    *,
+    library: Callable[[str, Path | None], ObjectLibrary] = load_library,
+) -> Scene:
     """Loads a scene and its library.
 
     Args:
         reference: path of a scene file, or the bare name of a built-in scene.
+        library: loads a library, by its reference and the folder that this is relative to.
 
     Raises:
         UnknownNameError: no such file or library, or an instance of an unknown object.
@@ -154,7 +160,7 @@ def load_scene(reference: str | Path) -> Scene:
     path = resolve(reference, "scenes")
     document = load_document(path, SceneDocument)
     try:
-        library = load_library(document.library, path.parent)
+        objects = library(document.library, path.parent)
     except UnknownNameError as error:
         raise UnknownNameError(f"{path}: library: {error}") from error
     seen: dict[str, str] = {}
@@ -162,7 +168,7 @@ def load_scene(reference: str | Path) -> Scene:
         for i, instance in enumerate(instances):
             where = f"{path}: {key}[{i}]"
             try:
-                entry = library.entry(instance.object)
+                entry = objects.entry(instance.object)
             except UnknownNameError as error:
                 raise UnknownNameError(f"{where}: {error}") from error
             if entry.is_fixed and key == "instances":
@@ -177,7 +183,7 @@ def load_scene(reference: str | Path) -> Scene:
                     f" another, such as name: {name}_2"
                 )
             seen[name] = f"{key}[{i}]"
-    return Scene(document, library, path)
+    return Scene(document, objects, path)
 
 
 def save_scene(document: SceneDocument, path: str | Path) -> None:

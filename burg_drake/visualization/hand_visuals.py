@@ -35,6 +35,7 @@ class HandVisual:
 
     Attributes:
         shape: for Meshcat.
+        model: the shape as the hand's model has it, for renderers.
         color: of shapes that have none of their own.
         X_HV: (4, 4) where it is on the open hand.
         slide: (3,) how far it moves in H for each metre by which the hand closes.
@@ -42,6 +43,7 @@ class HandVisual:
     """
 
     shape: Shape
+    model: Shape
     color: Rgba
     X_HV: Array
     slide: Array
@@ -90,7 +92,8 @@ def hand_visuals(
             )
             color = Rgba(given.r(), given.g(), given.b(), opacity * given.a())
             X_HV = X_HB @ inspector.GetPoseInFrame(geometry).GetAsMatrix4()
-            visuals.append(HandVisual(_drawn(shape, opacity), color, X_HV, slide, _corners(shape)))
+            drawn = _drawn(shape, opacity)
+            visuals.append(HandVisual(drawn, shape, color, X_HV, slide, _corners(shape)))
     return tuple(visuals)
 
 

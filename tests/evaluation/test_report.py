@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import html
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 from known_judge import CrashingJudge, Make
+from page_reading import part, read_page
 
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
@@ -22,41 +21,6 @@ from burg_drake.evaluation.report.style import STYLES, style_sheet
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import summarize
 
-VOID = {"meta", "br", "hr"}
-
-
-class Checker(HTMLParser):
-    """Checks that elements nest and collects what a browser would fetch."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.links: list[str] = []
-        self.text: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in VOID:
-            self.open.append(tag)
-        self.links += [str(v) for k, v in attrs if k in ("src", "href", "srcset", "data")]
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        pass
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.text.append(data)
-
-
-def check(page: str) -> Checker:
-    checker = Checker()
-    checker.feed(page)
-    assert checker.open == [] and checker.links == []
-    assert "@import" not in page and "url(" not in page and "<script" not in page
-    assert not re.search(r"https?://", page)
-    return checker
-
 
 @pytest.fixture
 def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
@@ -67,7 +31,7 @@ def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
 
 def test_the_page_is_whole_and_stands_alone(run: Run) -> None:
     page = run.report_path.read_text()
-    text = " ".join(check(page).text)
+    text = read_page(page).text
     assert page == report_page(run)
     total = summarize(run).total
     for expected in (
@@ -83,8 +47,8 @@ def test_the_page_is_whole_and_stands_alone(run: Run) -> None:
 
 
 def test_the_command_is_the_one_that_was_run(run: Run) -> None:
-    code = re.findall(r"<pre><code[^>]*>(.*?)</code></pre>", run.report_path.read_text())[-1]
-    words = html.unescape(re.sub(r"<[^>]+>", "", code)).split()
+    page = read_page(run.report_path.read_text())
+    words = part(page, "How to repeat it").find("pre")[0].text.split()
     assert words == [
         *("burg-drake", "evaluate", run.document.scene.path, "--station", "panda_tabletop"),
         *("--mode", "reach"),
@@ -104,7 +68,7 @@ def test_failures_are_listed_and_escaped(
     failed = evaluate(
         moved, station, tmp_path / "f", grasps_per_object=30, blind=True, progress=False
     )
-    text = " ".join(check(failed.report_path.read_text()).text)
+    text = read_page(failed.report_path.read_text()).text
     assert name in text
     assert "RuntimeError: the solver did not converge" in text
 
@@ -156,19 +120,19 @@ def test_what_was_disturbed_is_told(run: Run) -> None:
 def test_a_custom_engine_is_told_apart_from_its_preset(run: Run) -> None:
     engine = dataclasses.replace(run.document.engine, time_step=0.004)
     document = dataclasses.replace(run.document, engine=engine)
-    text = " ".join(check(report_page(Run(run.path, document))).text)
+    text = read_page(report_page(Run(run.path, document))).text
     assert "engine standard (custom)" in text and "The engine is not a preset" in text
-    text = " ".join(check(report_page(run)).text)
+    text = read_page(report_page(run)).text
     assert "(custom)" not in text and "not a preset" not in text
 
 
 def test_an_unfinished_run_says_so(run: Run) -> None:
     journal = run.path / "journal.jsonl"
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:10]))
-    text = " ".join(check(report_page(Run(run.path, run.document))).text)
+    text = read_page(report_page(Run(run.path, run.document))).text
     assert "not complete: 10 of 90 grasps are judged" in text
     journal.write_bytes(b"")
-    check(report_page(Run(run.path, run.document)))
+    read_page(report_page(Run(run.path, run.document)))
 
 
 def test_numbers_stand_out_from_every_colour() -> None:

@@ -58,7 +58,7 @@ class DaskExecutor:
         return sum(threads_by_address(self.client).values())
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `executor.Executor.judge`.
 

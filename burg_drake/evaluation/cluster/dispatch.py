@@ -53,13 +53,13 @@ class Dispatch:
         self._name = f"burg-drake-{uuid.uuid4().hex}"
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._sent: dict[Any, tuple[SentChunk, Hand]] = {}
-        self._coming: Iterator[Job] = iter(())
+        self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
         self._seen = -LOOK
         self._without = time.monotonic()
 
     def run(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None
     ) -> Generator[Answer, None, None]:
         """See `executor.Executor.judge`."""
         self._coming, self._on_failure = iter(jobs), on_failure
@@ -109,6 +109,8 @@ class Dispatch:
         if hand.job is not None and hand.job.left:
             return hand.job
         for job in self._coming:
+            if job is None:  # none is ready yet
+                break
             if job.candidates:
                 try:
                     self.jobs.append(SentJob(job))

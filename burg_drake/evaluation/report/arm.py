@@ -7,24 +7,14 @@ from collections import Counter
 import numpy as np
 
 from burg_drake.core.figures import percent
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.report.markup import Child, Html, element, section, table
+from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.evaluation.report.causes import MEANING
+from burg_drake.evaluation.report.markup import Child, Html, element, folded, section, table
 from burg_drake.evaluation.summary import Summary
 from burg_drake.evaluation.table import Columns
 
-MEANING = {
-    Outcome.HAND_COLLISION_APPROACH: "on the straight way in, the open hand meets something",
-    Outcome.HAND_COLLISION_RETREAT: "on the straight way back, the hand or the object in it does",
-    Outcome.HAND_COLLISION_LIFT: "on the lift, the hand or the object in it does",
-    Outcome.NO_IK: "no arm configuration puts the hand there, whatever the joint limits",
-    Outcome.JOINT_LIMIT: "there are such configurations, but all are beyond a joint limit",
-    Outcome.ARM_COLLISION: "within the limits, in each that was found the arm collides",
-    Outcome.APPROACH_LINE: "the arm can be at both ends of the way in, but not take the hand"
-    " straight along it",
-    Outcome.RETREAT_LINE: "the arm cannot take the hand straight back",
-    Outcome.LIFT_LINE: "the arm cannot take the hand along the lift",
-    Outcome.NO_PATH: "no way from the home posture to the pregrasp was found",
-}
+OF_ARM = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
+"""What can be between a grasp at which the hand is clear and its trial."""
 BLOCKERS = 3
 """Most frequent bodies that are listed for each outcome."""
 
@@ -35,7 +25,7 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
         return None
     clear, planned = summary.total.clear, summary.total.planned
     rows = []
-    for outcome, meaning in MEANING.items():
+    for outcome in OF_ARM:
         count = summary.total.outcomes[outcome]
         if count:
             cells = [
@@ -43,7 +33,7 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
             ]
             name = element("th", outcome.value.replace("_", " "), scope="row")
             way = element("td", _blockers(columns, outcome))
-            rows.append(element("tr", name, *cells, element("td", meaning), way))
+            rows.append(element("tr", name, *cells, element("td", MEANING.get(outcome, "")), way))
     share = f" ({percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute {planned}{share}:"
@@ -51,7 +41,7 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
         " up with the object, or as the motion says. The others end at the first thing that fails."
     )
     head = ["outcome", "grasps", "of clear", "what it means", "mostly in the way"]
-    return section("What hindered the arm", text, table(head, rows, numbers=(1, 2)) if rows else "")
+    return folded("What hindered the arm", text, table(head, rows, numbers=(1, 2)) if rows else "")
 
 
 def _blockers(columns: Columns, outcome: Outcome) -> str:

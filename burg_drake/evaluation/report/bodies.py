@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.report.markup import Html, element, section, table
+from burg_drake.evaluation.report.markup import Html, element, folded, table
 from burg_drake.evaluation.table import Columns
 from burg_drake.evaluation.trial import MOVED
 
@@ -36,7 +36,7 @@ def collision_section(columns: Columns) -> Html | None:
         numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
         rows.append(element("tr", element("th", name, scope="row"), *numbers))
     head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
-    return section(
+    return folded(
         "Start collisions",
         "What the open hand is in at the grasp, and how far it would have to move back. A grasp"
         " counts for one body, even if the hand is in several.",
@@ -74,7 +74,7 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
         cause = element("td", f"on {by} ({times})")
         rows.append(element("tr", element("th", name, scope="row"), *numbers, cause))
-    return section(
+    return folded(
         "What was disturbed",
         f"Objects that trials on other objects moved by {NOTICEABLE * 1e3:g} mm or more, whatever"
         " the outcome: in how many of the executed trials, and how far at most in each.",

@@ -1,4 +1,4 @@
-"""The report's charts: stacked bars, intervals, funnels and histograms as HTML and inline SVG.
+"""The report's charts: stacked bars, intervals and histograms as HTML and inline SVG.
 
 Colours come from the style sheet: a part or series names its CSS class.
 """
@@ -56,7 +56,7 @@ def stacked_bar(parts: Sequence[Part], whole: int) -> Html:
     segments = [
         element(
             "span",
-            str(part.count) if part.count >= 0.055 * whole else "",
+            f"{part.count:,}" if part.count >= 0.055 * whole else "",
             class_=f"part {part.style}",
             style=f"flex-grow:{part.count}",
             title=part.tip,
@@ -84,30 +84,6 @@ def interval_mark(share: float, low: float, high: float) -> Html:
         role="img",
         aria_label=f"{100 * share:.1f} %, between {100 * low:.0f} and {100 * high:.0f} %",
     )
-
-
-def funnel(counts: dict[str, int], losses: Sequence[str]) -> Html:
-    """Bars that get shorter, with what was lost between them.
-
-    Args:
-        counts: by stage, first to last.
-        losses: one text fewer than there are counts.
-    """
-    whole = max(next(iter(counts.values())), 1)
-    rows = []
-    for (name, count), loss in zip(counts.items(), ["", *losses], strict=True):
-        fill = element("i", style=f"width:{100 * count / whole:.2f}%")
-        rows.append(
-            element(
-                "tr",
-                element("th", name, scope="row"),
-                element("td", element("div", fill, class_="fill"), class_="wide"),
-                element("td", count, class_="number"),
-                element("td", f"{100 * count / whole:.1f} %", class_="number faint"),
-                element("td", loss, class_="faint"),
-            )
-        )
-    return element("table", *rows, class_="funnel")
 
 
 def histogram(series: Sequence[Series], *, title: str, unit: str, focus: Array) -> Html:

@@ -1,66 +1,17 @@
-"""Sections of the report about single grasps: margins, the best ones, failures."""
+"""Sections of the report about single grasps: the best ones, and failed simulations."""
 
 from __future__ import annotations
 
 import math
 import shlex
 
-import numpy as np
-
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.report.charts import Series, histogram, legend
-from burg_drake.evaluation.report.markup import Html, command, element, section, table
-from burg_drake.evaluation.report.style import STYLES
+from burg_drake.evaluation.report.markup import Html, command, element, folded, table
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import Columns
-from burg_drake.visualization.palette import GROUPS, group_of
 
 BEST = 3
 """Rows for each object in the table of best grasps."""
 FAILURES = 50
 """Rows of the table of failures."""
-
-
-def margin_section(columns: Columns) -> Html | None:
-    """Histograms of slip, tilt, force and patch; nothing where no grasp was held."""
-    lifted = columns["outcome"] == Outcome.LIFTED
-    if not np.isfinite(columns["slip"]).any():
-        return None
-    charts = [
-        _margin_chart(columns, lifted, name, title, unit, factor)
-        for name, title, unit, factor in (
-            ("slip", "slip in the hand [mm]", "mm", 1e3),
-            ("tilt", "tilt in the hand [°]", "°", 180 / math.pi),
-            ("pad_force", "normal force of the weaker pad [N]", "N", 1.0),
-            ("patch_area", "contact patch of the weaker pad [mm²]", "mm²", 1e6),
-        )
-    ]
-    groups = [g for g in GROUPS if _in_group(columns, g.name, "slip").any()]
-    return section(
-        "Margins",
-        "Of all grasps that both fingers held once: movement of the object in the hand since the"
-        " grip, force and contact patch, when the outcome was decided. The last bar counts all"
-        " beyond the axis.",
-        element("div", *charts, class_="charts"),
-        legend([(STYLES[g.name], g.name) for g in groups]),
-    )
-
-
-def _margin_chart(
-    columns: Columns, lifted: np.ndarray, name: str, title: str, unit: str, factor: float
-) -> Html:
-    values = columns[name] * factor
-    series = [
-        Series(values[_in_group(columns, g.name, name)], STYLES[g.name], g.name) for g in GROUPS
-    ]
-    finite = np.isfinite(values)
-    focus = values[finite & lifted] if (finite & lifted).any() else values[finite]
-    return histogram(series, title=title, unit=unit, focus=focus)
-
-
-def _in_group(columns: Columns, group: str, margin: str) -> np.ndarray:
-    groups = np.array([group_of(Outcome(o)).name for o in columns["outcome"]], dtype=str)
-    return (groups == group) & np.isfinite(columns[margin])
 
 
 def best_section(run: Run) -> Html | None:
@@ -97,7 +48,7 @@ def best_section(run: Run) -> Html | None:
             )
         )
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
-    return section(
+    return folded(
         "Best grasps",
         f"Of each object the {BEST} best. Best means: lifted, with the most room around the open"
         " hand (clearance), and so most likely lifted again when pose, mass and friction are not"
@@ -125,4 +76,4 @@ def failure_section(run: Run) -> Html | None:
     ]
     more = f" The first {FAILURES} are listed." if len(failures) > FAILURES else ""
     text = f"{len(failures)} grasps could not be simulated; they count as not executed.{more}"
-    return section("Failures", text, table(["grasp", "stage", "reason"], rows))
+    return folded("Failures", text, table(["grasp", "stage", "reason"], rows))

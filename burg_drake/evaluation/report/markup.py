@@ -37,3 +37,9 @@ def command(line: str) -> Html:
     words = [element("span", word) for word in line.split(" ")]
     spaced = [part for word in words for part in (word, " ")]
     return element("pre", element("code", *spaced[:-1], class_="copy"))
+
+
+def folded(title: str, text: str, *content: Child) -> Html:
+    """A part of the page for those who look for it: closed on the screen, open on paper."""
+    summary = element("summary", element("h2", title))
+    return element("section", element("details", summary, element("p", text), *content))

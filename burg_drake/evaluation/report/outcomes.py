@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from burg_drake.core.figures import count as number
 from burg_drake.core.figures import duration, figure, percent
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.report.charts import Part, funnel, interval_mark, legend, stacked_bar
-from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
+from burg_drake.evaluation.report.charts import Part, interval_mark, legend, stacked_bar
+from burg_drake.evaluation.report.markup import Child, Html, element, folded, join, section, table
 from burg_drake.evaluation.report.style import STYLES
 from burg_drake.evaluation.summary import Group, Summary
 from burg_drake.visualization.palette import GROUPS
@@ -23,24 +26,51 @@ STOPPED = {
 """What stops a grasp on its way to each step of the funnel."""
 
 
+HEAD = ("grasps", "outcomes", "lifted / executed", "share with 95 % interval")
+"""Columns of `group_row` behind the name."""
+OBJECTS = 40
+"""Of more objects, the worst ones are shown."""
+
+
 def objects_section(summary: Summary) -> Html:
     """Stacked outcomes and success share of each object."""
-    head = ["object", "grasps", "outcomes", "lifted / executed", "share with 95 % interval"]
-    rows = [_object_row(g, "") for g in summary.objects]
-    if len(summary.objects) > 1:
-        rows.append(_object_row(summary.total, "total"))
+    head, objects = ["object", *HEAD], list(summary.objects)
+    more = ""
+    if len(objects) > OBJECTS:
+        objects = worst_first(objects)[:OBJECTS]
+        more = f" Of {len(summary.objects)} objects the {OBJECTS} worst are shown."
+    rows = [group_row(group) for group in objects]
+    if len(objects) > 1:
+        rows.append(group_row(summary.total, "total"))
     present = [g for g in GROUPS if any(summary.total.outcomes[o] for o in g.outcomes)]
     return section(
         "Outcomes by object",
-        "What became of all grasps. The share counts only grasps whose trial was executed.",
-        table(head, rows, numbers=(1, 3)),
+        f"What became of all grasps. The share counts only grasps whose trial was executed.{more}",
+        table(head, rows, numbers=(1, 3), style="stacking"),
         legend([(STYLES[g.name], g.name) for g in present]),
         *(element("p", note, class_="notice") for note in summary.notes),
         *([element("p", str(summary.lifts))] if summary.lifts else []),
     )
 
 
-def _object_row(group: Group, style: str) -> Html:
+def worst_first(groups: Sequence[Group]) -> list[Group]:
+    """Groups by their success when executed; those of which nothing was executed come first, and
+    of equal shares those that are less certain."""
+
+    def rank(group: Group) -> tuple[float, float]:
+        return (group.lifted / group.executed if group.executed else -1.0), group.interval[0]
+
+    return sorted(groups, key=rank)
+
+
+def group_row(group: Group, style: str = "", name: Child = None) -> Html:
+    """Grasps of an object, a scene or all, in a row under `HEAD`.
+
+    Args:
+        group: to show.
+        style: CSS class.
+        name: in place of the group's own.
+    """
     parts = []
     for outcomes in GROUPS:
         inside = {o: group.outcomes[o] for o in outcomes.outcomes if group.outcomes[o]}
@@ -53,30 +83,13 @@ def _object_row(group: Group, style: str) -> Html:
         share = join(mark, f" {percent(group.lifted / group.executed)}")
     return element(
         "tr",
-        element("th", group.name, scope="row"),
-        element("td", group.judged, class_="number"),
+        element("th", group.name if name is None else name, scope="row"),
+        element("td", number(group.judged), class_="number"),
         element("td", stacked_bar(parts, group.judged), class_="wide"),
-        element("td", f"{group.lifted} / {group.executed}", class_="number"),
-        element("td", share, style="white-space:nowrap"),
+        element("td", f"{number(group.lifted)} / {number(group.executed)}", class_="number"),
+        element("td", share, class_="estimate"),
         class_=style or None,
     )
-
-
-def funnel_section(summary: Summary) -> Html:
-    """How many grasps pass each stage."""
-    total = summary.total
-    counts = {name: total.funnel[name] for name in summary.steps}
-    losses = [_loss(total, name) for name in summary.steps[1:]]
-    return section(
-        "Stages",
-        "Grasps that pass each stage, and what stopped the others.",
-        funnel(counts, losses),
-    )
-
-
-def _loss(total: Group, name: str) -> str:
-    lost = [(o, total.outcomes[o]) for o in STOPPED[name] if total.outcomes[o]]
-    return ", ".join(f"{n} {label(o)}" for o, n in sorted(lost, key=lambda pair: -pair[1]))
 
 
 def count_section(summary: Summary) -> Html:
@@ -93,7 +106,7 @@ def count_section(summary: Summary) -> Html:
         rows.append(element("tr", element("th", group.name, scope="row"), *cells, class_=style))
     head = ["object", *(label(o) for o in seen)]
     matrix = table(head, rows, numbers=tuple(range(1, len(head))), style="matrix")
-    return section("Counts", "Every grasp ends with exactly one outcome.", matrix)
+    return folded("Counts", "Every grasp ends with exactly one outcome.", matrix)
 
 
 def _count_style(count: int) -> str:
@@ -114,7 +127,7 @@ def cost_section(summary: Summary) -> Html:
         text += " That of reachable includes the search for the arm's motions."
     if summary.mode == "arm":
         text += " That of planned is their timing."
-    return section("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
+    return folded("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
 
 
 def label(outcome: Outcome) -> str:

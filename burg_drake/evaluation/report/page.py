@@ -1,27 +1,33 @@
-"""The report of a run for people: one HTML page that needs nothing else."""
+"""The report of a run for people: one HTML page that needs nothing else.
+
+It answers in the order in which a reader asks: what came out, where grasps were lost, on which
+objects, how they look, why they fail, by which margin; what the arm reaches; and how to repeat it.
+Tables for closer study follow, folded.
+"""
 
 from __future__ import annotations
 
 import math
 
-from burg_drake.core.figures import duration, percent
+from burg_drake.core.figures import count
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.arm import arm_section, execution_section
 from burg_drake.evaluation.report.bodies import collision_section, disturbed_section
-from burg_drake.evaluation.report.grasps import best_section, failure_section, margin_section
-from burg_drake.evaluation.report.markup import Child, Html, element
-from burg_drake.evaluation.report.outcomes import (
-    cost_section,
-    count_section,
-    funnel_section,
-    objects_section,
-)
-from burg_drake.evaluation.report.provenance import provenance
+from burg_drake.evaluation.report.cascade import cascade_section
+from burg_drake.evaluation.report.causes import causes_section, rows_of_run
+from burg_drake.evaluation.report.grasps import best_section, failure_section
+from burg_drake.evaluation.report.headline import headline
+from burg_drake.evaluation.report.html_page import closer, header, html_page
+from burg_drake.evaluation.report.margins import further_margins, margin_section, tried_margins
+from burg_drake.evaluation.report.markup import Html, element
+from burg_drake.evaluation.report.outcome_groups import group_indices
+from burg_drake.evaluation.report.outcomes import cost_section, count_section, objects_section
+from burg_drake.evaluation.report.picture import grasp_section, pictures_of, scene_picture
+from burg_drake.evaluation.report.provenance import provenance, repeat_section
 from burg_drake.evaluation.report.reachability import reachability_section
-from burg_drake.evaluation.report.style import style_sheet
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import Summary, summarize
+from burg_drake.evaluation.summary import summarize
 
 
 def write_report(run: Run) -> None:
@@ -36,87 +42,60 @@ def write_report(run: Run) -> None:
 def report_page(run: Run) -> str:
     """The report as HTML."""
     summary, columns = summarize(run), run.results
+    groups = group_indices(columns["outcome"])
+    disturbance = run.document.trial.get("disturbance", math.inf)
+    pictures, tried = pictures_of(run, groups), tried_margins(columns, groups)
     title = f"{run.document.scene.name} on {run.document.station.name}"
-    sections = [
-        _header(run, title),
+    return html_page(
+        f"Grasp evaluation: {title}",
+        header("Grasp evaluation", title, _about(run)),
         _notice(run),
-        _tiles(summary),
+        headline(summary),
+        scene_picture(pictures),
+        cascade_section(summary),
         objects_section(summary),
-        funnel_section(summary),
-        count_section(summary),
-        collision_section(columns),
-        arm_section(summary, columns),
+        grasp_section(pictures),
+        causes_section(rows_of_run(columns, str(run.path))),
+        margin_section(*tried, disturbance),
         reachability_section(run),
         execution_section(summary, columns),
-        margin_section(columns),
-        disturbed_section(columns, run.document.trial.get("disturbance", math.inf)),
-        best_section(run),
-        failure_section(run),
-        cost_section(summary),
-        provenance(run),
-    ]
-    return "<!DOCTYPE html>\n" + element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", f"Grasp evaluation: {title}"),
-            element("style", Html(style_sheet())),
+        repeat_section(run),
+        closer(
+            best_section(run),
+            count_section(summary),
+            arm_section(summary, columns),
+            collision_section(columns),
+            disturbed_section(columns, disturbance),
+            further_margins(*tried),
+            failure_section(run),
+            cost_section(summary),
+            provenance(run),
         ),
-        element("body", *sections),
-        lang="en",
     )
 
 
-def _header(run: Run, title: str) -> Html:
+def _about(run: Run) -> str:
     document = run.document
-    count = document.grasps.count
     how = "sampled" if document.grasps.origin == "sampled" else "given"
     day = document.stretches[0].started[:10] if document.stretches else ""
     engine = engine_label(document.engine)
-    about = f"{count} {how} grasps, engine {engine}, seed {document.seed}"
-    return element(
-        "header",
-        element("p", "Grasp evaluation", class_="kind"),
-        element("h1", title),
-        element("p", f"{about}{', ' if day else ''}{day}", class_="about"),
-    )
+    about = f"{count(document.grasps.count)} {how} grasps, mode {document.mode}, engine {engine}"
+    about += f", seed {document.seed}"
+    return f"{about}{', ' if day else ''}{day}"
 
 
 def _notice(run: Run) -> Html | None:
-    judged, total = len(run.results["id"]), len(run.candidates)
-    if judged == total:
-        return None
-    text = (
-        f"This run is not complete: {judged} of {total} grasps are judged. The command at the end"
-        " of this page goes on with it."
-    )
-    return element("p", text, class_="notice")
-
-
-def _tiles(summary: Summary) -> Html:
-    total = summary.total
-    low, high = total.interval
-    share = percent(total.lifted / total.executed) if total.executed else "-"
-    interval = f"{100 * low:.0f} to {100 * high:.0f} % (95 % interval)" if total.executed else ""
-    trial = next((c for c in summary.costs if c.name == "executed"), None)
-    screened = "clear" if summary.mode == "hand" else "clear and feasible for the arm"
-    by_arm = "; by the whole arm" if summary.mode == "arm" else ""
-    disturbed = total.held - total.lifted
-    disturbing = f"; {disturbed} more disturbed others" if disturbed else ""
-    tiles: list[tuple[str, Child, str]] = [
-        ("Grasps judged", total.judged, f"on {len(summary.objects)} objects"),
-        ("Executed", total.executed, f"those found {screened}{by_arm}"),
-        ("Lifted", total.lifted, f"of {total.executed} executed{disturbing}"),
-        ("Success when executed", share, interval),
-        ("CPU time of a trial", duration(trial.median) if trial else "-", "median"),
-    ]
-    return element(
-        "dl",
-        *(
-            element("div", element("dt", name), element("dd", value, element("small", note)))
-            for name, value, note in tiles
-        ),
-        class_="tiles",
-    )
+    judged, mine = len(run.results["id"]), len(run.mine)
+    parts = []
+    if run.document.shard:
+        number, _, whole = run.document.shard.partition("/")
+        parts.append(
+            f"This is shard {number} of {whole}: of {len(run.candidates)} grasps {mine} are judged"
+            " here. burg-drake merge unites the shards."
+        )
+    if judged < mine:
+        parts.append(
+            f"This run is not complete: {judged} of {mine} grasps are judged. The command under"
+            " “How to repeat it” goes on with it."
+        )
+    return element("p", " ".join(parts), class_="notice") if parts else None

@@ -1,68 +1,106 @@
-"""The report's last section: how to get the same results again, and what made them."""
+"""The report's last sections: how to get the same results again, and what made them."""
 
 from __future__ import annotations
 
-import shlex
-from dataclasses import replace
+from pathlib import Path
 
 from burg_drake.core.figures import duration
-from burg_drake.core.schema import load_document
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.campaign_document import CampaignDocument
 from burg_drake.evaluation.motion_numbers import (
     motion_in,
-    motion_options,
     motion_text,
     without_motion,
 )
 from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.report.markup import Html, command, element, join
+from burg_drake.evaluation.report.commands import reproduce_campaign_command, reproduce_command
+from burg_drake.evaluation.report.markup import Html, command, element, folded, join, section
 from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
-from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, STATION_FILE, Run
+from burg_drake.evaluation.run_store import GRASPS_FILE, JOURNAL_FILE, RUN_FILE, Run
 from burg_drake.station.engine import ENGINES, Engine
-from burg_drake.station.station import StationDocument
+
+ASKED = {
+    "hand": "the hand alone executes each grasp in simulation",
+    "reach": "the hand executes those that the arm can execute, too",
+    "arm": "the whole arm executes them, from the pregrasp on",
+}
+"""What a mode asks of each grasp."""
+DECIDING = ("burg_drake", "drake", "python")
+"""Software whose version people ask for first."""
 
 
-def provenance(run: Run) -> Html:
-    """Command, inputs with their hashes, versions, stretches and files."""
-    facts = [*_inputs(run.document), *_settings(run.document), *_stretches(run.document)]
-    return element(
-        "section",
-        element("h2", "How to reproduce"),
-        element("p", _text(run.document)),
-        command(reproduce_command(run)),
-        element(
-            "dl",
-            *(join(element("dt", name), element("dd", fact)) for name, fact in facts),
-            element("dt", "files"),
-            element(
-                "dd",
-                f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
-                f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)",
-            ),
-            class_="facts",
-        ),
+def repeat_section(run: Run) -> Html:
+    """The command that makes the same results again, and the settings that decide about them."""
+    document = run.document
+    facts = [
+        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        *_common(document),
+        ("run", f"{document.hash} (hash of all of that; column run of the table)"),
+    ]
+    return section(
+        "How to repeat it", _text(document), command(reproduce_command(run)), _list(facts)
     )
 
 
-def reproduce_command(run: Run) -> str:
-    """The command line that makes this run; for given grasps their file is among the run's."""
-    document = run.document
-    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
-    words += ["--mode", document.mode]
-    if document.grasps.per_object is None:
-        words += ["--grasps", str(run.path / GRASPS_FILE)]
-    else:
-        words += ["--grasps-per-object", str(document.grasps.per_object)]
-        words += ["--approach-angle", str(document.grasps.approach_angle_deg)]
-        words += ["--blind"] if document.grasps.blind else []
-        words += [word for name in document.grasps.only for word in ("--only", name)]
-    usual = load_document(run.path / STATION_FILE, StationDocument).motion
-    motion = motion_in(document.trial)
-    if document.mode == "hand":  # which does not begin before the grasp
-        motion = replace(motion, standoff=usual.standoff)
-    words += motion_options(motion, usual)
-    words += ["--engine", document.engine.name, "--seed", str(document.seed)]
-    words += [] if document.table == "csv" else ["--table", document.table]
-    return shlex.join([*words, "-o", str(run.path)])
+def provenance(run: Run) -> Html:
+    """All inputs with their hashes, settings, versions, stretches and files."""
+    facts = [*_inputs(run.document), *_settings(run.document), *_stretches(run.document)]
+    files = (
+        f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
+        f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
+    )
+    text = "Everything that decides about the results, who judged when, and what is in the folder."
+    return folded("All settings and versions", text, _list([*facts, ("files", files)]))
+
+
+def repeat_campaign(campaign: Campaign) -> Html:
+    """The command that began a run over many scenes, and the settings that decide about it."""
+    document = campaign.document
+    scenes = [entry.path for entry in document.scenes]
+    text = (
+        "Results follow from the inputs, the seed and the versions below; not from the number of"
+        " workers, machines or shares, or the order of their work."
+    )
+    facts = [
+        ("scenes", f"{len(scenes)}, their contents in campaign.yaml"),
+        *_common(document),
+        ("run", f"{document.hash} (hash of all of that)"),
+    ]
+    return section(
+        "How to repeat it", text, command(reproduce_campaign_command(campaign)), _list(facts)
+    )
+
+
+def campaign_facts(campaign: Campaign) -> Html:
+    """All settings, versions, and who worked on a run over many scenes."""
+    document = campaign.document
+    facts = [
+        *(
+            (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
+            for folder, content in document.libraries.items()
+        ),
+        *_settings(document),
+        *_stretches(document),
+    ]
+    text = "Everything that decides about the results but the scenes, and who judged when."
+    return folded("All settings and versions", text, _list(facts))
+
+
+def _common(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+    """Settings that people ask for first."""
+    return [
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("mode", f"{document.mode}: {ASKED[document.mode]}"),
+        ("motion", motion_text(motion_in(document.trial))),
+        ("engine", engine_label(document.engine)),
+        ("seed", str(document.seed)),
+        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in DECIDING)),
+    ]
+
+
+def _list(facts: list[tuple[str, str]]) -> Html:
+    pairs = (join(element("dt", name), element("dd", fact)) for name, fact in facts)
+    return element("dl", *pairs, class_="facts")
 
 
 def _text(document: RunDocument) -> str:
@@ -92,7 +130,7 @@ def _inputs(document: RunDocument) -> list[tuple[str, str]]:
     ]
 
 
-def _settings(document: RunDocument) -> list[tuple[str, str]]:
+def _settings(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     engine = document.engine
     return [
         ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
@@ -124,7 +162,7 @@ def _listed(settings: dict[str, float]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
 
 
-def _stretches(document: RunDocument) -> list[tuple[str, str]]:
+def _stretches(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     lines = []
     for stretch in document.stretches:
         judged = "interrupted" if stretch.judged is None else f"{stretch.judged} grasps"

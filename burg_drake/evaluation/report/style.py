@@ -14,6 +14,8 @@ THEMED = {
     "simulation failed": ("#1d2328", "#f4f6f7"),
 }
 """Greys, black and dark blue need one tone on a light page and another on a dark one."""
+STROKES = {GROUPS[1].hex: "#b59f00"}
+"""Thin lines in yellow cannot be seen on white: a darker one of its hue."""
 TEXT = ("#101418", "#ffffff")
 """Of numbers on the colours: whichever stands out more."""
 
@@ -28,4 +30,6 @@ def style_sheet() -> str:
 
 def _rule(group: str, colour: str) -> str:
     text = max(TEXT, key=lambda text: contrast(text, colour))
-    return f".{STYLES[group]} {{ background: {colour}; fill: {colour}; color: {text}; }}\n"
+    name = STYLES[group]
+    fill = f".{name} {{ background: {colour}; fill: {colour}; color: {text}; }}"
+    return f"{fill} .grasp.{name} {{ stroke: {STROKES.get(colour, colour)}; }}\n"

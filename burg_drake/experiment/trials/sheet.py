@@ -8,18 +8,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
+from burg_drake.core.errors import FieldError, InvalidInputError
+from burg_drake.core.names import require_names
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose, load_document, save_document
 from burg_drake.evaluation.mode import Mode
 from burg_drake.evaluation.run_document import Input
+from burg_drake.experiment.trials.checks import require_known, require_least, require_time
 
 SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the
 rest by hand, or with burg-drake trials record and burg-drake trials serve."""
 Success = Literal["lifted", "held"]
 """What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)."""
 Balance = Literal["outcome", "stage", "margin", "probability", "none"]
+Among = Literal["clear", "reachable", "executed"]
+"""What was chosen from: grasps at which the hand is clear, those of them that the arm can be at,
+or those that were tried in simulation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,13 +53,18 @@ class Selection:
     """How the grasps were chosen.
 
     Attributes:
-        per_object: how many of each object were wanted.
+        per_object: how many of each object of a run were wanted.
         balance: by what the grasps of an object were divided into strata.
         margin: name of the margin, with `margin`.
         bins: number of strata of a margin or a probability.
         success: what counts as success, here and in comparisons.
         seed: of choice and order.
+        among: what was chosen from.
+        scenes: so many scenes were drawn from those of the runs; 0 for all.
+        blocks: how many blocks the trials of a scene were divided into.
     """
+
+    WRITTEN_WHOLE: ClassVar[bool] = True
 
     per_object: int
     balance: Balance
@@ -61,6 +72,18 @@ class Selection:
     bins: int = 0
     success: Success = "lifted"
     seed: int = 0
+    among: Among = "executed"
+    scenes: int = 0
+    blocks: int = 1
+
+    def __post_init__(self) -> None:
+        require_least(self.per_object, 1, "per_object")
+        require_least(self.blocks, 1, "blocks")
+        require_least(self.scenes, 0, "scenes")
+        require_least(self.bins, 0, "bins")
+        if (self.balance == "margin") != bool(self.margin):
+            what = "names a margin" if self.margin else "names none"
+            raise FieldError(f"margin {what}, and balance is {self.balance!r}", "margin")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +105,13 @@ class Stratum:
     population: int
     selected: int
     wanted: int
+
+    def __post_init__(self) -> None:
+        require_least(self.selected, 0, "selected")
+        if self.population < self.selected:
+            raise FieldError(
+                f"population {self.population} is less than selected {self.selected}", "population"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +146,12 @@ class RobotReport:
 
     width_mm: float | None = None
     effort_n: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("width_mm", "effort_n"):
+            value = getattr(self, name)
+            if value is not None and value < 0.0:
+                raise FieldError(f"{name} is {value:g}; it cannot be below 0", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,6 +193,15 @@ class RealTrial:
     placement: dict[str, ObjectPlace] = field(default_factory=dict)
     robot: RobotReport | None = None
 
+    def __post_init__(self) -> None:
+        require_least(self.number, 1, "number")
+        require_time(self.time, "time")
+
+    @property
+    def carried_out(self) -> bool:
+        """Whether it has an outcome, be it that nobody tried."""
+        return self.outcome is not None
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrialSheet:
@@ -168,6 +213,7 @@ class TrialSheet:
         selection: how the grasps were chosen.
         strata: what was chosen from, by key.
         trials: in order.
+        notes: what people should know of the choice, such as where there were too few grasps.
         versions: of the software that chose.
     """
 
@@ -177,7 +223,73 @@ class TrialSheet:
     selection: Selection
     strata: dict[str, Stratum] = field(default_factory=dict)
     trials: tuple[RealTrial, ...] = ()
+    notes: tuple[str, ...] = ()
     versions: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_names(self.runs, "runs")
+        require_time(self.created, "created")
+        for key, stratum in self.strata.items():
+            require_known(stratum.run, self.runs, "run", "strata", key, "run")
+        lines: dict[int, int] = {}
+        for i, trial in enumerate(self.trials):
+            first = lines.setdefault(trial.number, i)
+            if first != i:
+                raise FieldError(
+                    f"number {trial.number} is given twice, to trials {first + 1} and {i + 1} of"
+                    " the list",
+                    *("trials", i, "number"),
+                )
+            self._check(i, trial)
+
+    def _check(self, i: int, trial: RealTrial) -> None:
+        """Refuses a trial whose run or stratum is unknown, or not its own; a sheet without any
+        strata is one that nobody has balanced."""
+        require_known(trial.run, self.runs, "run", "trials", i, "run")
+        if not self.strata:
+            return
+        require_known(trial.stratum, self.strata, "stratum", "trials", i, "stratum")
+        stratum = self.strata[trial.stratum]
+        for name in ("run", "object"):
+            theirs, own = getattr(stratum, name), getattr(trial, name)
+            if theirs != own:
+                raise FieldError(
+                    f"stratum {trial.stratum!r} is of {name} {theirs!r}, trial {trial.number} of"
+                    f" {own!r}",
+                    *("trials", i, "stratum"),
+                )
+
+    def trial(self, number: int) -> RealTrial:
+        """The trial of a number.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self.trials[self.index(number)]
+
+    def index(self, number: int) -> int:
+        """Where among `trials` the one of a number is.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        for i, trial in enumerate(self.trials):
+            if trial.number == number:
+                return i
+        numbers = [trial.number for trial in self.trials]
+        span = f"they have {min(numbers)} to {max(numbers)}" if numbers else "there are no trials"
+        raise InvalidInputError(f"there is no trial {number}; {span}")
+
+    @property
+    def next(self) -> RealTrial | None:
+        """The first trial, by number, without an outcome; None if all have one."""
+        left = [trial for trial in self.trials if not trial.carried_out]
+        return min(left, key=lambda trial: trial.number, default=None)
+
+
+def succeeded(outcome: Outcome | RealOutcome, success: Success) -> bool:
+    """Whether an outcome counts as success."""
+    return outcome.held if success == "held" else outcome.value == Outcome.LIFTED.value
 
 
 def load_trials(path: str | Path) -> TrialSheet:

@@ -1,0 +1,214 @@
+"""Coverage of the intervals of `burg-drake compare`, and how long a million rows take.
+
+    python benchmarks/compare.py coverage [--repeats 400]
+    python benchmarks/compare.py speed [RUN RUN] [--rows 1000000]
+
+`coverage` draws trials from populations whose figures are known, as `trials plan` chooses them (so
+many of each object from those that were predicted to be lifted, and from the others), and counts
+how often the 95 % interval of each figure holds the one of the whole population: for all grasps by
+the Bayesian bootstrap within strata that the package uses, next to drawing the trials of each
+stratum anew (percentiles), and to Wilson's interval with the effective number of trials. Outcomes
+of the trials are random, as reality is: the true figures are those of an endless series.
+
+`speed` times everything that follows on reading, on columns of so many rows, and the comparison of
+two runs on the disk; wall time, and CPU time in brackets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from burg_drake.core.frames import Array
+from burg_drake.core.statistics import wilson_interval
+from burg_drake.experiment.comparison.agreement import _all_measures, agreement
+from burg_drake.experiment.comparison.calibration import MARGINS
+from burg_drake.experiment.comparison.comparison import compare
+from burg_drake.experiment.comparison.judgement import judgement
+from burg_drake.experiment.comparison.matching import match_rows
+from burg_drake.experiment.comparison.measures import MEASURES
+from burg_drake.experiment.comparison.of_runs import pairs_of_runs
+from burg_drake.experiment.comparison.ordered import Ordered
+from burg_drake.experiment.comparison.ranking import ranking
+from burg_drake.experiment.comparison.resampling import bounds
+
+FIGURES = ("precision", "recall", "specificity", "f1", "accuracy", "matthews", "kappa", "actual")
+
+
+def main() -> None:
+    """Runs a benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(required=True)
+    covered = verbs.add_parser("coverage")
+    covered.add_argument("--repeats", type=int, default=400)
+    covered.set_defaults(run=coverage)
+    speedy = verbs.add_parser("speed")
+    speedy.add_argument("runs", nargs="*", metavar="RUN")
+    speedy.add_argument("--rows", type=int, default=1_000_000)
+    speedy.set_defaults(run=speed)
+    arguments = parser.parse_args()
+    arguments.run(arguments)
+
+
+def coverage(arguments: argparse.Namespace) -> None:
+    """Prints how often intervals hold the truth, and how wide they are."""
+    rng = np.random.default_rng(0)
+    for objects, each, right in (
+        (1, 30, 0.7),
+        (6, 5, 0.7),
+        (6, 5, 0.95),
+        (12, 3, 0.9),
+        (6, 10, 0.85),
+    ):
+        _cover(objects, each, right, arguments.repeats, rng)
+    _cover_ranking(arguments.repeats, rng)
+
+
+def _cover(objects: int, each: int, right: float, repeats: int, rng: np.random.Generator) -> None:
+    """One kind of population: its strata are of (object, predicted)."""
+    held = {method: np.zeros(len(FIGURES)) for method in ("package", "resampled", "wilson")}
+    wide = {method: np.zeros(len(FIGURES)) for method in held}
+    for _ in range(repeats):
+        population = rng.integers(30, 600, (objects, 2)).astype(float).ravel()
+        chance = np.clip(rng.beta(right * 12, (1 - right) * 12, 2 * objects), 0.01, 0.99)
+        truth = _figures(_cells(chance) * population[:, None])
+        seen = rng.binomial(each, chance) / each
+        counts = np.rint(_cells(seen) * each).astype(int)
+        a = agreement(counts, population=population)
+        mine = np.array(
+            [[getattr(a.figure(n), e) for n in FIGURES] for e in ("low", "high")], float
+        )
+        others = _resampled(counts, population, rng), _wilson(counts, population)
+        for method, (low, high) in zip(held, (mine, *others), strict=True):
+            inside = (low - 1e-9 <= truth) & (truth <= high + 1e-9)
+            held[method] += inside | np.isnan(truth)
+            wide[method] += np.nan_to_num(high - low)
+    print(f"{objects} objects, {each} a stratum, {right:g} right: coverage (mean width)")
+    print(f"{'':12}" + "".join(f"{name:>16}" for name in FIGURES))
+    for method in held:
+        cells = zip(held[method] / repeats, wide[method] / repeats, strict=True)
+        print(f"{method:12}" + "".join(f"{c:9.3f} ({w:.2f})" for c, w in cells))
+
+
+def _cells(right: Array) -> Array:
+    """(S, 4) shares of cells of strata that predict success and failure by turns."""
+    cells = np.zeros((len(right), 4))
+    cells[0::2, 0], cells[0::2, 1] = right[0::2], 1 - right[0::2]
+    cells[1::2, 3], cells[1::2, 2] = right[1::2], 1 - right[1::2]
+    return cells
+
+
+def _figures(cells: Array) -> Array:
+    every = dict(zip(MEASURES, _all_measures(cells.sum(axis=0)), strict=True))
+    return np.array([every[name] for name in FIGURES])
+
+
+def _resampled(counts: Array, population: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Trials of each stratum drawn anew."""
+    size = counts.sum(axis=1)
+    drawn = np.stack(
+        [
+            rng.multinomial(n, c / n, 1000) * (w / n)
+            for n, c, w in zip(size, counts, population, strict=True)
+        ]
+    ).sum(axis=0)
+    low, high = bounds(_all_measures(drawn))
+    order = [list(MEASURES).index(name) for name in FIGURES]
+    return low[order], high[order]
+
+
+def _wilson(counts: Array, population: Array) -> tuple[Array, Array]:
+    """Wilson's interval with L. Kish's effective number of trials, for shares alone."""
+    weight = population / counts.sum(axis=1)
+    low, high = np.full(len(FIGURES), np.nan), np.full(len(FIGURES), np.nan)
+    for k, name in enumerate(FIGURES):
+        measure = MEASURES[name]
+        if measure.is_share:
+            part = (weight[:, None] * counts)[:, list(measure.part)].sum()
+            whole = (weight[:, None] * counts)[:, list(measure.whole)].sum()
+            squares = (weight[:, None] ** 2 * counts)[:, list(measure.whole)].sum()
+            if whole:
+                effective = whole**2 / squares
+                low[k], high[k] = wilson_interval(part / whole * effective, effective)
+    return low, high
+
+
+def _cover_ranking(repeats: int, rng: np.random.Generator) -> None:
+    """Intervals of the area under the ROC curve of normal numbers, some of them rounded."""
+    from scipy.stats import norm
+
+    print("AUROC: coverage (mean width)")
+    for trials, shift, digits in ((20, 0.5, 9), (60, 1.0, 9), (60, 2.0, 9), (60, 1.0, 0)):
+        held = wide = 0.0
+        far = rng.normal(size=200_000)
+        truth = float(norm.cdf(shift / np.sqrt(2)))
+        if digits < 9:
+            a, b = np.round(far[::2] + shift, digits), np.round(far[1::2], digits)
+            truth = float((a > b).mean() + (a == b).mean() / 2)
+        for _ in range(repeats):
+            good = rng.random(trials) < 0.3
+            values = np.round(rng.normal(size=trials) + shift * good, digits)
+            found = ranking(Ordered.of(values, good))
+            if found.low is not None and found.high is not None:
+                held += found.low <= truth <= found.high
+                wide += found.high - found.low
+        print(f"  {trials} trials, true {truth:.2f}: {held / repeats:.3f} ({wide / repeats:.2f})")
+
+
+def speed(arguments: argparse.Namespace) -> None:
+    """Prints wall times."""
+    tables = _made_up(arguments.rows, 0), _made_up(arguments.rows, 0)
+    tables[1]["outcome"] = np.random.default_rng(5).permutation(tables[1]["outcome"])
+    with _timed(f"{arguments.rows} rows in memory"):
+        with _timed("  matching"):
+            found = match_rows(*tables)
+        with _timed("  pairs"):
+            pairs, _ = pairs_of_runs(tables, found, "lifted")
+        with _timed("  figures"):
+            judgement(pairs, scenes={})
+    if len(arguments.runs) == 2:
+        with _timed("runs on the disk"):
+            c = compare(*arguments.runs)
+        print(f"{c.coverage.compared} grasps compared")
+
+
+@contextmanager
+def _timed(what: str) -> Iterator[None]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    yield
+    print(f"{what}: {time.perf_counter() - wall:.2f} s ({time.process_time() - cpu:.2f})")
+
+
+def _made_up(rows: int, seed: int) -> dict[str, Array]:
+    """A table like that of a run over a thousand scenes."""
+    rng = np.random.default_rng(seed)
+    objects = np.array(["mug", "bowl", "box", "bottle", "banana", "screwdriver"])
+    outcomes = np.array(["lifted", "slipped", "collision_table", "collision_target", "no_ik"])
+    stages = np.array(["executed", "executed", "clear", "clear", "reachable"])
+    ended = rng.integers(0, 5, rows)
+    which = rng.integers(0, 6, rows)
+    scenes = np.array([f"{k:012x}" for k in range(1000)])
+    columns: dict[str, Array] = {
+        "scene_content": np.repeat(scenes, -(-rows // 1000))[:rows],
+        "id": np.array([f"{objects[k]}-{i:010x}" for i, k in enumerate(which.tolist())]),
+        "object": objects[which],
+        "outcome": outcomes[ended],
+        "stage": stages[ended],
+        "blocker": np.where(ended == 2, "table", ""),
+        "run": np.repeat(scenes, -(-rows // 1000))[:rows],
+    }
+    for name in ("x", "y", "z", "qw", "qx", "qy", "qz", "width"):
+        columns[name] = rng.normal(size=rows)
+    for name in MARGINS:
+        values = rng.normal(size=rows)
+        values[ended > 1] = np.nan  # what is stopped before its trial has no such margin
+        columns[name] = values if name not in ("clearance", "score") else rng.normal(size=rows)
+    return columns
+
+
+if __name__ == "__main__":
+    main()

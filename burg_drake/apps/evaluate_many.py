@@ -1,0 +1,182 @@
+"""`burg-drake evaluate` on several scenes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.arguments import DEFAULT_APPROACH_ANGLE
+from burg_drake.apps.given_grasps import read_given
+from burg_drake.apps.motion_options import chosen_motion, require_standoff_of_arm
+from burg_drake.apps.retries import how_to_retry
+from burg_drake.apps.sampling_options import grasps_per_object
+from burg_drake.core.errors import InvalidInputError, listing
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.campaign import Campaign
+    from burg_drake.evaluation.executor import Executor
+    from burg_drake.evaluation.request import Given
+    from burg_drake.evaluation.summary import Summary
+    from burg_drake.scene.scene import Scene
+    from burg_drake.station.station import Station
+
+SHOWN = 20
+"""So many scenes have a row of their own."""
+
+
+def evaluate_many(
+    arguments: argparse.Namespace, references: Sequence[str], executor: Executor | None = None
+) -> int:
+    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated.
+
+    Args:
+        arguments: of the verb.
+        references: the scenes.
+        executor: judges in place of processes of this machine.
+    """
+    from burg_drake.evaluation.cascade import evaluate
+    from burg_drake.evaluation.mode import mode_for
+    from burg_drake.evaluation.motion_numbers import motion_text
+    from burg_drake.station.grasp_motion import GraspMotion
+    from burg_drake.station.station import load_station
+
+    if arguments.output is None:
+        raise InvalidInputError(f"{len(references)} scenes are given; say where to with -o RUN")
+    station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    require_standoff_of_arm(arguments, mode)
+    motion = chosen_motion(arguments, station)
+    campaign = evaluate(
+        list(references),
+        station,
+        arguments.output,
+        grasps_per_object=grasps_per_object(arguments),
+        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+        blind=arguments.blind,
+        only=arguments.only,
+        grasps=_given(arguments, station),
+        engine=arguments.engine,
+        seed=arguments.seed,
+        workers=arguments.workers,
+        executor=executor,
+        shard=arguments.shard,
+        table=arguments.table,
+        mode=mode,
+        motion=motion,
+        retry_failed=arguments.retry_failed,
+        progress=not arguments.quiet,
+    )
+    print_campaign(campaign)
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
+    return how_it_ended(campaign)
+
+
+def print_campaign(campaign: Campaign) -> None:
+    """Prints the tables of a run over many scenes, and where what is."""
+    from rich.console import Console
+
+    from burg_drake.evaluation.part_store import PARTS_FOLDER
+    from burg_drake.evaluation.summary import summarize
+    from burg_drake.evaluation.summary_tables import summary_view
+
+    summary = summarize(campaign)
+    Console().print(summary_view(summary))
+    _scene_table(summary).show()
+    if campaign.document.shard:
+        print(f"shard   {campaign.document.shard}; burg-drake merge unites all of them")
+    print(f"runs    {campaign.path}/scenes/NAME, each with a table and a report")
+    print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
+    if campaign.report_path.exists():
+        print(f"report  {campaign.report_path}")
+
+
+def how_it_ended(campaign: Campaign) -> int:
+    """Says what could not be judged; the exit code."""
+    states = campaign.states.values()
+    failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
+    for name, why in campaign.failed.items():
+        print(f"burg-drake: scene {name} could not be judged: {why}", file=sys.stderr)
+    if failed:
+        where = listing([s.scene for s in states if s.failed])
+        print(
+            f"burg-drake: {failed} grasps could not be simulated (scenes {where});"
+            f" {how_to_retry(interrupted, failed)}",
+            file=sys.stderr,
+        )
+    return 1 if failed or campaign.failed else 0
+
+
+def _scene_table(summary: Summary) -> Any:
+    """The scenes in which the smallest share of the executed grasps was lifted."""
+    from burg_drake.core.figures import count, percent
+    from burg_drake.core.text_table import TextTable
+
+    def share(group: Any) -> float:
+        return group.lifted / group.executed if group.executed else -1.0
+
+    groups = sorted(summary.scenes, key=share)[:SHOWN]
+    more = len(summary.scenes) - len(groups)
+    title = f"Scenes, the {SHOWN} with the least success" if more else "Scenes"
+    table = TextTable(title).names("scene")
+    table.numbers(*summary.steps, "success")
+    for group in groups:
+        success = percent(share(group)) if group.executed else "-"
+        table.row(group.name, *(count(group.funnel[name]) for name in summary.steps), success)
+    if more:
+        table.caption = f"{more:,} more scenes are in the columns of the store"
+    return table
+
+
+def _given(arguments: argparse.Namespace, station: Station) -> Given | None:
+    """The grasps of the file: those in the frames of their objects as a set for all scenes."""
+    from burg_drake.apps.grasp_file import FRAMES, gripper_for
+    from burg_drake.evaluation.grasp_input import read_input
+    from burg_drake.formats.conversion import with_objects_renamed
+
+    if arguments.grasps is None:
+        return None
+    imported = read_input(
+        arguments.grasps, arguments.grasps_format, gripper_for(arguments, station)
+    )
+    for note in imported.notes:
+        print(f"note: {note}")
+    frame = FRAMES.get(arguments.grasps_frame) or imported.frame
+    if frame != "object":
+        return _FileOfScenes(arguments, station)
+    return with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
+
+
+@dataclass(frozen=True)
+class _FileOfScenes:
+    """Grasps in the frame of a scene or camera: each scene gets those that a file has of it, by
+    the column `scene_id`.
+
+    Attributes:
+        arguments: of the verb.
+        station: has the hand.
+    """
+
+    arguments: argparse.Namespace
+    station: Station
+
+    def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
+        from burg_drake.core.errors import UnknownNameError
+
+        chosen = argparse.Namespace(**{**vars(self.arguments), "run": None})
+        chosen.scene_id = scene.name
+        try:
+            return read_given(chosen, scene, self.station).by_instance
+        except UnknownNameError:
+            return {}
+        except InvalidInputError as error:
+            if "no scene ids" in str(error):
+                raise InvalidInputError(
+                    f"{self.arguments.grasps} has grasps that are measured in the frame of one"
+                    " scene or camera, and does not say of which; evaluate that scene alone"
+                ) from error
+            raise

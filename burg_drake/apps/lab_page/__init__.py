@@ -1,0 +1,1 @@
+"""The page of the lab: trials are entered where they are carried out."""

@@ -1,0 +1,87 @@
+"use strict";
+
+// The live picture, and how far the objects stand from their places.
+
+async function showFrames() {
+  let number = 0, epoch = 0;
+  for (;;) {
+    await seen();
+    if (view !== "camera" || (camera && camera.checking)) { await sleep(200); continue; }
+    try {
+      const answer = await fetch(`frame.jpg?epoch=${epoch}&after=${number}`);
+      if (answer.status === 200) {
+        number = Number(answer.headers.get("X-Picture"));
+        epoch = Number(answer.headers.get("X-Epoch"));
+        await paint(await answer.blob());
+      } else if (answer.status !== 204) await sleep(1000);
+    } catch {
+      number = epoch = 0;
+      await sleep(1000);
+    }
+  }
+}
+
+async function paint(blob) {
+  if (view !== "camera") return;
+  const picture = $("picture"), before = picture.src;
+  picture.src = URL.createObjectURL(blob);
+  picture.alt = "camera with the scene drawn over it";
+  try { await picture.decode(); } catch { /* the next one will do */ }
+  if (before.startsWith("blob:")) URL.revokeObjectURL(before);
+}
+
+async function showCamera() {
+  for (;;) {
+    await seen();
+    try {
+      const answer = await fetch("camera");
+      if (answer.ok) { camera = await answer.json(); renderCamera(); }
+    } catch { /* the other loop tells */ }
+    await sleep(view === "camera" || (camera && camera.checking) ? 400 : 1500);
+  }
+}
+
+function renderCamera() {
+  const { check, checking } = camera;
+  if (view === "camera") {
+    $("line").hidden = false;
+    $("line").textContent = camera.fault || camera.line;
+  }
+  $("check").disabled = checking || !camera.scene;
+  $("check").textContent = checking ? "Measuring …" : "Check placement";
+  const mine = check && check.number === current;
+  $("checked").textContent = !mine ? keptText()
+    : check.problem || (check.kept ? "Kept with this trial." : "Not kept; press the button to keep it.");
+  const rows = mine ? Object.entries(check.objects) : Object.entries((entries.get(current) || {}).placement || {});
+  $("objects").replaceChildren(...rows.map(([name, placed]) => placeRow(name, placed)));
+  const slow = check && check.seconds > QUICK;
+  if ($("always").checked && !checking && !slow && camera.valid && view === "camera") {
+    post("check", { number: current, keep: false });
+  }
+}
+
+function keptText() {
+  const entry = entries.get(current);
+  return entry && entry.photo ? `Kept with this trial: ${entry.photo}` : "";
+}
+
+function placeRow(name, { status, within, mm, deg }) {
+  const row = make("tr"), text = status === "not_seen" || mm === null ? "not seen" : `${mm.toFixed(1)} mm`;
+  const kind = status !== "measured" ? "unsure" : within === undefined ? "" : within ? "within" : "off";
+  const mark = { within: "✓ ", off: "✗ ", unsure: "? " }[kind] || "";
+  row.append(make("th", "", name), make("td", kind, mark + text));
+  row.append(make("td", kind, deg === null ? "" : `${(Math.round(10 * deg) / 10 || 0).toFixed(1)}°`));
+  return row;
+}
+
+async function post(path, body) {
+  try {
+    const answer = await fetch(path, {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(body),
+    });
+    const data = await answer.json();
+    if (data.error) $("checked").textContent = data.error;
+  } catch { /* the status tells */ }
+}

@@ -1,0 +1,130 @@
+"use strict";
+
+// Entries that the program has not acknowledged yet. They are in the browser's storage before
+// anything else happens, and are sent until the program says that they are on its disk.
+
+class Outbox {
+  constructor(plan, changed) {
+    this.prefix = `burg-drake entry ${plan} `;
+    this.changed = changed;   // called with the acknowledged item and the trial's entry, or nothing
+    this.stored = true;       // whether the browser keeps them
+    this.problem = "";        // why the last attempt failed
+    this.count = 0;
+    this.items = this.load();
+    this.wake = () => {};
+    this.send();
+  }
+
+  load() {
+    const items = [];
+    try {
+      for (let k = 0; k < localStorage.length; k++) {
+        const key = localStorage.key(k);
+        if (!key.startsWith(this.prefix)) continue;
+        try { items.push(JSON.parse(localStorage.getItem(key))); } catch { /* not ours */ }
+      }
+    } catch { this.stored = false; }
+    return items.sort((a, b) => (a.id < b.id ? -1 : 1));
+  }
+
+  store(item) {
+    try { localStorage.setItem(this.prefix + item.id, JSON.stringify(item)); }
+    catch { this.stored = false; }
+  }
+
+  remove(item) {
+    this.items = this.items.filter((other) => other !== item);
+    try { localStorage.removeItem(this.prefix + item.id); } catch { /* it was never there */ }
+  }
+
+  // entry: fields of the request; state: of the trial that it replaces, as the program told it.
+  add(entry, state, before) {
+    const earlier = this.of(entry.number).at(-1);
+    const moment = String(Date.now()).padStart(14, "0");
+    const random = Math.random().toString(36).slice(2, 10);
+    const item = {
+      id: `${moment} ${String(this.count++).padStart(6, "0")} ${random}`,
+      entry: { ...entry, replaces: state },
+      after: earlier ? earlier.id : "",
+      before,
+      trouble: null,
+    };
+    this.items.push(item);
+    this.store(item);
+    this.changed();
+    this.wake();
+    return item;
+  }
+
+  of(number) { return this.items.filter((item) => item.entry.number === number); }
+
+  get troubled() { return this.items.filter((item) => item.trouble); }
+
+  discard(item) {
+    for (const later of this.of(item.entry.number)) {
+      if (later.id >= item.id) this.remove(later);
+    }
+    this.changed();
+    this.wake();
+  }
+
+  insist(item) {
+    item.entry.replaces = item.trouble.state;
+    item.trouble = null;
+    this.store(item);
+    this.changed();
+    this.wake();
+  }
+
+  nextItem() {
+    const blocked = new Set(this.troubled.map((item) => item.entry.number));
+    return this.items.find((item) => !blocked.has(item.entry.number));
+  }
+
+  async send() {
+    for (;;) {
+      const item = this.nextItem();
+      if (!item) {
+        await new Promise((done) => { this.wake = done; });
+        continue;
+      }
+      let pause = 0;
+      try { pause = await this.attempt(item); }
+      catch { this.problem = "the program does not answer"; pause = 1000; }
+      this.changed();
+      if (pause) await sleep(pause);
+    }
+  }
+
+  // Sends an item; returns how long to wait before the next attempt [ms].
+  async attempt(item) {
+    const answer = await fetch("entry", {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify(item.entry),
+      signal: AbortSignal.timeout(40000),
+    });
+    const data = await answer.json();
+    if (answer.ok) {
+      this.problem = "";
+      for (const later of this.items) {
+        if (later.after !== item.id) continue;
+        later.entry.replaces = data.entry.state;  // before its predecessor is forgotten
+        later.after = "";
+        this.store(later);
+      }
+      this.remove(item);
+      this.changed(item, data.entry);
+      return 0;
+    }
+    if (answer.status === 409 || answer.status === 400) {
+      const state = data.entry ? data.entry.state : "";
+      item.trouble = { text: data.error, state, label: data.entry ? data.entry.label : "" };
+      this.store(item);
+      this.changed(null, data.entry);
+      return 0;
+    }
+    this.problem = data.error;  // such as a file that somebody is editing: it may pass
+    return 2000;
+  }
+}

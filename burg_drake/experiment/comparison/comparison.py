@@ -1,0 +1,127 @@
+"""Simulated outcomes against real ones, and against those of another simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError, nearest, quoted
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.run_store import Run
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.paired import Paired
+from burg_drake.experiment.comparison.placement import LIMIT_MM
+from burg_drake.experiment.comparison.side import Side
+from burg_drake.experiment.trials.sheet import Success
+
+SUCCESSES: tuple[Success, ...] = ("lifted", "held")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coverage:
+    """Which grasps the figures are about.
+
+    Attributes:
+        compared: grasps with a verdict and an outcome.
+        only_first, only_second: grasps, or trials, that the other side has not.
+        other_content: grasps that have only their id in common.
+        left_out: grasps of both sides that tell nothing, by reason.
+    """
+
+    compared: int
+    only_first: int = 0
+    only_second: int = 0
+    other_content: int = 0
+    left_out: Mapping[str, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A comparison with all its figures; intervals are those of 95 %.
+
+    Attributes:
+        kind: `trials`, a run against the robot; `runs`, a run against another one; `simulators`,
+            two runs against the same trials on the robot.
+        success: what counts as success.
+        first: the run whose verdicts are predictions.
+        second: the other run of `simulators`.
+        reference: what happened: the trials, or the second run of `runs`.
+        coverage: which grasps were compared.
+        judgement: figures of the first run.
+        other: figures of the second run of `simulators`.
+        difference: how often either of them was right about the same trial.
+        settings: in what two runs differ, in words.
+        notes: what people should know before they trust the figures.
+        seed: of the intervals' resampling.
+    """
+
+    version: int = 1
+    kind: Literal["trials", "runs", "simulators"]
+    success: Success
+    first: Side
+    second: Side | None = None
+    reference: Side
+    coverage: Coverage
+    judgement: Judgement
+    other: Judgement | None = None
+    difference: Paired | None = None
+    settings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    seed: int = 0
+
+
+def compare(
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
+    trials: str | Path | None = None,
+    *,
+    success: Success | None = None,
+    placement_limit_mm: float = LIMIT_MM,
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares a run with trials on the robot or with another run, or two runs with trials.
+
+    Args:
+        first: run whose verdicts are taken as predictions, or its folder.
+        second: a trials file, or a run of the same grasps, which then says what is true.
+        trials: a trials file; both runs are then compared with it, and with each other.
+        success: what counts as success; if None what the trials were planned with, or `lifted`.
+        placement_limit_mm: how far off every object may be in trials with good placement [mm].
+        robustness: table of robustness whose shares of success are a predicted probability;
+            `robustness.csv` in the folder of the first run if None and it is there.
+        seed: of the intervals' resampling.
+
+    Raises:
+        InvalidInputError: they have nothing in common that can be compared.
+        DocumentError: the trials file does not fit its schema.
+    """
+    from burg_drake.experiment.comparison.of_runs import compare_runs
+    from burg_drake.experiment.comparison.of_trials import compare_trials
+
+    if success is not None and success not in SUCCESSES:
+        raise InvalidInputError(f"success is {quoted(success)}; {nearest(str(success), SUCCESSES)}")
+    if not np.isfinite(placement_limit_mm) or placement_limit_mm < 0.0:
+        raise InvalidInputError(f"the placement limit is {placement_limit_mm} mm; give 0 or more")
+    if trials is None and not is_trials(second):
+        return compare_runs(
+            first, second, success=success or "lifted", robustness=robustness, seed=seed
+        )
+    sheet = second if trials is None else trials
+    return compare_trials(
+        [first] if trials is None else [first, second],
+        Path(str(sheet)),
+        success=success,
+        placement_limit_mm=placement_limit_mm,
+        robustness=robustness,
+        seed=seed,
+    )
+
+
+def is_trials(path: Run | Campaign | str | Path) -> bool:
+    """Whether it is a trials file rather than a run, going by its name."""
+    return isinstance(path, (str, Path)) and Path(path).suffix in (".yaml", ".yml")

@@ -1,0 +1,61 @@
+"""The same grasps in two tables of results: by scene and id, and by what they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.arrays import Rows, Values
+from burg_drake.experiment.comparison.texts import text_keys
+
+KEY = ("scene_content", "id")
+CONTENT = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
+"""What makes a grasp, beside its instance, which is a part of its id."""
+SAME = 1e-9
+"""Poses and widths that differ less are the same [m, 1]: tables may have come as texts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Rows of two tables that are about the same grasp.
+
+    Attributes:
+        first, second: (N,) rows.
+        other_content: grasps that only have their id in common.
+        only_first, only_second: grasps of one table alone.
+    """
+
+    first: Rows
+    second: Rows
+    other_content: int
+    only_first: int
+    only_second: int
+
+
+def match_rows(first: Columns, second: Columns) -> Match:
+    """Finds the grasps that two tables have in common; of equal rows the first one counts."""
+    keys = _keys(first), _keys(second)
+    if np.array_equal(*keys):
+        one = other = np.arange(len(keys[0]))
+    else:
+        _, one, other = np.intersect1d(*keys, return_indices=True)
+        order = np.argsort(one)
+        one, other = one[order], other[order]
+    same = np.ones(len(one), dtype=bool)
+    for name in CONTENT:
+        a, b = first[name][one], second[name][other]
+        same &= (np.abs(a - b) <= SAME) | (np.isnan(a) & np.isnan(b))
+    return Match(
+        one[same],
+        other[same],
+        int((~same).sum()),
+        len(keys[0]) - len(one),
+        len(keys[1]) - len(other),
+    )
+
+
+def _keys(columns: Columns) -> Values:
+    scenes, ids = (text_keys(columns[name]) for name in KEY)
+    return ids + scenes * np.uint64(0x9E3779B97F4A7C15)

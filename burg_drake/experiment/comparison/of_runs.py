@@ -1,0 +1,111 @@
+"""A run against another one of the same grasps, whose verdicts are taken for the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.arrays import Rows
+from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.comparison import Comparison, Coverage
+from burg_drake.experiment.comparison.disagreement import disagreements
+from burg_drake.experiment.comparison.judgement import judgement
+from burg_drake.experiment.comparison.matching import Match, match_rows
+from burg_drake.experiment.comparison.pairs import (
+    NAMES,
+    REFERENCE_NAMES,
+    Pairs,
+    make_pairs,
+    successes,
+    undecided,
+)
+from burg_drake.experiment.comparison.probability import predicted_probability
+from burg_drake.experiment.comparison.side import Judged, require_common_scene, settings_apart
+from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.experiment.trials.sheet import Success
+
+
+def compare_runs(
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
+    *,
+    success: Success = "lifted",
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares the verdicts of two runs; see `comparison.compare`."""
+    sides = Judged.load(first), Judged.load(second)
+    require_common_scene(*sides)
+    tables = sides[0].columns(NAMES), sides[1].columns(REFERENCE_NAMES)
+    found = match_rows(*tables)
+    if not len(found.first):
+        raise InvalidInputError(_nothing_in_common(sides, found))
+    pairs, left_out = pairs_of_runs(tables, found, success)
+    probability = predicted_probability(sides[0], pairs.id, robustness)
+    if probability is not None:
+        pairs = pairs.with_margin(PROBABILITY, probability)
+    scenes = sides[0].scenes
+    wrong = disagreements(pairs, scenes, [side.folders for side in sides])
+    apart = settings_apart(*sides)
+    return Comparison(
+        kind="runs",
+        success=success,
+        first=sides[0].side,
+        reference=sides[1].side,
+        coverage=Coverage(
+            compared=len(pairs),
+            only_first=found.only_first,
+            only_second=found.only_second,
+            other_content=found.other_content,
+            left_out=left_out,
+        ),
+        judgement=judgement(pairs, scenes=scenes, disagreements=wrong, seed=seed),
+        settings=apart,
+        notes=() if apart else ("the runs have the same settings",),
+        seed=seed,
+    )
+
+
+def pairs_of_runs(
+    tables: tuple[Columns, Columns], found: Match, success: Success
+) -> tuple[Pairs, dict[str, int]]:
+    """Pairs of verdicts of the grasps in common, and what is left out by reason."""
+    one = _rows(tables[0], found.first)
+    ended = Factor.of(_rows({"outcome": tables[1]["outcome"]}, found.second)["outcome"])
+    pairs = make_pairs(one, ended, successes(ended, success), success)
+    keep = np.ones(len(pairs), dtype=bool)
+    left_out = {}
+    for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
+        for outcome, rows in undecided(verdicts).items():
+            if rows.any():
+                left_out[f"{outcome} in the {where}"] = int((rows & keep).sum())
+                keep &= ~rows
+    return pairs if keep.all() else pairs.take(keep), left_out
+
+
+def _rows(columns: Columns, rows: Rows) -> Columns:
+    """Some rows of a table; the table itself if they are all of it, in order."""
+    count = len(next(iter(columns.values())))
+    if len(rows) == count and np.array_equal(rows, np.arange(count)):
+        return columns
+    return {name: values[rows] for name, values in columns.items()}
+
+
+def _nothing_in_common(sides: tuple[Judged, Judged], found: Match) -> str:
+    paths = f"{sides[0].path} and {sides[1].path}"
+    if found.other_content:
+        return (
+            f"{paths} have {found.other_content} grasps with the same ids, but none with the same"
+            " pose and width; give the second run the grasps of the first: evaluate --grasps"
+            f" {sides[0].path / 'grasps.npz'}"
+        )
+    return (
+        f"{paths} have no grasp in common ({found.only_first} and {found.only_second} are judged);"
+        f" give the second run the grasps of the first: evaluate --grasps"
+        f" {sides[0].path / 'grasps.npz'}"
+    )

@@ -1,0 +1,194 @@
+"""One run or two against trials on the robot."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import Array
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.comparison import Comparison, Coverage
+from burg_drake.experiment.comparison.disagreement import disagreements
+from burg_drake.experiment.comparison.judgement import Judgement, Strata, judgement
+from burg_drake.experiment.comparison.paired import paired
+from burg_drake.experiment.comparison.pairs import Pairs, make_pairs, undecided
+from burg_drake.experiment.comparison.placement import offsets, placement_agreement
+from burg_drake.experiment.comparison.probability import predicted_probability
+from burg_drake.experiment.comparison.side import Judged, settings_apart, side_of_trials
+from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.experiment.comparison.tried import find_tried
+from burg_drake.experiment.trials.sheet import (
+    RealTrial,
+    Success,
+    TrialSheet,
+    load_trials,
+    succeeded,
+)
+
+
+def compare_trials(
+    runs: Sequence[Run | Campaign | str | Path],
+    path: Path,
+    *,
+    success: Success | None,
+    placement_limit_mm: float,
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares one or two runs with the trials of a sheet; see `comparison.compare`."""
+    sheet = load_trials(path)
+    success = success or sheet.selection.success
+    sides = [Judged.load(run) for run in runs]
+    tables = []
+    left_out: Counter[str] = Counter()
+    for k, side in enumerate(sides):
+        columns, missing = find_tried(sheet, path, side)
+        tables.append(columns)
+        which = "the run" if len(sides) == 1 else f"the {('first', 'second')[k]} run"
+        left_out.update({f"grasp {reason} in {which}": n for reason, n in missing.items()})
+    indices = set.intersection(*(set(t["trial"].tolist()) for t in tables))
+    chosen, untold = _telling(sheet, tables, sorted(indices))
+    left_out.update(untold)
+    if not chosen:
+        raise InvalidInputError(_nothing_told(path, left_out))
+    trials = [sheet.trials[k] for k in chosen]
+    found = []
+    for side, columns in zip(sides, tables, strict=True):
+        pairs = _pairs(trials, columns, chosen, success)
+        probability = predicted_probability(
+            side, pairs.id, robustness if side is sides[0] else None
+        )
+        found.append(pairs if probability is None else pairs.with_margin(PROBABILITY, probability))
+    judged = [
+        _judgement(pairs, side, sheet, trials, placement_limit_mm, seed)
+        for pairs, side in zip(found, sides, strict=True)
+    ]
+    two = len(sides) == 2
+    right = [pairs.predicted == pairs.actual for pairs in found]
+    return Comparison(
+        kind="simulators" if two else "trials",
+        success=success,
+        first=sides[0].side,
+        second=sides[1].side if two else None,
+        reference=side_of_trials(sheet, path),
+        coverage=Coverage(compared=len(trials), left_out=dict(left_out)),
+        judgement=judged[0],
+        other=judged[1] if two else None,
+        difference=paired(*right, seed=seed) if two else None,
+        settings=settings_apart(*sides) if two else (),
+        notes=_notes(sheet, trials, sides, tables, judged[0]),
+        seed=seed,
+    )
+
+
+def _telling(
+    sheet: TrialSheet, tables: Sequence[Columns], indices: Sequence[int]
+) -> tuple[list[int], Counter[str]]:
+    """Trials that tell something of their grasp, and why the others do not."""
+    left_out: Counter[str] = Counter()
+    silent: dict[int, str] = {}
+    for columns in tables:
+        for verdict, rows in undecided(Factor.of(columns["outcome"])).items():
+            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {verdict}")
+    chosen = []
+    for k in indices:
+        outcome = sheet.trials[k].outcome
+        if outcome is None:
+            left_out["not carried out yet"] += 1
+        elif not outcome.attempted:
+            left_out[outcome.value] += 1
+        elif k in silent:
+            left_out[silent[k]] += 1
+        else:
+            chosen.append(k)
+    return chosen, left_out
+
+
+def _pairs(
+    trials: Sequence[RealTrial], columns: Columns, chosen: Sequence[int], success: Success
+) -> Pairs:
+    """Verdicts and outcomes of the chosen trials."""
+    row = {k: r for r, k in enumerate(columns["trial"].tolist())}
+    rows = np.array([row[k] for k in chosen], dtype=np.intp)
+    outcomes = [t.outcome for t in trials if t.outcome is not None]
+    ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
+    actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
+    return make_pairs({n: v[rows] for n, v in columns.items()}, ended, actual, success)
+
+
+def _judgement(
+    pairs: Pairs,
+    side: Judged,
+    sheet: TrialSheet,
+    trials: Sequence[RealTrial],
+    limit_mm: float,
+    seed: int,
+) -> Judgement:
+    largest, target = offsets(trials, limit_mm)
+    placement = placement_agreement(pairs, largest, target, limit_mm=limit_mm, seed=seed)
+    return judgement(
+        pairs,
+        scenes=side.scenes,
+        strata=_strata(sheet, trials),
+        placement=placement,
+        disagreements=disagreements(pairs, side.scenes, [side.folders], trials, largest),
+        seed=seed,
+    )
+
+
+def _strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
+    """What the trials were chosen from; None if one of them was not chosen from anything."""
+    keys = {key: k for k, key in enumerate(sheet.strata)}
+    if not keys or any(trial.stratum not in keys for trial in trials):
+        return None
+    population: Array = np.array([s.population for s in sheet.strata.values()], dtype=float)
+    return Strata(np.array([keys[t.stratum] for t in trials], dtype=np.intp), population)
+
+
+def _notes(
+    sheet: TrialSheet,
+    trials: Sequence[RealTrial],
+    sides: Sequence[Judged],
+    tables: Sequence[Columns],
+    judged: Judgement,
+) -> tuple[str, ...]:
+    """What people should know before they trust the figures."""
+    notes = []
+    hashes = {source.hash for source in sheet.runs.values()}
+    for side, columns in zip(sides, tables, strict=True):
+        own = set(columns["run"].tolist()) & hashes
+        if not own:
+            notes.append(
+                f"the grasps were not chosen from {side.path}, but from another run of them"
+            )
+        changed = [
+            sheet.trials[k].number
+            for k, outcome in zip(columns["trial"].tolist(), columns["outcome"], strict=True)
+            if own and sheet.trials[k].simulated != outcome
+        ]
+        if changed:
+            notes.append(
+                f"{side.path} has other verdicts than the trials file for {len(changed)} trials,"
+                f" such as trial {changed[0]}; those of the run count"
+            )
+    if judged.not_represented:
+        notes.append(
+            f"no trial stands for {judged.not_represented} grasps that could have been chosen;"
+            " figures for all grasps leave them out"
+        )
+    twice = len(trials) - len({(t.run, t.grasp) for t in trials})
+    if twice:
+        notes.append(f"{twice} trials repeat a grasp; intervals take them as independent")
+    return tuple(notes)
+
+
+def _nothing_told(path: Path, left_out: Counter[str]) -> str:
+    reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
+    return f"{path}: no trial can be compared yet ({reasons})"

@@ -1,0 +1,133 @@
+"""Sections about single grasps and verdicts: where simulation and reality disagree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+from burg_drake.core.figures import count, figure
+from burg_drake.evaluation.report.markup import (
+    Child,
+    Html,
+    command,
+    element,
+    folded,
+    join,
+    section,
+    table,
+)
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.disagreement import Disagreement
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.report.figures import share_mark
+
+MOST_CASES = 50
+MOST_STOPPED = 30
+
+
+def case_section(comparison: Comparison, judged: Judgement, photos: Path | None) -> Html | None:
+    """The wrong verdicts with the way to look at them; nothing where there are none.
+
+    Args:
+        comparison: the comparison.
+        judged: what it says of one judge.
+        photos: folder of the trials file from that of the page; None without trials.
+    """
+    if not judged.disagreements:
+        return None
+    tables = []
+    for kind, title in (
+        ("fp", "Success predicted, failure seen"),
+        ("fn", "Failure predicted, success seen"),
+    ):
+        cases = [d for d in judged.disagreements if d.kind == kind]
+        if cases:
+            total = round(getattr(judged.selected, kind))
+            shown = min(len(cases), MOST_CASES)
+            more = f", the first {shown}" if total > shown else ""
+            tables += [
+                element("h3", f"{title}: {count(total)}{more}", class_="case"),
+                _case_table(cases[:MOST_CASES], photos),
+            ]
+    text = "Each command shows the trial in simulation."
+    return section("Where they disagree", text, *tables)
+
+
+def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
+    real = any(case.trial is not None for case in cases)
+    head = ["trial", "object", "simulated", "happened"] if real else ["object", "first", "second"]
+    head += ["offset", "note"] if real else []
+    head.append("replay")
+    rows = []
+    for case in cases:
+        verdict = case.simulated.replace("_", " ")
+        cells: list[Child] = [case.trial] if real else []
+        cells += [
+            case.object,
+            f"{verdict} ({case.blocker})" if case.blocker else verdict,
+            case.ended.replace("_", " "),
+        ]
+        if real:
+            offset = "-" if case.offset_mm is None else f"{figure(case.offset_mm)} mm"
+            cells += [offset, _note(case, photos)]
+        cells.append(join(*(command(line) for line in case.replays)))
+        rows.append(
+            element(
+                "tr",
+                *(element("td", c, data_label=h) for h, c in zip(head, cells, strict=True)),
+            )
+        )
+    return table(head, rows, style="cases")
+
+
+def _note(case: Disagreement, photos: Path | None) -> Child:
+    """The note, and a link to the photo."""
+    if not case.photo or photos is None:
+        return case.note
+    link = element("a", "photo", href=quote((photos / case.photo).as_posix()))
+    return join(case.note, " " if case.note else "", link)
+
+
+def stopped_section(judged: Judgement) -> Html:
+    """What became of grasps by verdict and the body in the way."""
+    rows = [
+        element(
+            "tr",
+            element("th", row.outcome.replace("_", " "), scope="row"),
+            element("td", row.blocker or "", class_="faint"),
+            element("td", row.stage),
+            element("td", count(row.trials), class_="number", data_label="trials"),
+            element("td", share_mark(row.successes), class_="estimate", data_label="succeeded"),
+        )
+        for row in judged.stopped[:MOST_STOPPED]
+    ]
+    more = ""
+    if len(judged.stopped) > MOST_STOPPED:
+        more = f" The first {MOST_STOPPED} of {len(judged.stopped)}."
+    head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
+    text = f"By what the simulation said: how many of these grasps succeeded.{more}"
+    return section(
+        "What became of each verdict", text, table(head, rows, numbers=(3,), style="groups")
+    )
+
+
+def outcome_section(comparison: Comparison, judged: Judgement) -> Html:
+    """Simulated outcomes by what happened."""
+    happened = sorted({name for row in judged.outcomes.values() for name in row})
+    rows = []
+    for simulated, row in judged.outcomes.items():
+        cells = [
+            element("td", row.get(name, "·"), class_="number" if name in row else "number zero")
+            for name in happened
+        ]
+        rows.append(element("tr", element("th", simulated.replace("_", " "), scope="row"), *cells))
+    head = ["simulated", *(name.replace("_", " ") for name in happened)]
+    other = "by the second run" if comparison.kind == "runs" else "on the robot"
+    numbers = range(1, len(head))
+    style = "matrix" if len(head) > 6 else ""
+    return folded(
+        "Outcome by outcome",
+        f"Rows: how grasps ended in simulation. Columns: how they ended {other}.",
+        table(head, rows, numbers=numbers, style=style),
+    )

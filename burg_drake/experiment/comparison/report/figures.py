@@ -1,0 +1,136 @@
+"""Sections with matrices and figures: of all trials, by object, by scene, by placement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from burg_drake.core.figures import count
+from burg_drake.evaluation.report.charts import interval_mark
+from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
+from burg_drake.experiment.comparison.agreement import Agreement
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.groups import Group
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.measures import CELLS, MEASURES, Figure
+from burg_drake.experiment.comparison.wording import CELL_NAMES, SHARES, interval, number
+
+MOST_ROWS = 60
+Named = Sequence[tuple[str, Judgement]]
+"""What a comparison says of each judge; the name is empty if there is only one."""
+
+
+def matrix_section(comparison: Comparison, judged: Named) -> Html:
+    """Confusion matrices of the trials, and of all grasps that they stand for."""
+    other = "second run" if comparison.kind == "runs" else "on the robot"
+    blocks = []
+    for name, judgement in judged:
+        found = [("selected trials", judgement.selected)]
+        if judgement.all_grasps is not None:
+            found.append(("all grasps", judgement.all_grasps))
+        elif comparison.kind == "runs":
+            found = [("grasps", judgement.selected)]
+        blocks += [_matrix(_titled(title, name), a, other) for title, a in found]
+    text = "Rows: what the simulation predicted. Columns: what happened."
+    if any(j.all_grasps is not None for _, j in judged):
+        text += (
+            " Selected trials are counted as they are; for all grasps each trial counts for the"
+            " grasps that it was chosen from."
+        )
+    return section("Verdicts and outcomes", text, element("div", *blocks, class_="beside"))
+
+
+def _titled(title: str, name: str) -> str:
+    return f"{title}, {name}" if name else title
+
+
+def _matrix(title: str, found: Agreement, other: str) -> Html:
+    def cell(name: str, style: str) -> Html:
+        value = count(round(getattr(found, name)))
+        tip = CELL_NAMES[name]
+        return element(
+            "td", element("b", value), element("small", name.upper()), class_=style, title=tip
+        )
+
+    rows = [
+        element("tr", element("th", "success predicted", scope="row"), *pair)
+        for pair in [(cell("tp", "right"), cell("fp", "wrong"))]
+    ]
+    rows.append(
+        element(
+            "tr",
+            element("th", "failure predicted", scope="row"),
+            cell("fn", "wrong"),
+            cell("tn", "right"),
+        )
+    )
+    head = ["", f"success {other}", f"failure {other}"]
+    return element(
+        "div", element("h3", title[0].upper() + title[1:]), table(head, rows, style="confusion")
+    )
+
+
+def figure_section(judged: Named) -> Html:
+    """All measures with their intervals."""
+    columns: list[tuple[str, Agreement]] = []
+    for name, judgement in judged:
+        columns.append((_titled("selected trials", name), judgement.selected))
+        if judgement.all_grasps is not None:
+            columns.append((_titled("all grasps", name), judgement.all_grasps))
+    if len(columns) == 1:
+        columns = [("value", columns[0][1])]
+    head = ["figure", *(name for name, _ in columns)]
+    rows = []
+    for key, measure in MEASURES.items():
+        cells = [figure_cell(a.figure(key), percent=key in SHARES) for _, a in columns]
+        rows.append(element("tr", element("th", measure.name, scope="row"), *cells))
+    return section("Figures", _how(judged), table(head, rows, numbers=range(1, len(head))))
+
+
+def figure_cell(found: Figure, *, percent: bool) -> Html:
+    """A figure and its interval, below each other where there is little room."""
+    if found.value is None:
+        return element("td", found.reason, class_="number faint why")
+    bounds = element("small", interval(found, percent=percent), class_="bounds")
+    return element("td", number(found, percent=percent), " ", bounds, class_="number")
+
+
+def _how(judged: Named) -> str:
+    weighted = any(j.all_grasps is not None for _, j in judged)
+    text = "With 95 % intervals: Wilson's for shares, all others come from a Bayesian bootstrap."
+    if weighted:
+        text = (
+            "The grasps were chosen from strata. Figures of the selected trials describe the"
+            " experiment; figures for all grasps, in which each trial stands for its share of a"
+            " stratum, describe what a user of the simulator meets. 95 % intervals: Wilson's for"
+            " shares of the selected trials; a Bayesian bootstrap within strata for all others."
+        )
+    return text
+
+
+def group_section(title: str, text: str, head: str, groups: Sequence[Group]) -> Html:
+    """Counts, and shares with their intervals as dots and lines, by object or scene."""
+    names = [head, "trials", "TP", "FP", "FN", "TN", "right", "precision", "recall"]
+    rows = [_group_row(group) for group in groups[:MOST_ROWS]]
+    if len(groups) > MOST_ROWS:
+        text += f" The first {MOST_ROWS} of {len(groups)}."
+    return section(title, text, table(names, rows, numbers=range(1, 6), style="groups"))
+
+
+def _group_row(group: Group) -> Html:
+    a = group.agreement
+    counts = [
+        element("td", count(round(n)), class_="number", data_label=name)
+        for name, n in zip(("trials", *CELLS), (a.trials, *a.cells), strict=True)
+    ]
+    shares = [
+        element("td", share_mark(found), class_="estimate", data_label=name)
+        for name, found in (("right", a.accuracy), ("precision", a.precision), ("recall", a.recall))
+    ]
+    return element("tr", element("th", group.name, scope="row"), *counts, *shares)
+
+
+def share_mark(found: Figure) -> Child:
+    """A share as a dot with its interval, and in figures."""
+    if found.value is None or found.low is None or found.high is None:
+        return element("span", found.reason, class_="faint")
+    return join(interval_mark(found.value, found.low, found.high), f" {100 * found.value:.0f} %")

@@ -1,0 +1,79 @@
+"""Sections about numbers that may tell of success: margins, and placement of the objects."""
+
+from __future__ import annotations
+
+from burg_drake.core.figures import count
+from burg_drake.evaluation.report.markup import Html, element, section, table
+from burg_drake.experiment.comparison.calibration import Calibration
+from burg_drake.experiment.comparison.groups import Group
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.report.figures import figure_cell, group_section
+from burg_drake.experiment.comparison.report.plots import reliability_plot
+from burg_drake.experiment.comparison.wording import margin_title
+
+MOST_PLOTS = 4
+
+
+def margin_section(judged: Judgement) -> Html | None:
+    """What margins tell about success; nothing where there are none."""
+    defined = [c for c in judged.calibration if c.auroc.value is not None]
+    found = sorted(defined, key=_telling, reverse=True)
+    if not found:
+        return None
+    weighted = any(c.auroc_weighted is not None for c in found)
+    head = ["margin", "trials", "AUROC"]
+    head += ["AUROC, all grasps"] if weighted else []
+    rows = [_row(c, weighted) for c in found]
+    plots = [reliability_plot(c, "actual success") for c in found[:MOST_PLOTS]]
+    trials = "grasps, each trial standing for its share," if weighted else "trials"
+    text = (
+        "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
+        " margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes"
+        f" among {trials} in bins of about equally many trials, with Wilson's intervals; line: the"
+        " monotone curve that fits best; dashes: all of them."
+    )
+    return section(
+        "Do margins tell what will succeed?",
+        text,
+        element("div", *plots, class_="charts plots"),
+        table(head, rows, numbers=range(1, len(head))),
+    )
+
+
+def _telling(found: Calibration) -> float:
+    """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
+    low, high = found.auroc.low, found.auroc.high
+    return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
+
+
+def _row(c: Calibration, weighted: bool) -> Html:
+    found = (c.auroc, c.auroc_weighted) if weighted else (c.auroc,)
+    return element(
+        "tr",
+        element(
+            "th", f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}", scope="row"
+        ),
+        element("td", count(c.trials), class_="number"),
+        *(figure_cell(f or Figure.undefined(""), percent=False) for f in found),
+    )
+
+
+def placement_section(judged: Judgement) -> Html | None:
+    """Agreement by placement; nothing without real trials."""
+    p = judged.placement
+    if p is None or not p.within.trials + p.beyond.trials:
+        return None
+    limit = f"{p.limit_mm:g} mm"
+    groups = [
+        Group(name=f"every object within {limit}", agreement=p.within),
+        Group(name=f"an object more than {limit} off", agreement=p.beyond),
+        Group(name="not all measured", agreement=p.unmeasured),
+    ]
+    text = (
+        "Where objects stood off their targets, the simulation judged another scene than the robot"
+        " met. Agreement that is much better in the first row points at placement, not physics."
+    )
+    plots = [reliability_plot(c, "right verdicts") for c in (p.largest, p.target) if c.trials]
+    whole = group_section("By placement of the objects", text, "placement", groups)
+    return element("div", whole, element("div", *plots, class_="charts plots"))

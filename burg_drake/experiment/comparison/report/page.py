@@ -1,0 +1,201 @@
+"""The page of a comparison for people: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from burg_drake.core.figures import count
+from burg_drake.evaluation.report.html_page import header, html_page, tiles
+from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.report.cases import (
+    case_section,
+    outcome_section,
+    stopped_section,
+)
+from burg_drake.experiment.comparison.report.figures import (
+    figure_section,
+    group_section,
+    matrix_section,
+)
+from burg_drake.experiment.comparison.report.margins import margin_section, placement_section
+from burg_drake.experiment.comparison.side import Side
+from burg_drake.experiment.comparison.wording import (
+    SHARES,
+    bias_words,
+    headline,
+    interval,
+    number,
+)
+
+KINDS = {
+    "trials": "Simulation against reality",
+    "simulators": "Two simulations against reality",
+    "runs": "Simulation against simulation",
+}
+
+
+def comparison_page(
+    comparison: Comparison,
+    path: str | Path = "compare.html",
+    line: str = "",
+    more: Sequence[Child] = (),
+) -> str:
+    """The page as HTML.
+
+    Args:
+        comparison: what it shows.
+        path: where the page will be, so that its links to photos hold there.
+        line: the command that makes it again; left out if empty.
+        more: further sections.
+    """
+    c = comparison
+    title = ", ".join(c.first.scenes[:3]) + (" and others" if len(c.first.scenes) > 3 else "")
+    title = f"{title} on {c.first.station}"
+    return html_page(
+        f"{KINDS[c.kind]}: {title}",
+        element("style", Html(_style())),
+        header(KINDS[c.kind], title, _about(c)),
+        _lead(c),
+        *(element("p", note, class_="notice") for note in c.notes),
+        *_sections(c, _photos(c, Path(path))),
+        *more,
+        _settings(c),
+        section("How to repeat it", "The same inputs give the same page.", command(line))
+        if line
+        else None,
+    )
+
+
+def _style() -> str:
+    folder = files("burg_drake.experiment.comparison.report")
+    return (folder / "style.css").read_text(encoding="utf-8")
+
+
+def _about(c: Comparison) -> str:
+    what = "grasps" if c.kind == "runs" else "trials"
+    counts = "also where others were disturbed" if c.success == "held" else "nothing else disturbed"
+    sides = [c.first, *([c.second] if c.second else []), c.reference]
+    who = " against ".join(side.label for side in (sides[0], sides[-1]))
+    if c.second:
+        who = f"{c.first.label} and {c.second.label} against {c.reference.label}"
+    return f"{count(c.coverage.compared)} {what}: {who}; success: {c.success}, {counts}"
+
+
+def _lead(c: Comparison) -> Html:
+    found = c.judgement.selected
+    entries: list[tuple[str, Child, str]] = [
+        _tile("Right verdicts", found.accuracy, "accuracy"),
+        _tile("Precision", found.precision, "precision"),
+        _tile("Recall", found.recall, "recall"),
+        _tile("Matthews correlation", found.matthews, "matthews"),
+        _tile("Cohen's kappa", found.kappa, "kappa"),
+    ]
+    first = " (first simulator)" if c.kind == "simulators" else ""
+    return element(
+        "div",
+        element("p", element("b", headline(c)), f" {bias_words(c)}", class_="lead"),
+        tiles(entries),
+        element(
+            "p",
+            f"Figures of the selected trials{first}, with 95 % intervals that take trials as"
+            " independent; trials on one object are alike, so that for other objects the range is"
+            " wider.",
+            class_="note",
+        ),
+    )
+
+
+def _tile(name: str, found: Figure, key: str) -> tuple[str, Child, str]:
+    percent = key in SHARES
+    if found.value is None:
+        return name, "-", found.reason
+    if percent:
+        return name, f"{100 * found.value:.0f} %", f"{interval(found, percent=True)} %"
+    return name, number(found, percent=False), interval(found, percent=False)
+
+
+def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
+    judged = [("", c.judgement)]
+    if c.other is not None:
+        judged = [("first", c.judgement), ("second", c.other)]
+    parts: list[Html | None] = [matrix_section(c, judged), _difference(c), figure_section(judged)]
+    for name, judgement in judged:
+        parts += [_named(part, name) for part in _of_one(c, judgement, photos)]
+    return parts
+
+
+def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
+    text = "Share of right verdicts, precision and recall, with 95 % intervals."
+    parts = [
+        group_section("By object", text, "object", judgement.objects),
+        group_section("By scene", text, "scene", judgement.scenes)
+        if len(judgement.scenes) > 1
+        else None,
+        placement_section(judgement),
+        margin_section(judgement),
+        stopped_section(judgement),
+        case_section(c, judgement, photos),
+        outcome_section(c, judgement),
+    ]
+    return parts
+
+
+def _named(part: Html | None, name: str) -> Html | None:
+    """Says in a section's title which simulator it is about."""
+    if part is None or not name:
+        return part
+    return Html(part.replace("</h2>", f", {name} simulator</h2>", 1))
+
+
+def _difference(c: Comparison) -> Html | None:
+    """Whether one of two simulators is right more often."""
+    d = c.difference
+    if d is None or d.p_value is None or d.difference.value is None:
+        return None
+    points = interval(d.difference, percent=True)
+    text = (
+        f"Both are right in {d.both} of {d.trials} trials, only the first in {d.only_first}, only"
+        f" the second in {d.only_second}, neither in {d.neither}. The first is right"
+        f" {100 * d.difference.value:+.1f} percentage points more often {points}; McNemar's exact"
+        f" test of equally many right verdicts: p = {d.p_value:.3g}."
+    )
+    return section("Which simulator is right more often?", text)
+
+
+def _settings(c: Comparison) -> Html:
+    """What was compared, what was left out, in what runs differ."""
+    facts: list[tuple[str, str]] = []
+    sides = [("predictions", c.first), ("second simulation", c.second), ("truth", c.reference)]
+    facts += [(name, _side(side)) for name, side in sides if side is not None]
+    v = c.coverage
+    facts.append(("compared", count(v.compared)))
+    if c.kind == "runs":
+        facts.append(("only in the first", count(v.only_first)))
+        facts.append(("only in the second", count(v.only_second)))
+        facts.append(("same id, other grasp", count(v.other_content)))
+    facts += [(f"left out: {k.replace('_', ' ')}", count(n)) for k, n in v.left_out.items()]
+    facts += [("differs", text) for text in c.settings]
+    facts.append(("intervals", f"95 %, bootstrap seed {c.seed}"))
+    entries = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
+    return section("What was compared", "", element("dl", *entries, class_="facts"))
+
+
+def _side(side: Side) -> str:
+    hashes = ", ".join(side.hashes[:6]) + (" and others" if len(side.hashes) > 6 else "")
+    how = "" if side.kind == "trials" else f", mode {side.mode}, engine {side.engine}"
+    run = "runs" if len(side.hashes) > 1 else "run"
+    return f"{side.path}{how}, station {side.station}, {run} {hashes}"
+
+
+def _photos(c: Comparison, path: Path) -> Path | None:
+    """Folder of the trials file from that of the page."""
+    if c.reference.kind != "trials":
+        return None
+    folder = Path(c.reference.path).absolute().parent
+    return Path(os.path.relpath(folder, path.absolute().parent))

@@ -1,0 +1,180 @@
+"""A comparison as tables for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from burg_drake.core.figures import count, figure
+from burg_drake.core.text_table import TextTable
+from burg_drake.experiment.comparison.agreement import Agreement
+from burg_drake.experiment.comparison.calibration import Calibration
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.groups import Group
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.measures import MEASURES
+from burg_drake.experiment.comparison.wording import (
+    SHARES,
+    bias_words,
+    headline,
+    interval,
+    margin_title,
+    number,
+)
+
+MOST_ROWS = 20
+
+
+def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
+    """Tables and sentences, the most important first."""
+    c = comparison
+    yield headline(c)
+    for name, judged in _judgements(c):
+        yield matrix_table(c, judged, name)
+        yield figure_table(judged, name)
+        yield bias_words(c, judged)
+        if len(judged.objects) > 1:
+            yield group_table(f"By object{name}", "object", judged.objects)
+        if len(judged.scenes) > 1:
+            yield group_table(f"By scene{name}", "scene", judged.scenes)
+        yield stopped_table(judged, name)
+        telling = [c for c in judged.calibration if c.auroc.value is not None]
+        if telling:
+            yield calibration_table(telling, name)
+        if judged.placement is not None:
+            yield placement_table(judged, name)
+    yield coverage_words(c)
+    yield from (f"differs: {text}" for text in c.settings)
+    yield from (f"note: {text}" for text in c.notes)
+
+
+def _judgements(comparison: Comparison) -> list[tuple[str, Judgement]]:
+    if comparison.other is None:
+        return [("", comparison.judgement)]
+    return [(", first run", comparison.judgement), (", second run", comparison.other)]
+
+
+def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
+    """The confusion matrix."""
+    other = "second run" if comparison.kind == "runs" else "on the robot"
+    table = TextTable(f"Verdicts and outcomes{name}").texts("predicted")
+    table.numbers(f"success {other}", f"failure {other}")
+    found = judged.selected
+    table.row("success", count(int(found.tp)), count(int(found.fp)))
+    table.row("failure", count(int(found.fn)), count(int(found.tn)))
+    return table
+
+
+def figure_table(judged: Judgement, name: str = "") -> TextTable:
+    """All figures, of the selected trials and of all grasps."""
+    table = TextTable(f"Figures{name}").texts("figure")
+    found: list[Agreement] = [judged.selected]
+    if judged.all_grasps is None:
+        table.numbers("value", "95 % CI")
+    else:
+        found.append(judged.all_grasps)
+        table.numbers("selected trials", "95 % CI", "all grasps", "95 % CI")
+        grasps = count(round(sum(judged.all_grasps.cells)))
+        table.caption = (
+            f"selected trials: the {found[0].trials} that were compared; all grasps: the {grasps}"
+            " that they were chosen from, each trial standing for its share"
+        )
+    for key, measure in MEASURES.items():
+        cells = []
+        for agreement in found:
+            f, percent = agreement.figure(key), key in SHARES
+            cells += [number(f, percent=percent), interval(f, percent=percent) or "-"]
+        table.row(measure.name, *cells)
+    reasons = {f.reason for a in found for f in (a.figure(k) for k in MEASURES) if f.reason}
+    if reasons:
+        undefined = f"-: undefined, as {'; '.join(sorted(reasons))}"
+        table.caption = f"{table.caption}\n{undefined}" if table.caption else undefined
+    return table
+
+
+def group_table(title: str, head: str, groups: Sequence[Group]) -> TextTable:
+    """Counts and shares by object or scene."""
+    table = TextTable(title).names(head).numbers("trials", "TP", "FP", "FN", "TN")
+    table.numbers("right", "95 % CI", "precision", "recall")
+    for group in groups[:MOST_ROWS]:
+        a = group.agreement
+        table.row(
+            group.name,
+            *(count(int(n)) for n in (a.trials, *a.cells)),
+            number(a.accuracy, percent=True),
+            interval(a.accuracy, percent=True) or "-",
+            number(a.precision, percent=True),
+            number(a.recall, percent=True),
+        )
+    if len(groups) > MOST_ROWS:
+        table.caption = f"the first {MOST_ROWS} of {len(groups)}; --json has all"
+    return table
+
+
+def stopped_table(judged: Judgement, name: str = "") -> TextTable:
+    """What became of grasps by verdict."""
+    table = TextTable(f"What became of each verdict{name}")
+    table.texts("simulated").names("body in the way").numbers("trials", "succeeded", "95 % CI")
+    for row in judged.stopped[:MOST_ROWS]:
+        table.row(
+            row.outcome,
+            row.blocker,
+            count(row.trials),
+            number(row.successes, percent=True),
+            interval(row.successes, percent=True) or "-",
+        )
+    if len(judged.stopped) > MOST_ROWS:
+        table.caption = f"the first {MOST_ROWS} of {len(judged.stopped)}; --json has all"
+    return table
+
+
+def calibration_table(found: Sequence[Calibration], name: str = "") -> TextTable:
+    """How well each margin ranks success above failure."""
+    weighted = any(c.auroc_weighted is not None for c in found)
+    table = TextTable(f"What margins tell about success{name}").texts("margin", "better")
+    table.numbers("trials", "AUROC", "95 % CI")
+    if weighted:
+        table.numbers("all grasps")
+    for c in found:
+        cells = [count(c.trials), number(c.auroc, percent=False)]
+        cells.append(interval(c.auroc, percent=False) or "-")
+        if weighted:
+            cells.append("-" if c.auroc_weighted is None else figure(c.auroc_weighted.value, 3))
+        better = "smaller" if c.smaller_is_better else "larger"
+        table.row(margin_title(c.name)[0], better, *cells)
+    table.caption = (
+        "AUROC: how often the better margin is that of the success, of a success and a failure;"
+        " 0.5 tells nothing"
+    )
+    return table
+
+
+def placement_table(judged: Judgement, name: str = "") -> TextTable:
+    """Agreement by placement."""
+    p = judged.placement
+    assert p is not None
+    limit = f"{p.limit_mm:g} mm"
+    groups = [
+        Group(name=f"every object within {limit}", agreement=p.within),
+        Group(name="one farther off", agreement=p.beyond),
+        Group(name="not measured", agreement=p.unmeasured),
+    ]
+    table = group_table(f"By placement of the objects{name}", "placement", groups)
+    if p.largest.auroc.value is not None:
+        table.caption = (
+            "AUROC of the largest offset for right verdicts:"
+            f" {number(p.largest.auroc, percent=False)} {interval(p.largest.auroc, percent=False)}"
+        )
+    return table
+
+
+def coverage_words(comparison: Comparison) -> str:
+    """Which grasps were compared and which were not."""
+    v = comparison.coverage
+    what = "grasps" if comparison.kind == "runs" else "trials"
+    parts = [f"{v.compared:,} {what} compared"]
+    if v.only_first or v.only_second:
+        parts.append(f"{v.only_first:,} only in the first, {v.only_second:,} only in the second")
+    if v.other_content:
+        parts.append(f"{v.other_content:,} with the same id but another pose or width")
+    parts += [f"{n:,} left out: {reason.replace('_', ' ')}" for reason, n in v.left_out.items()]
+    return "; ".join(parts)

@@ -1,0 +1,114 @@
+"""A comparison in words, and its numbers as people read them."""
+
+from __future__ import annotations
+
+from burg_drake.core.figures import MISSING, figure
+from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.measures import MEASURES, Figure
+
+SHARES = frozenset(name for name, measure in MEASURES.items() if measure.is_share)
+CELL_NAMES = {
+    "tp": "success predicted and seen",
+    "fp": "success predicted, failure seen",
+    "fn": "failure predicted, success seen",
+    "tn": "failure predicted and seen",
+}
+UNITS = {
+    "m": ("mm", 1e3),
+    "rad": ("°", 57.29577951308232),
+    "m2": ("mm²", 1e6),
+    "N": ("N", 1.0),
+}
+"""Units for people by that of a column, and how many of them it is."""
+
+
+def number(found: Figure, *, percent: bool) -> str:
+    """The value of a figure."""
+    if found.value is None:
+        return MISSING
+    return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
+
+
+def interval(found: Figure, *, percent: bool) -> str:
+    """The interval of a figure in brackets; empty if there is none."""
+    if found.low is None or found.high is None:
+        return ""
+    bounds, decimals = [found.low, found.high], 2
+    if percent:
+        bounds = [100 * bound for bound in bounds]
+        decimals = 0 if bounds[1] - bounds[0] >= 2.0 else 1
+    low, high = (f"{round(bound, decimals) + 0.0:.{decimals}f}" for bound in bounds)
+    return f"[{low}, {high}]"
+
+
+def brief(found: Figure) -> str:
+    """A share in whole per cents with its interval."""
+    if found.value is None:
+        return f"undefined ({found.reason})"
+    return f"{100 * found.value:.0f} % {interval(found, percent=True)}"
+
+
+def headline(comparison: Comparison) -> str:
+    """What was found, in one sentence."""
+    c, found = comparison, comparison.judgement.selected
+    if c.kind == "runs":
+        return (
+            f"On {found.trials:,} grasps the two runs agree in {brief(found.accuracy)}: success in"
+            f" {brief(found.predicted)} by the first ({c.first.label}) and in"
+            f" {brief(found.actual)} by the second ({c.reference.label})."
+        )
+    trials = f"In {found.trials} trials on the robot"
+    if c.other is not None and c.second is not None and c.difference is not None:
+        first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
+        p = "" if c.difference.p_value is None else f" (McNemar p = {figure(c.difference.p_value)})"
+        return (
+            f"{trials} {first} was right in {brief(found.accuracy)}, {second} in"
+            f" {brief(c.other.selected.accuracy)}; {difference_words(c)}{p}."
+        )
+    return (
+        f"{trials} the simulator's verdict was right in {brief(found.accuracy)}; of the successes"
+        f" that it predicted {brief(found.precision)} came true, of those that came about it had"
+        f" predicted {brief(found.recall)}."
+    )
+
+
+def difference_words(comparison: Comparison) -> str:
+    """Which of two simulators was right where the other was wrong."""
+    d = comparison.difference
+    if d is None:
+        return ""
+    return f"in {d.only_first} trials only the first was right, in {d.only_second} only the second"
+
+
+def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
+    """Whether a simulator promises too much."""
+    b = (judged or comparison.judgement).bias
+    if b.difference.value is None:
+        return "no trials"
+    more = "more" if b.difference.value > 0 else "less"
+    size = f"{100 * abs(b.difference.value):.1f} percentage points {more} success than"
+    if b.difference.value == 0:
+        size = "just as much success as"
+    who, other = ("simulator promises", "the robot achieved")
+    if comparison.kind == "runs":
+        who, other = "first run sees", "the second"
+    return (
+        f"The {who} {size} {other} {interval(b.difference, percent=True)}: {b.only_first:,}"
+        f" predicted successes did not come true, {b.only_second:,} came about against the"
+        f" prediction (McNemar's exact test: p = {figure(b.p_value)})."
+    )
+
+
+def margin_title(name: str) -> tuple[str, str, float]:
+    """What a margin is called, its unit for people, and how many of them its column's unit is."""
+    from burg_drake.core.columns import describe
+
+    if name == PROBABILITY:
+        return "predicted probability", "", 1.0
+    if name.endswith("_mm"):
+        return name.removesuffix("_mm").replace("_", " "), "mm", 1.0
+    column = describe(name)
+    unit, size = UNITS.get(column.unit, ("", 1.0)) if column else ("", 1.0)
+    return name.replace("_", " "), unit, size

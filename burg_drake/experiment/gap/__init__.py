@@ -1,0 +1,1 @@
+"""Where simulation and reality part: real trials judged again, and one cause after the other."""

@@ -1,0 +1,118 @@
+"""The page on where grasps are lost: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from burg_drake.core.figures import percent
+from burg_drake.core.files import atomic_write
+from burg_drake.evaluation.origin import engine_label
+from burg_drake.evaluation.report.html_page import header, html_page, tiles
+from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
+from burg_drake.experiment.gap.changes import Change, changes
+from burg_drake.experiment.gap.ladder import Ladder
+from burg_drake.experiment.gap.report.flow_chart import STYLE
+from burg_drake.experiment.gap.report.sections import (
+    change_section,
+    flow_section,
+    objects_section,
+    push_section,
+    reality_section,
+)
+from burg_drake.experiment.gap.report.story import TITLES, story
+from burg_drake.experiment.gap.steps_reality import StepAgreement
+from burg_drake.experiment.trials.sheet import Success
+
+REPORT_FILE = "gap.html"
+
+
+def write_gap_report(
+    ladder: Ladder, success: Success, agreement: Sequence[StepAgreement], command_line: str
+) -> None:
+    """Writes the page into the folder of the steps.
+
+    Args:
+        ladder: all steps.
+        success: what counts.
+        agreement: with real trials, if there are any.
+        command_line: that makes it again.
+
+    Raises:
+        InvalidInputError: it cannot be written.
+    """
+    page = gap_page(ladder, success, agreement, command_line)
+    atomic_write(ladder.path / REPORT_FILE, page)
+
+
+def gap_page(
+    ladder: Ladder, success: Success, agreement: Sequence[StepAgreement], command_line: str
+) -> str:
+    """The page as HTML."""
+    found = changes(ladder, success)
+    document = ladder.first.document
+    title = f"{document.scene.name} on {document.station.name}"
+    return html_page(
+        f"Where grasps are lost: {title}",
+        element("style", Html(STYLE)),
+        header("Where grasps are lost", title, _about(ladder, success)),
+        *_told(story(ladder, found, success)),
+        tiles(_tiles(ladder, found)),
+        flow_section(ladder, found),
+        objects_section(ladder, success),
+        *(change_section(change) for change in found),
+        push_section(ladder),
+        reality_section(agreement),
+        _again(ladder, command_line),
+    )
+
+
+def _about(ladder: Ladder, success: Success) -> str:
+    document = ladder.first.document
+    counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
+    about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
+    return f"{about}; success: {counts}"
+
+
+def _told(sentences: Sequence[str]) -> list[Html]:
+    return [element("p", " ".join(sentences), class_="lead")]
+
+
+def _tiles(ladder: Ladder, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
+    whole = len(ladder.first.candidates)
+    entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
+    first = found[0].successes if found else 0
+    if found and found[0].step != "placed":
+        entries.append((TITLES["hand"].capitalize(), f"{first}", "succeed"))
+    for change in found:
+        left = change.successes - len(change.lost) + len(change.won)
+        if change.step == "placed":
+            share = percent(left / change.successes) if change.successes else "-"
+            entries.append(("Objects displaced", share, "of these succeed again"))
+        else:
+            note = f"{len(change.lost)} lost, {len(change.won)} won"
+            entries.append((TITLES[change.step].capitalize(), f"{left}", note))
+    return entries
+
+
+def _again(ladder: Ladder, command_line: str) -> Html:
+    document = ladder.document
+    facts = [("folder", str(ladder.path))]
+    facts += [
+        (TITLES[step.name], ", ".join(str(run.path) for run in step.runs) or "-")
+        for step in ladder.steps
+    ]
+    if document.samples:
+        noise = f"{document.place_mm:g} mm, {document.turn_deg:g} degrees, seed {document.seed}"
+        redrawn = f"{sum(document.redrawn)} places were drawn again, as something stood there"
+        facts.append(("displaced by", f"{noise}; {redrawn}"))
+        for scene, names in document.kept.items():
+            facts.append((f"scene {scene}", f"{', '.join(names)} as planned: no other place found"))
+    facts.append(("versions", ", ".join(f"{k} {v}" for k, v in document.versions.items())))
+    listed = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
+    return section(
+        "How to repeat",
+        "Every step is an ordinary run that burg-drake report, replay and robustness open. The same"
+        " command goes on where it was interrupted.",
+        command(command_line),
+        element("dl", *listed, class_="facts"),
+    )

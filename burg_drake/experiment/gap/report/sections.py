@@ -1,0 +1,226 @@
+"""Sections of the page on where grasps are lost."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core.figures import percent
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.report.charts import interval_mark
+from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section, table
+from burg_drake.evaluation.summary import PUSH, pushes
+from burg_drake.evaluation.trial import PUSHED
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
+from burg_drake.experiment.gap.ladder import Ladder
+from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
+from burg_drake.experiment.gap.report.story import TITLES, replay_command, words
+from burg_drake.experiment.gap.steps_reality import StepAgreement
+from burg_drake.experiment.trials.sheet import Success
+
+ROWS = 40
+"""Grasps that a step's table lists."""
+ABOUT = {
+    "reach": "The same trials of the hand, of grasps that the arm can execute: a posture within"
+    " its limits, a straight approach, a straight lift and a path, all free of collisions.",
+    "arm": "The whole arm executes what it can reach, from the pregrasp on, with servos that yield:"
+    " now the hand may push objects before it closes.",
+    "placed": "The hand goes where it was planned to go, and the objects stand a little elsewhere."
+    " A hand that is open within a displaced object counts as a collision; the arm knows where"
+    " things stand and plans its way anew. Each grasp is counted once a scene.",
+}
+
+
+def flow_section(ladder: Ladder, found: Sequence[Change]) -> Html | None:
+    """The picture of all steps."""
+    if not found:
+        return None
+    columns, scale = [], []
+    for step in ladder.steps:
+        outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
+        scenes = f" in {len(step.runs)} scenes" if step.name == "placed" else ""
+        columns.append(Column(TITLES[step.name] + scenes, outcomes))
+        scale.append(1.0 / max(len(step.runs), 1))
+    return section(
+        "From step to step",
+        "What becomes of the grasps, in the colours of what they become next. In displaced scenes"
+        " only successes of the step before are tried, each once a scene.",
+        element("div", flow_chart(columns, [c.flow for c in found], scale), class_="scroll"),
+    )
+
+
+def objects_section(ladder: Ladder, success: Success) -> Html:
+    """Successes of each object in each step."""
+    by_step = [successes_by_object(step, success) for step in ladder.steps]
+    whole = by_step[0]
+    head = ["object", "grasps", *(TITLES[step.name] for step in ladder.steps)]
+    rows = []
+    for name, (_, grasps) in whole.items():
+        cells: list[Child] = [grasps]
+        for step, counts in zip(ladder.steps, by_step, strict=True):
+            good, all = counts.get(name, (0, 0))
+            cells.append(f"{good} of {all}" if step.name == "placed" else good)
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+    return section(
+        "By object",
+        "Grasps of each object that succeed in each step; in displaced scenes, of the trials.",
+        table(head, rows, numbers=tuple(range(1, len(head)))),
+    )
+
+
+def change_section(change: Change) -> Html:
+    """What one step changes: outcomes, objects, bodies in the way, and the grasps."""
+    title = TITLES[change.step].capitalize()
+    lost, whole = len(change.lost), change.successes
+    parts: list[Child] = []
+    if whole:
+        low, high = change.share_lost
+        share = f"{lost} of {whole} successes are lost ({percent(lost / whole)})"
+        mark = interval_mark(lost / whole, low, high)
+        parts.append(element("p", f"{share} ", mark))
+    if change.lost or change.won:
+        parts += [_flow_table(change), _objects_table(change), _listing(change)]
+    return section(title, ABOUT[change.step], *parts)
+
+
+def _flow_table(change: Change) -> Html:
+    """Outcomes before and after, where they differ."""
+    moved = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
+    rows = []
+    for (before, after), count in sorted(moved.items(), key=lambda item: -item[1]):
+        blockers = Counter(
+            m.blocker for m in change.moves if (m.before, m.after) == (before, after) and m.blocker
+        )
+        by = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
+        rows.append(
+            element(
+                "tr",
+                element("td", words(before)),
+                element("td", words(after)),
+                element("td", count, class_="number"),
+                element("td", by or "-", class_="faint"),
+            )
+        )
+    head = ["before", "after", "grasps", "in the way"]
+    return table(head, rows, numbers=(2,))
+
+
+def _objects_table(change: Change) -> Html | None:
+    """Which objects suffer."""
+    lost = Counter(move.object for move in change.lost)
+    if not lost:
+        return None
+    had = Counter(m.object for m in change.moves if m.lost or m.before.held)
+    rows = [
+        element(
+            "tr",
+            element("th", name, scope="row"),
+            element("td", f"{count} of {had[name]}", class_="number"),
+            element("td", ", ".join(f"{words(o)} {n}" for o, n in into.most_common(3))),
+        )
+        for name, count in lost.most_common()
+        for into in [Counter(m.after for m in change.lost if m.object == name)]
+    ]
+    return table(["object", "lost", "what they turn into"], rows, numbers=(1,))
+
+
+def _listing(change: Change) -> Html:
+    """The grasps that change, and how to watch them."""
+    moves = [*change.lost, *change.won]
+    rows = [_listed(move) for move in moves[:ROWS]]
+    first = shlex.join(replay_command(moves[0].run, moves[0].grasp))
+    more = f", the first {ROWS} of {len(moves)}" if len(moves) > ROWS else ""
+    inside = join(
+        element("p", "Any of them can be watched; replay tells again what was in the way:"),
+        command(first),
+        table(["grasp", "before", "after", "in the way", "command"], rows),
+    )
+    return element("details", element("summary", f"The grasps that change{more}"), inside)
+
+
+def _listed(move: Move) -> Html:
+    line = shlex.join(replay_command(move.run, move.grasp))
+    return element(
+        "tr",
+        element("td", element("code", move.grasp)),
+        element("td", words(move.before)),
+        element("td", words(move.after)),
+        element("td", move.blocker or "-", class_="faint"),
+        element("td", element("code", line, class_="copy")),
+    )
+
+
+def push_section(ladder: Ladder) -> Html | None:
+    """By how much the hand pushes objects before it closes."""
+    arm = next((step.runs[0] for step in ladder.steps if step.name == "arm"), None)
+    told = None if arm is None else pushes(arm.results)
+    if arm is None or told is None:
+        return None
+    columns = arm.results
+    went = np.isfinite(columns["pushed"])
+    target = np.array(
+        [
+            columns[PUSHED + str(name)][k] if PUSHED + str(name) in columns else np.nan
+            for k, name in enumerate(columns["instance"])
+        ]
+    )
+    rows = []
+    for name in dict.fromkeys(columns["object"].tolist()):
+        of = went & (columns["object"] == name)
+        if not of.any():
+            continue
+        values = 1e3 * target[of]
+        moved = values > 1e3 * PUSH
+        held = np.array([Outcome(o).held for o in columns["outcome"][of]])
+        cells: list[Child] = [
+            int(of.sum()),
+            int(moved.sum()),
+            f"{np.median(values):.1f}",
+            f"{values.max():.1f}",
+            f"{int((held & moved).sum())} of {int(moved.sum())}",
+            f"{int((held & ~moved).sum())} of {int((~moved).sum())}",
+        ]
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+    limit = f"{1e3 * PUSH:g} mm"
+    head = ["object", "trials", f"pushed over {limit}", "median [mm]", "largest [mm]"]
+    head += ["held if pushed", "held if not"]
+    return section(
+        "Pushed before the hand closes",
+        f"{told} The table is about the object to be grasped.",
+        table(head, rows, numbers=(1, 2, 3, 4, 5, 6)),
+    )
+
+
+def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
+    """What each step does to the agreement with the robot."""
+    if not agreement or not agreement[0].found.trials:
+        return None
+    rows = []
+    for one in agreement:
+        cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        shares = [
+            element("td", _estimate(one.found.figure(name)), class_="estimate")
+            for name in ("precision", "recall", "accuracy")
+        ]
+        head = element("th", TITLES[one.step], scope="row")
+        rows.append(element("tr", head, *numbers, *shares))
+    names = ["step", "trials", "TP", "FP", "FN", "TN", "precision", "recall", "accuracy"]
+    return section(
+        "Beside the robot",
+        "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
+        " means that success is predicted; in displaced scenes, in more than half of them.",
+        table(names, rows, numbers=(1, 2, 3, 4, 5)),
+    )
+
+
+def _estimate(found: Figure) -> Child:
+    if found.value is None or found.low is None or found.high is None:
+        return "-"
+    return join(interval_mark(found.value, found.low, found.high), f" {percent(found.value)}")

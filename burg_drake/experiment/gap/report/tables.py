@@ -1,0 +1,129 @@
+"""The steps as tables for terminals, and as JSON values."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from burg_drake.core.figures import percent
+from burg_drake.core.schema import plain_data
+from burg_drake.core.text_table import TextTable
+from burg_drake.evaluation.summary import pushes
+from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.record import plain
+from burg_drake.experiment.comparison.wording import interval
+from burg_drake.experiment.gap.changes import Change, successes_by_object
+from burg_drake.experiment.gap.ladder import Ladder
+from burg_drake.experiment.gap.report.story import TITLES, replay_command, story, words
+from burg_drake.experiment.gap.steps_reality import StepAgreement
+from burg_drake.experiment.trials.sheet import Success
+
+FIGURES = ("precision", "recall", "accuracy")
+
+
+def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
+    """What each step keeps and loses."""
+    table = TextTable("Where grasps are lost", caption=_caption(ladder))
+    table.names("step").numbers("before", "lost", "won", "left", "lost %", "95 % CI")
+    table.texts("turned into")
+    for change in found:
+        lost, whole = len(change.lost), change.successes
+        low, high = change.share_lost
+        into = Counter(words(move.after) for move in change.lost)
+        table.row(
+            TITLES[change.step],
+            *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
+            percent(lost / whole) if whole else "-",
+            f"{100 * low:.0f}-{100 * high:.0f} %" if whole else "-",
+            ", ".join(f"{name} {count}" for name, count in into.most_common()),
+        )
+    return table
+
+
+def _caption(ladder: Ladder) -> str:
+    document = ladder.document
+    if not document.samples:
+        return ""
+    return (
+        f"objects displaced: {document.place_mm:g} mm and {document.turn_deg:g} degrees (standard"
+        f" deviations) in {document.samples} scenes; each grasp counts once a scene"
+    )
+
+
+def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
+    """What each step does to the agreement with the robot."""
+    table = TextTable("Beside the robot", caption="positive: success is predicted")
+    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", *FIGURES)
+    for one in agreement:
+        found = one.found
+        counts = (found.trials, *(f"{cell:g}" for cell in found.cells))
+        table.row(TITLES[one.step], *map(str, counts), *(_share(found.figure(n)) for n in FIGURES))
+    return table
+
+
+def _share(found: Figure) -> str:
+    if found.value is None:
+        return "-"
+    return f"{100 * found.value:.0f} {interval(found, percent=True)} %"
+
+
+def gap_json(
+    ladder: Ladder,
+    found: Sequence[Change],
+    agreement: Sequence[StepAgreement],
+    success: Success,
+) -> dict[str, Any]:
+    """All figures, and the grasps that change."""
+    told = {"arm": next((s.runs[0].results for s in ladder.steps if s.name == "arm"), None)}
+    pushed = None if told["arm"] is None else pushes(told["arm"])
+    return {
+        "success": success,
+        "asked": plain_data(ladder.document),
+        "story": story(ladder, found, success),
+        "steps": [
+            {
+                "name": step.name,
+                "runs": [str(run.path) for run in step.runs],
+                "outcomes": dict(
+                    Counter(v.outcome.value for run in step.runs for v in run.verdicts.values())
+                ),
+                "objects": {
+                    name: {"successes": good, "grasps": all}
+                    for name, (good, all) in successes_by_object(step, success).items()
+                },
+            }
+            for step in ladder.steps
+        ],
+        "changes": [_change_json(change) for change in found],
+        "pushed": None if pushed is None else asdict(pushed),
+        "reality": [{"step": one.step, **plain(one.found)} for one in agreement],
+    }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    low, high = change.share_lost
+    return {
+        "step": change.step,
+        "successes": change.successes,
+        "lost": len(change.lost),
+        "won": len(change.won),
+        "share_lost": {"low": low, "high": high},
+        "flow": [
+            {"before": a.value, "after": b.value, "count": n}
+            for (a, b), n in change.flow.most_common()
+        ],
+        "blockers": dict(change.blockers.most_common()),
+        "grasps": [
+            {
+                "grasp": move.grasp,
+                "object": move.object,
+                "before": move.before.value,
+                "after": move.after.value,
+                "blocker": move.blocker,
+                "replay": replay_command(move.run, move.grasp),
+            }
+            for move in (*change.lost, *change.won)
+        ],
+    }

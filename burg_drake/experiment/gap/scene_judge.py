@@ -1,0 +1,60 @@
+"""What a worker needs to judge grasps of a scene that nobody has looked at before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from burg_drake.core.content import content_hash
+from burg_drake.evaluation.mode import Mode
+from burg_drake.evaluation.station_judge import StationJudge, StationJudgeFactory
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import Engine
+from burg_drake.station.station import Station
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trial_settings import TrialSettings
+
+
+@dataclass(frozen=True)
+class SceneJudgeFactory:
+    """Builds the judge of a scene with all settings that a run has recorded.
+
+    Attributes:
+        scene, station: what to build.
+        engine, mode, settings: see `StationJudge`.
+    """
+
+    scene: Scene
+    station: Station
+    engine: Engine
+    mode: Mode
+    settings: TrialSettings
+
+    def __call__(self) -> StationJudge:
+        return StationJudge(
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=self.settings,
+        )
+
+    @property
+    def plain(self) -> Callable[[], StationJudge]:
+        """The usual factory where it does the same: clusters know how to send that one."""
+        from burg_drake.simulation.trial_settings import TrialSettings
+
+        if self.settings != TrialSettings(motion=self.settings.motion):
+            return self
+        motion = self.settings.motion
+        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, motion)
+
+    @property
+    def content(self) -> str:
+        """Hash of all that decides about its verdicts, but for the versions."""
+        return content_hash(
+            *(self.scene.content, self.station.content, self.mode),
+            *(asdict(self.engine), asdict(self.settings)),
+        )

@@ -1,0 +1,265 @@
+"""The trials file as the page of the lab sees it: what is to be done, what was entered, and entries
+that come from several browsers, late, or twice.
+
+An entry tells which state of its trial it replaces. It is written if that is still the state; it
+counts as written if the file, or its journal, has it already, so that a browser may send it again
+as often as it likes; else somebody else was faster, and the browser is told.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.core.outcome import RealOutcome
+from burg_drake.experiment.pages.tried_runs import TriedRuns
+from burg_drake.experiment.pages.words import (
+    SHORT_LIST,
+    approach_text,
+    closing_text,
+    outcome_label,
+    point_text,
+)
+from burg_drake.experiment.trials.book import TrialBook
+from burg_drake.experiment.trials.entries import entered
+from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
+
+OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
+"""What people enter; photo and placement come from the camera."""
+DIGITS = 12
+
+
+class EntryConflict(InvalidInputError):
+    """Somebody else has entered something else meanwhile.
+
+    Attributes:
+        trial: as it stands now.
+    """
+
+    def __init__(self, message: str, trial: RealTrial) -> None:
+        super().__init__(message)
+        self.trial = trial
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabEntry:
+    """What somebody has entered on the page.
+
+    Attributes:
+        number: of the trial.
+        replaces: state of the trial that was seen when it was entered, see `state_of`.
+        outcome: how it ended; None takes an entry back.
+        time: of the click, ISO 8601 with time zone.
+        operator, note: who, and what was noticed.
+        width_mm: between the pads at the end [mm].
+    """
+
+    number: int
+    replaces: str
+    outcome: RealOutcome | None
+    time: str = ""
+    operator: str = ""
+    note: str = ""
+    width_mm: float | None = None
+
+
+class LabBook:
+    """Reads and writes a trials file; every method may be called from any thread.
+
+    Args:
+        runs: of the file.
+        show_simulated: whether the page may tell what was simulated.
+    """
+
+    def __init__(self, runs: TriedRuns, *, show_simulated: bool = False) -> None:
+        self.runs, self.show_simulated = runs, show_simulated
+        self.book = TrialBook(runs.path)
+        self.plan = plan_of(runs.sheet)
+        self._lock = threading.Lock()
+        self._cached: tuple[object, TrialSheet, str] | None = None
+
+    def sheet(self) -> TrialSheet:
+        """What the file holds now.
+
+        Raises:
+            DocumentError: it cannot be read, which may pass: somebody may be editing it.
+            InvalidInputError: it is another plan by now.
+        """
+        return self._read()[0]
+
+    def version(self) -> str:
+        """Changes with the file's contents."""
+        return self._read()[1]
+
+    def enter(self, entry: LabEntry) -> RealTrial:
+        """Writes an entry; it is on the disk when this returns.
+
+        Returns:
+            The trial as it stands then.
+
+        Raises:
+            EntryConflict: the trial is neither as `entry.replaces` says nor as the entry says, and
+                the entry was never written before.
+            BurgError: there is no such trial, or the file cannot be read or written.
+        """
+        with self._lock:
+            trial = self.sheet().trial(entry.number)
+            values = _values(entry, trial)
+            if self._is_written(entry, values, trial):
+                return trial
+            if state_of(trial) != entry.replaces:
+                what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
+                who = f" by {trial.operator}" if trial.operator else ""
+                raise EntryConflict(
+                    f"trial {entry.number} was changed meanwhile: it has {what}{who}", trial
+                )
+            empty = all(getattr(trial, name) in ("", None) for name in OPERATOR_FIELDS)
+            return self.book.record(entry.number, correct=not empty, **values)
+
+    def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
+        """Enters what was seen before a trial.
+
+        Raises:
+            BurgError: as for `enter`; the trial has an outcome already.
+        """
+        with self._lock:
+            self.require_open(number)
+            return self.book.record(number, correct=True, photo=photo, placement=placement)
+
+    def require_open(self, number: int) -> None:
+        """Refuses a photo of what was before a trial that is over.
+
+        Raises:
+            InvalidInputError: the trial has an outcome; or there is none of that number.
+        """
+        if self.sheet().trial(number).outcome is not None:
+            raise InvalidInputError(
+                f"trial {number} is carried out already; photo and placement were not kept"
+            )
+
+    def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
+        """Whether the entry is in the file, or was until something else was entered."""
+        if all(getattr(trial, name) == value for name, value in values.items()):
+            return True
+        if state_of(trial) == entry.replaces or entry.outcome is None:
+            return False
+        wanted = entered(replace(trial, **values))
+        return any(
+            past.is_of(trial)
+            and all(past.after.get(name) == wanted.get(name) for name in OPERATOR_FIELDS)
+            for past in self.book.entries()
+        )
+
+    def _read(self) -> tuple[TrialSheet, str]:
+        path = Path(self.runs.path)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {path}: {error.strerror}") from error
+        key = (status.st_mtime_ns, status.st_size, status.st_ino)
+        cached = self._cached
+        if cached is None or cached[0] != key:
+            sheet = self.book.sheet()
+            if plan_of(sheet) != self.plan:
+                raise InvalidInputError(f"{path} holds other trials by now; start the page again")
+            cached = (key, sheet, content_hash(*map(str, key))[:DIGITS])
+            self._cached = cached
+        return cached[1], cached[2]
+
+
+def _values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
+    """Fields of the trial that an entry sets."""
+    effort = None if trial.robot is None else trial.robot.effort_n
+    known = entry.width_mm is not None or effort is not None
+    robot = RobotReport(width_mm=entry.width_mm, effort_n=effort) if known else None
+    if entry.outcome is None:
+        robot = None
+    return {
+        "outcome": entry.outcome,
+        "time": entry.time if entry.outcome is not None else "",
+        "operator": entry.operator if entry.outcome is not None else "",
+        "note": entry.note,
+        "robot": robot,
+    }
+
+
+def plan_of(sheet: TrialSheet) -> str:
+    """Short hash of what is to be tried, whatever was entered."""
+    trials = [f"{t.number} {t.run} {t.grasp} {t.content}" for t in sheet.trials]
+    return content_hash(sheet.created, [run.hash for run in sheet.runs.values()], trials)[:DIGITS]
+
+
+def state_of(trial: RealTrial) -> str:
+    """Short hash of what people have entered for a trial."""
+    values = entered(trial)
+    return content_hash({k: str(values.get(k)) for k in OPERATOR_FIELDS})[:DIGITS]
+
+
+def plan_data(lab: LabBook) -> dict[str, Any]:
+    """What does not change, for the page."""
+    sheet, runs = lab.runs.sheet, lab.runs
+    return {
+        "plan": lab.plan,
+        "file": lab.runs.path.name,
+        "outcomes": [
+            {"value": outcome.value, "label": label, "meaning": meaning}
+            for outcome, (label, meaning) in SHORT_LIST.items()
+        ],
+        "others": [
+            {"value": outcome.value, "label": outcome_label(outcome)}
+            for outcome in RealOutcome
+            if outcome not in SHORT_LIST
+        ],
+        "trials": [
+            {
+                "number": trial.number,
+                "block": trial.block,
+                "scene": runs.of(trial).scene.name,
+                "station": runs.of(trial).station.name,
+                "instance": trial.instance,
+                "object": trial.object,
+                "grasp": trial.grasp,
+                "approach": approach_text(runs.X_SG(trial)),
+                "fingers": closing_text(runs.X_SG(trial)),
+                "point": point_text(runs.X_SG(trial)),
+                "width": round(1e3 * runs.width(trial), 1),
+                **({"simulated": trial.simulated.value} if lab.show_simulated else {}),
+            }
+            for trial in sorted(sheet.trials, key=lambda trial: trial.number)
+        ],
+    }
+
+
+def entry_data(trial: RealTrial) -> dict[str, Any]:
+    """What was entered for a trial, for the page."""
+    return {
+        "number": trial.number,
+        "state": state_of(trial),
+        "outcome": trial.outcome and trial.outcome.value,
+        "label": outcome_label(trial.outcome) if trial.outcome else "",
+        "time": trial.time,
+        "operator": trial.operator,
+        "note": trial.note,
+        "width_mm": trial.robot and trial.robot.width_mm,
+        "photo": trial.photo,
+        "placement": {name: _place_data(place) for name, place in trial.placement.items()},
+    }
+
+
+def _place_data(place: ObjectPlace) -> dict[str, Any]:
+    off = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
+    return {"status": place.status, "mm": off, "deg": place.turn_deg}
+
+
+def states(lab: LabBook) -> dict[str, Any]:
+    """What has been entered so far, for the page; says so if the file cannot be read just now."""
+    try:
+        sheet, version = lab.sheet(), lab.version()
+    except BurgError as error:
+        return {"plan": lab.plan, "problem": str(error)}
+    entries = [entry_data(trial) for trial in sheet.trials]
+    return {"plan": lab.plan, "version": version, "problem": "", "entries": entries}

@@ -1,0 +1,212 @@
+"""The camera over the board in the lab: the live picture of the scene that is being tried, and how
+far its objects stand from their places."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from burg_drake.cameras.event_log import EventLog
+from burg_drake.cameras.frame_source import FrameSource
+from burg_drake.cameras.image_file import write_image
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.live_session import LiveSession
+from burg_drake.cameras.overlay_style import OverlayStyle
+from burg_drake.cameras.picture import Picture
+from burg_drake.cameras.placement_document import Placement, PlacementCheck
+from burg_drake.cameras.session import Session, Sight, pose_line
+from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.experiment.pages.lab_book import LabBook
+from burg_drake.experiment.trials.evidence import keep_evidence, object_places
+from burg_drake.scene.scene import Scene
+
+IDLE_AFTER = 5.0
+"""The camera is not looked at when no browser has asked for a picture for so long [s]."""
+FRESH = 5.0
+"""How long a check waits for a picture [s]."""
+OpenSource = Callable[[Scene], FrameSource]
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The live view of one scene; pictures of different views have different epochs."""
+
+    epoch: int
+    scene: Scene
+    live: LiveSession
+
+
+class LabCamera:
+    """Watches the board; every method may be called from any thread.
+
+    Args:
+        lab: the trials.
+        open_source: opens the camera over a scene.
+        intrinsics: of the camera.
+        print_scale: size of the printed boards against the documents', along x and y.
+    """
+
+    def __init__(
+        self,
+        lab: LabBook,
+        open_source: OpenSource,
+        intrinsics: Intrinsics,
+        *,
+        print_scale: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        self._lab, self._open, self._intrinsics = lab, open_source, intrinsics
+        self._print_scale = print_scale
+        self._lock = threading.RLock()
+        self._view: _View | None = None
+        self._epoch = 0
+        self._check: threading.Thread | None = None
+        self._checked: dict[str, Any] | None = None
+
+    def watch(self, number: int) -> None:
+        """Looks at the scene of a trial from now on.
+
+        Raises:
+            BurgError: there is no such trial, or the camera cannot be opened.
+        """
+        scene = self._lab.runs.of(self._lab.runs.sheet.trial(number)).scene
+        with self._lock:
+            if self._view is not None and self._view.scene.content == scene.content:
+                return
+            self.close()
+            source = self._open(scene)
+            try:
+                session = Session(scene, self._intrinsics, print_scale=self._print_scale)
+                events = EventLog(lambda event: None)
+                live = LiveSession(session, source, events=events, idle_after=IDLE_AFTER)
+            except BaseException:
+                source.close()
+                raise
+            self._epoch += 1
+            self._view, self._checked = _View(self._epoch, scene, live), None
+            live.start()
+
+    def close(self) -> None:
+        """Ends the live view."""
+        with self._lock:
+            view, self._view = self._view, None
+            if view is not None:
+                view.live.close()
+            self.wait_for_check()  # OpenCV must not be at work when Python ends
+
+    def next_picture(self, epoch: int, after: int, seconds: float) -> tuple[int, Picture] | None:
+        """The newest picture, as soon as it is another one than that of this epoch and number."""
+        view = self._view
+        if view is None:
+            time.sleep(min(seconds, 0.2))
+            return None
+        picture = view.live.next_picture(after if epoch == view.epoch else 0, seconds)
+        return None if picture is None else (view.epoch, picture)
+
+    @property
+    def is_checking(self) -> bool:
+        """A placement check is at work."""
+        return self._check is not None and self._check.is_alive()
+
+    def check(self, number: int, *, keep: bool) -> None:
+        """Measures in a thread of its own how the objects of the newest picture stand.
+
+        Args:
+            number: of the trial that it is for.
+            keep: enter photo and placement for the trial.
+
+        Raises:
+            BurgError: there is no picture with a pose, or a check is at work.
+        """
+        self.watch(number)
+        with self._lock:
+            if self.is_checking:
+                raise InvalidInputError("a placement check is at work already")
+            view = self._view
+            assert view is not None
+            stale = view.live.attend()
+            picture = view.live.picture if not stale else None
+            picture = picture or view.live.next_picture(stale, FRESH)
+            if picture is None or not picture.sight.estimate.valid:
+                raise InvalidInputError(
+                    "a placement check needs a picture that shows where the board is"
+                )
+            self._check = threading.Thread(
+                target=self._measure,
+                args=(view, number, picture.sight, keep),
+                name="placement check",
+                daemon=True,
+            )
+            self._check.start()
+
+    def wait_for_check(self, seconds: float | None = None) -> None:
+        """Until the placement check that is at work, if any, is done."""
+        if self._check is not None:
+            self._check.join(seconds)
+
+    def status(self) -> dict[str, Any]:
+        """What the page shows beside the picture."""
+        view = self._view
+        if view is None:
+            return {"scene": "", "line": "", "checking": False, "check": None}
+        picture, reader = view.live.picture, view.live.reader
+        lost = reader.fault if reader.state == "lost" else ""
+        line = pose_line(picture.sight.estimate, view.scene.board) if picture else "waiting"
+        return {
+            "scene": view.scene.name,
+            "fault": lost,
+            "valid": picture is not None and picture.sight.estimate.valid,
+            "line": line,
+            "checking": self.is_checking,
+            "check": self._checked,
+        }
+
+    def _measure(self, view: _View, number: int, sight: Sight, keep: bool) -> None:
+        begun = time.monotonic()
+        told: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
+        try:
+            check = view.live.session.check(sight)
+            view.live.placement = check
+            told["objects"] = {n: place_row(p) for n, p in check.instances.items()}
+            told["problem"] = check.reason
+            if keep and not check.reason:
+                self._keep(number, sight, check)
+                told["kept"] = True
+        except BurgError as error:
+            told["problem"] = str(error)
+        told["seconds"] = time.monotonic() - begun
+        told["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
+        self._checked = told
+
+    def _keep(self, number: int, sight: Sight, check: PlacementCheck) -> None:
+        """Writes the photo, then the entry that names it."""
+        path = self._lab.runs.path
+        self._lab.require_open(number)
+        with tempfile.TemporaryDirectory() as folder:
+            photo = Path(folder) / "photo.png"
+            write_image(photo, sight.frame.image)
+            name = keep_evidence(path, number, photo=photo, check=check)
+        self._lab.photographed(number, name, object_places(check))
+
+
+def place_row(placed: Placement) -> dict[str, Any]:
+    """How far an object is off, for the page; within the overlay's tolerance or not."""
+    style = OverlayStyle()
+    off = None if placed.displacement is None else math.hypot(*placed.displacement)
+    turn = placed.angle
+    within = (
+        off is not None and off <= style.tolerance and abs(turn or 0.0) <= style.angle_tolerance
+    )
+    return {
+        "status": placed.status,
+        "reason": placed.reason,
+        "within": within,
+        "mm": None if off is None else round(1e3 * off, 2),
+        "deg": None if turn is None else round(math.degrees(turn), 2) + 0.0,
+    }

@@ -1,0 +1,282 @@
+"""A trials file that several writers share: programs, and people with an editor.
+
+Programs take turns by a lock on a file beside it. What `TrialBook.record` has returned for is on
+the disk, in the file and in its journal, see `experiment.trials.entries`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from burg_drake.core.document_text import read_text
+from burg_drake.core.errors import (
+    InvalidInputError,
+    quoted,
+)
+from burg_drake.core.files import atomic_write
+from burg_drake.core.schema import parse_document
+from burg_drake.experiment.trials.entries import (
+    Entry,
+    How,
+    Lacking,
+    append_entry,
+    entered,
+    journal_path,
+    lacking,
+    read_entries,
+    sync_folder,
+    with_values,
+)
+from burg_drake.experiment.trials.given_entry import EMPTY, checked, includes, merged
+from burg_drake.experiment.trials.given_entry import real_outcome as real_outcome
+from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
+from burg_drake.experiment.trials.trial_text import with_trial
+
+WAIT = 30.0
+"""Time to wait for other writers, each of which takes some hundredths of a second [s]."""
+TURN = 0.01
+"""Time between two attempts to get the lock [s]."""
+
+
+class TrialChanged(InvalidInputError):
+    """A trial is not what it was taken for.
+
+    Attributes:
+        trial: as it is.
+    """
+
+    def __init__(self, message: str, trial: RealTrial) -> None:
+        super().__init__(message)
+        self.trial = trial
+
+
+class TrialBook:
+    """A trials file on disk.
+
+    Attributes:
+        path: the file.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Reads the file once, to find out whether it can be.
+
+        Raises:
+            DocumentError: it cannot be read, or does not fit the schema.
+        """
+        self.path = Path(path)
+        self.sheet()
+
+    def sheet(self) -> TrialSheet:
+        """What the file holds now; see `load_trials`."""
+        return self._read()[1]
+
+    def trial(self, number: int | Literal["next"]) -> RealTrial:
+        """The trial of a number, or the first one without an outcome.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._chosen(self.sheet(), number)
+
+    def entries(self) -> list[Entry]:
+        """All that was ever recorded, in order."""
+        return read_entries(journal_path(self.path))
+
+    def lacking(self) -> list[Lacking]:
+        """What the file lacks of that; see `entries.lacking`."""
+        return lacking(self.sheet(), self.entries())
+
+    def record(
+        self,
+        number: int | Literal["next"],
+        *,
+        correct: bool = False,
+        again: bool = False,
+        expected: RealTrial | None = None,
+        **entry: Any,
+    ) -> RealTrial:
+        """Enters what is known of a trial; all else in the file stays as it is, byte for byte.
+
+        The same entry twice is one. The journal keeps what is replaced.
+
+        Args:
+            number: of the trial; `next` for the first one without an outcome.
+            correct: the entry replaces what contradicts it.
+            again: the trial was carried out once more: the entry replaces all that there is.
+            expected: only if the trial still is this one, and nobody has changed it meanwhile.
+            entry: fields of `RealTrial`: `outcome`, `time` (now, if there is an outcome and nothing
+                else is said), `operator`, `note`, `photo`, `placement`, `robot`, a `RobotReport`
+                or its fields that are known.
+
+        Returns:
+            The trial as it is on the disk.
+
+        Raises:
+            UnknownNameError: there is no such field.
+            TrialChanged: it is not as expected.
+            InvalidInputError: there is no such trial, or no such outcome; the trial has another
+                entry already; or the file cannot be written.
+        """
+        given = checked(entry)
+
+        def change(trial: RealTrial) -> RealTrial:
+            if expected is not None and trial != expected:
+                raise TrialChanged(
+                    f"{self.path}: trial {trial.number} was changed meanwhile", trial
+                )
+            self.require_open(trial, given, correct=correct, again=again)
+            base = replace(trial, **EMPTY) if again else trial
+            new = replace(base, **merged(base, given))
+            if new.outcome is not None and "time" not in given:
+                same = not again and new.outcome is trial.outcome and trial.time
+                new = replace(new, time=trial.time if same else _now())
+            return new
+
+        how: How = "again" if again else "corrected" if correct else "recorded"
+        return self._change(number, change, how)
+
+    def restore(self, numbers: Sequence[int] | None = None) -> list[RealTrial]:
+        """Enters again what the file lacks; what was edited by hand stays.
+
+        Args:
+            numbers: of trials; all if None.
+
+        Returns:
+            The trials that were changed.
+        """
+        return [
+            self._change(lost.number, lambda trial: self._restored(trial), "restored")
+            for lost in self.lacking()
+            if lost.values and (numbers is None or lost.number in numbers)
+        ]
+
+    def keep(self, numbers: Sequence[int] | None = None) -> list[RealTrial]:
+        """Notes that the file is right where it differs from what was recorded.
+
+        Args:
+            numbers: of trials; all if None.
+
+        Returns:
+            These trials.
+        """
+        return [
+            self._change(found.number, lambda trial: trial, "kept")
+            for found in self.lacking()
+            if numbers is None or found.number in numbers
+        ]
+
+    def _restored(self, trial: RealTrial) -> RealTrial:
+        """With the last entry's value of each field that has an older one; under the lock."""
+        lost = [found.values for found in self.lacking() if found.number == trial.number]
+        return with_values(trial, lost[0]) if lost else trial
+
+    def require_open(
+        self,
+        trial: RealTrial,
+        entry: Mapping[str, Any],
+        *,
+        correct: bool = False,
+        again: bool = False,
+    ) -> None:
+        """Refuses an entry that contradicts one that is there, unless it is to replace it.
+
+        Args:
+            trial: as it is.
+            entry, correct, again: as for `record`.
+
+        Raises:
+            UnknownNameError: there is no such field.
+            InvalidInputError: it contradicts, or cannot be read.
+        """
+        given = merged(trial, checked(entry))
+        if correct or again:
+            return
+        for name, value in given.items():
+            present = getattr(trial, name)
+            if present != EMPTY[name] and not includes(value, present):
+                told = f" {quoted(str(present))}" if isinstance(present, str) else ""
+                raise InvalidInputError(
+                    f"{self.path}: trial {trial.number} has {name}{told} already; say that this"
+                    " corrects it (--correct), or that the trial was carried out once more"
+                    " (--again)"
+                )
+
+    def _change(
+        self, number: int | Literal["next"], change: Callable[[RealTrial], RealTrial], how: How
+    ) -> RealTrial:
+        with self._locked():
+            while True:
+                text, sheet = self._read()
+                old = self._chosen(sheet, number)
+                new = change(old)
+                if new == old and how != "kept":
+                    return old
+                content = with_trial(text, str(self.path), sheet, new)
+                if read_text(self.path) == text:  # no editor has written it meanwhile
+                    break
+            now = _now()
+            names = (old.number, old.grasp, old.content, now, how)
+            append_entry(journal_path(self.path), Entry(*names, entered(old), entered(new)))
+            if new != old:
+                target = self.path.resolve()  # of a link
+                atomic_write(target, content.encode())
+                sync_folder(target.parent)
+        return new
+
+    def _chosen(self, sheet: TrialSheet, number: int | Literal["next"]) -> RealTrial:
+        if number != "next":
+            try:
+                return sheet.trial(number)
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{self.path}: {error}") from error
+        if sheet.next is None:
+            raise InvalidInputError(f"{self.path}: all trials have an outcome; there is no next")
+        return sheet.next
+
+    def _read(self) -> tuple[str, TrialSheet]:
+        text = read_text(self.path)
+        return text, parse_document(text, TrialSheet, str(self.path))
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """One writer at a time; the end of its process, however it comes, releases the lock."""
+        path = self.path.with_name(f".{self.path.name}.lock")
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+        try:
+            self._wait_for(file)
+            yield
+        finally:
+            os.close(file)
+
+    def _wait_for(self, file: int) -> None:
+        until = time.monotonic() + WAIT
+        while True:
+            try:
+                return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                if time.monotonic() > until:
+                    raise InvalidInputError(
+                        f"{self.path} has been locked by another process for {WAIT:g} s; nothing"
+                        " was recorded"
+                    ) from error
+                time.sleep(TURN)
+            except OSError as error:
+                raise InvalidInputError(
+                    f"{self.path} is on a file system without locks ({error.strerror}), where two"
+                    " writers could lose entries; move it to another one"
+                ) from error
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="seconds")

@@ -1,0 +1,164 @@
+"""What lies beside a trials file: photos of the scene before trials, and placement checks of them.
+
+photos/017.png         the photo of trial 17, as it was taken
+placements/017.yaml    the whole placement check; the trials file has its main numbers
+
+Nothing is written over: what comes second is 017_2.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import count
+from pathlib import Path
+
+from burg_drake.cameras.placement_document import Placement, PlacementCheck, save_placement
+from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import atomic_write
+from burg_drake.core.schema import Pose
+from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, TrialSheet
+from burg_drake.scene.scene import Scene
+
+PHOTOS, PLACEMENTS = "photos", "placements"
+MILLI = 1e3
+
+
+def object_places(check: PlacementCheck) -> dict[str, ObjectPlace]:
+    """The main numbers of a placement check, by instance, rounded to a micrometre and a thousandth
+    of a degree."""
+    return {name: _place(placement) for name, placement in check.instances.items()}
+
+
+def require_scene(check: PlacementCheck, sheet: TrialSheet, trial: RealTrial, where: str) -> None:
+    """Refuses a placement check of another scene than that of a trial.
+
+    Raises:
+        InvalidInputError: it is of another one.
+    """
+    expected = sheet.runs[trial.run].scene
+    if check.scene.content != expected.content:
+        raise InvalidInputError(
+            f"{where} is of scene {check.scene.name!r} ({check.scene.content[:12]}); trial"
+            f" {trial.number} is on {expected.name!r} ({expected.content[:12]})"
+        )
+
+
+def require_same_scene(scene: Scene, sheet: TrialSheet, trial: RealTrial) -> None:
+    """Refuses another scene than that of a trial.
+
+    Raises:
+        InvalidInputError: it is another one.
+    """
+    expected = sheet.runs[trial.run].scene
+    if scene.content != expected.content:
+        raise InvalidInputError(
+            f"{scene.path} is not the scene of trial {trial.number}, {expected.name!r}: it has"
+            f" content {scene.content[:12]}, not {expected.content[:12]}"
+        )
+
+
+def measured(
+    scene: Scene,
+    photo: str | Path,
+    intrinsics: str | Path,
+    *,
+    depth: str | Path | None = None,
+    depth_unit: float | None = None,
+    scale: tuple[float, float] = (1.0, 1.0),
+) -> PlacementCheck:
+    """The placement check of a photo in a file; see `check_placement`.
+
+    Raises:
+        InvalidInputError: a file cannot be read, or the images do not belong to the intrinsics.
+    """
+    from burg_drake.cameras.image_file import read_image
+    from burg_drake.cameras.intrinsics_file import load_intrinsics
+    from burg_drake.cameras.placement import check_placement
+    from burg_drake.cameras.placement_depth_file import read_depth
+    from burg_drake.cameras.placement_document import image_of_file
+
+    camera = load_intrinsics(intrinsics)
+    image = read_image(photo)
+    camera.require_size(image.shape[1], image.shape[0], str(photo))
+    distances = None
+    if depth is not None:
+        distances = read_depth(depth, depth_unit)
+        camera.require_size(distances.shape[1], distances.shape[0], str(depth))
+    return check_placement(
+        scene,
+        image,
+        camera,
+        depth=distances,
+        scale=scale,
+        image_source=image_of_file(photo),
+        depth_source=None if depth is None else image_of_file(depth),
+    )
+
+
+def keep_evidence(
+    sheet_path: str | Path,
+    number: int,
+    *,
+    photo: str | Path | None = None,
+    check: PlacementCheck | None = None,
+) -> str:
+    """Copies a photo and writes a placement check beside a trials file.
+
+    Args:
+        sheet_path: the trials file.
+        number: of the trial.
+        photo: the photo; none if None.
+        check: its placement check; none if None.
+
+    Returns:
+        The copy of the photo, from the folder of the trials file; empty without a photo.
+
+    Raises:
+        InvalidInputError: the photo cannot be read, or nothing be written.
+    """
+    folder = Path(sheet_path).parent
+    stem = _free_stem(folder, number)
+    copy = ""
+    if photo is not None:
+        content = read_bytes(photo, IMAGE_SIZE)
+        copy = f"{PHOTOS}/{stem}{Path(photo).suffix.lower()}"
+        atomic_write(folder / copy, content)
+    if check is not None:
+        save_placement(check, folder / PLACEMENTS / f"{stem}.yaml")
+    return copy
+
+
+def placement_file(sheet_path: str | Path, photo: str) -> Path:
+    """Where the placement check of a photo in a trials file is, if there is one."""
+    return Path(sheet_path).parent / PLACEMENTS / f"{Path(photo).stem}.yaml"
+
+
+def _free_stem(folder: Path, number: int) -> str:
+    """A name that no photo and no placement check has yet."""
+    for k in count(1):
+        stem = f"{number:03d}" if k == 1 else f"{number:03d}_{k}"
+        if not any(any((folder / place).glob(f"{stem}.*")) for place in (PHOTOS, PLACEMENTS)):
+            return stem
+    raise AssertionError
+
+
+def _place(placement: Placement) -> ObjectPlace:
+    way, sd = placement.displacement, placement.displacement_sd
+    return ObjectPlace(
+        status=placement.status,
+        offset_mm=None if way is None else _millimetres(way),
+        offset_sd_mm=None if sd is None else _millimetres(sd),
+        turn_deg=None if placement.angle is None else _degrees(placement.angle),
+        turn_sd_deg=None if placement.angle_sd is None else _degrees(placement.angle_sd),
+        X_SO=None if placement.measured is None else Pose.readable(placement.measured.matrix()),
+    )
+
+
+def _millimetres(way: tuple[float, float]) -> tuple[float, float]:
+    x, y = (round(MILLI * value, 3) + 0.0 for value in way)
+    return x, y
+
+
+def _degrees(angle: float) -> float:
+    return round(math.degrees(angle), 3) + 0.0

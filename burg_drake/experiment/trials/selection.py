@@ -1,0 +1,118 @@
+"""Draws grasps of each object: so many of each stratum, by chance that follows from the grasps.
+
+The same grasps are drawn whatever the order of the runs, and of more grasps an object those of
+fewer are a part.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core.content import content_hash
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.experiment.trials.pool import Pool
+from burg_drake.experiment.trials.sheet import Selection, Stratum
+from burg_drake.experiment.trials.strata import (
+    FAILURE,
+    SUCCESS,
+    allocate,
+    even_shares,
+    labels_of,
+    robustness_of,
+)
+
+Chosen = list[tuple[Pool, int, str]]
+"""Grasps with the key of their stratum; a number is a place in the pool."""
+MOST_NOTES = 20
+"""Of the same kind; more than these are counted."""
+
+
+def drawn_scenes(pools: list[Pool], selection: Selection) -> list[Pool]:
+    """The pools of as many scenes as are wanted."""
+    found = sorted({p.scene for p in pools}, key=lambda s: content_hash(selection.seed, "scene", s))
+    if selection.scenes > len(found):
+        raise InvalidInputError(
+            f"{selection.scenes} scenes are wanted; the runs have {len(found)} with such grasps"
+        )
+    return [p for p in pools if not selection.scenes or p.scene in found[: selection.scenes]]
+
+
+def choose(
+    pools: Sequence[Pool], selection: Selection, table: Path | None
+) -> tuple[dict[str, Stratum], Chosen, list[str]]:
+    """Strata, the grasps chosen, and notes about what is missing."""
+    strata: dict[str, Stratum] = {}
+    chosen: Chosen = []
+    short: list[str] = []
+    unknown = 0
+    for pool in pools:
+        labels = labels_of(pool, selection, lambda run: robustness_of(run, table))
+        objects = pool.cells("object")
+        unknown += int((labels == "").sum())
+        for held in np.unique(objects).tolist():
+            members: defaultdict[str, list[int]] = defaultdict(list)
+            for k in np.flatnonzero((objects == held) & (labels != "")).tolist():
+                members[str(labels[k])].append(k)
+            if selection.balance == "outcome":
+                members[SUCCESS], members[FAILURE]  # also without any
+            if not members:
+                short.append(f"{held} of run {pool.key}: no grasp to choose from")
+                continue
+            found = _strata(pool, held, members, selection)
+            strata |= found
+            short += _shortfalls(found, selection.per_object)
+            for key, stratum in found.items():
+                ranked = _ranked(pool, members[stratum.label], selection.seed)
+                chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
+    notes = [f"{unknown} grasps have no {_balanced(selection)}; left out"] if unknown else []
+    if len(short) > MOST_NOTES:
+        short = [*short[:MOST_NOTES], f"and {len(short) - MOST_NOTES} more such shortfalls"]
+    return strata, chosen, notes + short
+
+
+def _strata(
+    pool: Pool, held: str, members: Mapping[str, Sequence[int]], selection: Selection
+) -> dict[str, Stratum]:
+    """Strata of one object, with how many of each are chosen."""
+    seed = selection.seed
+    first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
+    asked = even_shares(first, selection.per_object)
+    taken = allocate({k: len(v) for k, v in members.items()}, selection.per_object, first)
+    return {
+        f"{pool.key}/{held}/{label}": Stratum(
+            run=pool.key,
+            object=held,
+            label=label,
+            population=len(members[label]),
+            selected=taken[label],
+            wanted=asked[label],
+        )
+        for label in sorted(members)
+    }
+
+
+def _shortfalls(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
+    """A line about an object that has too few grasps of a stratum, or in all."""
+    parts = list(strata.values())
+    total = sum(stratum.selected for stratum in parts)
+    missing = [s for s in parts if s.selected < s.wanted]
+    if not missing:
+        return []
+    told = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
+    rest = "others make up for it" if total == wanted else f"{total} of {wanted} in all"
+    return [f"{parts[0].object} of run {parts[0].run}: {told}; {rest}"]
+
+
+def _balanced(selection: Selection) -> str:
+    return selection.margin or "probability"
+
+
+def _ranked(pool: Pool, members: Sequence[int], seed: int) -> list[int]:
+    """Places in a random order that follows from the grasps themselves."""
+    ids = pool.cells("id")
+    world = pool.scene
+    return sorted(members, key=lambda k: content_hash(seed, "grasp", world, str(ids[k])))

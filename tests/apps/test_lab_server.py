@@ -1,0 +1,225 @@
+"""The server of the lab's page, by real requests; and killed, as a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from burg_drake.apps.lab_page.server import PAGES, LabServer
+from burg_drake.core.outcome import RealOutcome
+from burg_drake.experiment.pages.lab_book import LabBook
+from burg_drake.experiment.pages.picture_shelf import PictureShelf
+from burg_drake.experiment.pages.tried_runs import TriedRuns
+from burg_drake.experiment.trials.book import TrialBook
+from burg_drake.experiment.trials.entries import journal_path, read_entries
+from burg_drake.experiment.trials.sheet import load_trials
+from tests.experiment.pages.conftest import made as made
+from tests.experiment.pages.conftest import trials as trials
+
+TIMEOUT = 60.0
+TIME = "2026-05-05T10:02:11+02:00"
+
+
+@pytest.fixture
+def server(trials: Path) -> Iterator[LabServer]:
+    """Without pictures, which have tests of their own."""
+    runs = TriedRuns(trials)
+    server = LabServer(LabBook(runs), PictureShelf(runs), port=0)
+    server.start()
+    yield server
+    server.close()
+
+
+def request(
+    port: int, method: str, path: str, body: str | None = None, **headers: str
+) -> tuple[int, dict[str, str], bytes]:
+    """Status, headers and body of an answer; `_` in names of headers stands for `-`."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+    try:
+        given = {key.replace("_", "-"): value for key, value in headers.items()}
+        connection.request(method, path, body, given)
+        answer = connection.getresponse()
+        return answer.status, dict(answer.headers), answer.read()
+    finally:
+        connection.close()
+
+
+def read(port: int, path: str) -> Any:
+    code, _, answer = request(port, "GET", path)
+    assert code == 200, answer
+    return json.loads(answer)
+
+
+def post(port: int, path: str, body: object, **headers: str) -> tuple[int, dict[str, Any]]:
+    text = body if isinstance(body, str) else json.dumps(body)
+    kind = {"Content_Type": "application/json"} | headers
+    code, _, answer = request(port, "POST", path, text, **kind)
+    return code, json.loads(answer)
+
+
+def entry(port: int, number: int, outcome: str | None, **more: object) -> dict[str, object]:
+    """As the page makes it."""
+    found = read(port, "/states")
+    state = next(e["state"] for e in found["entries"] if e["number"] == number)
+    known = {"plan": found["plan"], "number": number, "replaces": state, "outcome": outcome}
+    return known | {"time": TIME, "operator": "AB", "note": "", "width_mm": None} | more
+
+
+def test_an_entry_is_in_the_file_when_it_is_acknowledged(server: LabServer, trials: Path) -> None:
+    port = server.server_address[1]
+    code, answer = post(port, "/entry", entry(port, 2, "slipped", note="nass ☂", width_mm=7))
+    assert code == 200 and answer["entry"]["label"] == "slipped"
+    trial = load_trials(trials).trial(2)
+    assert (trial.outcome, trial.note, trial.operator) == (RealOutcome.SLIPPED, "nass ☂", "AB")
+    states = read(port, "/states")
+    assert request(port, "GET", f"/states?after={states['version']}")[0] == 204
+    TrialBook(trials).record(3, outcome="lifted")  # by another program
+    seen = read(port, f"/states?after={states['version']}")["entries"]
+    assert [e["outcome"] for e in seen[:3]] == [None, "slipped", "lifted"]
+
+
+BAD: list[tuple[dict[str, object], int, str]] = [
+    ({"outcome": "lifte"}, 400, "there is no outcome 'lifte'"),
+    ({"outcome": 3}, 400, "outcome must be a str"),
+    ({"number": True}, 400, "number must be a int"),
+    ({"number": 99}, 422, "99"),
+    ({"colour": "red"}, 400, "an entry has no 'colour'"),
+    ({"note": "x" * 2001}, 400, "note has 2001 characters"),
+    ({"note": "a\x00b"}, 400, "no text"),
+    ({"note": "\ud800"}, 400, "no text"),
+    ({"time": "2026-05-05T10:02:11"}, 400, "with its zone"),
+    ({"width_mm": -1}, 400, "width_mm must be from 0"),
+    ({"width_mm": 1e300}, 400, "width_mm must be from 0"),
+    ({"plan": "another"}, 409, "another trials file"),
+    ({"replaces": "other"}, 409, "was changed meanwhile: it has nothing"),
+]
+
+
+def test_bad_entries(server: LabServer, trials: Path) -> None:
+    port, before = server.server_address[1], trials.read_text()
+    good = entry(port, 1, "lifted")
+    for change, code, message in BAD:
+        found, answer = post(port, "/entry", good | change)
+        assert found == code and message in answer["error"], change
+    assert trials.read_text() == before
+
+
+def test_other_sites_and_broken_requests_are_refused(server: LabServer, trials: Path) -> None:
+    port, before = server.server_address[1], trials.read_text()
+    good = entry(port, 1, "lifted")
+    assert post(port, "/entry", good, Origin="http://evil.example")[0] == 403
+    assert post(port, "/entry", good, Host="evil.example")[0] == 403
+    assert post(port, "/entry", good, Sec_Fetch_Site="cross-site")[0] == 403
+    assert post(port, "/entry", good, Content_Type="text/plain")[0] == 415
+    assert post(port, "/entry", "{")[0] == 400 and post(port, "/entry", "[1]")[0] == 400
+    assert post(port, "/entry", '{"number": NaN}')[0] == 400
+    assert post(port, "/entry", "x" * 20_000)[0] == 400
+    assert post(port, "/check", {"number": 1, "keep": True})[0] == 404  # no camera
+    for path in ("/secret", "/picture/grasp/99.jpg", "/picture/../x.jpg", "/picture/x/1.jpg"):
+        assert request(port, "GET", path)[0] == 404
+    assert request(port, "GET", "/states", Origin="http://evil.example")[0] == 403
+    assert trials.read_text() == before
+    for path in PAGES:
+        code, headers, body = request(port, "GET", path)
+        assert code == 200 and body and "default-src 'self'" in headers["Content-Security-Policy"]
+    own = f"http://127.0.0.1:{port}"
+    assert post(port, "/entry", good, Origin=own, Sec_Fetch_Site="same-origin")[0] == 200
+
+
+def test_other_machines_need_the_token(trials: Path) -> None:
+    runs = TriedRuns(trials)
+    server = LabServer(LabBook(runs), PictureShelf(runs), host="0.0.0.0", port=0, secret="s" * 40)
+    server.start()
+    try:
+        port = server.server_address[1]
+        came: list[str] = []
+        server.on_admitted = came.append
+        for path in ("/", "/?token=x", "/plan", "/states", "/page.js"):
+            assert request(port, "GET", path)[0] == 403
+        address = server.url
+        path = address[address.index("/?") :]
+        code, headers, _ = request(port, "GET", path)
+        assert code == 200 and came == ["127.0.0.1"] and server.url != address
+        cookie, *rules = headers["Set-Cookie"].split("; ")
+        assert {"HttpOnly", "SameSite=Strict"} <= set(rules)
+        assert request(port, "GET", path)[0] == 403  # it was for one browser
+        assert request(port, "GET", "/states", Cookie=cookie)[0] == 200
+        assert request(port, "GET", "/states", Cookie=cookie[:-1])[0] == 403
+    finally:
+        server.close()
+
+
+def start(trials: Path, port: int) -> subprocess.Popen[str]:
+    """The program itself, once it serves."""
+    words = [sys.executable, "-m", "burg_drake.apps.cli", "trials", "serve", str(trials)]
+    process = subprocess.Popen(
+        [*words, "--port", str(port)], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert re.search(rf"7 trials: open http://127.0.0.1:{port}/", line), line
+    return process
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait(TIMEOUT)
+    if process.stdout is not None:
+        process.stdout.close()
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> None:
+    port = free_port()
+    process = start(trials, port)
+    sent = {n: entry(port, n, outcome) for n, outcome in ((1, "lifted"), (2, "slipped"))}
+    assert post(port, "/entry", sent[1])[0] == 200
+    unanswered = threading.Thread(target=_careless, args=(port, sent[2]))
+    unanswered.start()
+    kill(process)  # somewhere in the middle of the second entry
+    unanswered.join(TIMEOUT)
+    assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
+    server = serve_again(trials, port)
+    try:
+        clients = [threading.Thread(target=post, args=(port, "/entry", e)) for e in sent.values()]
+        for client in clients:
+            client.start()
+        for client in clients:
+            client.join(TIMEOUT)
+        outcomes = [t.outcome for t in load_trials(trials).trials[:3]]
+        assert outcomes == [RealOutcome.LIFTED, RealOutcome.SLIPPED, None]
+        told = [e.number for e in read_entries(journal_path(trials)) if e.before != e.after]
+        assert sorted(set(told)) == [1, 2] and told.count(1) == 1
+    finally:
+        server.close()
+
+
+def serve_again(trials: Path, port: int) -> LabServer:
+    """The program started again, in this process."""
+    runs = TriedRuns(trials)
+    server = LabServer(LabBook(runs), PictureShelf(runs), port=port)
+    server.start()
+    return server
+
+
+def _careless(port: int, body: dict[str, object]) -> None:
+    """Sends, and does not mind what comes of it."""
+    with contextlib.suppress(OSError, http.client.HTTPException, ValueError):
+        post(port, "/entry", body)

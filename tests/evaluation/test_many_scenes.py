@@ -1,0 +1,228 @@
+"""Runs over many scenes around a known judge: as each scene on its own, however they come about."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inline_executor import Inline
+from known_judge import expected, refuse
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.frames import make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.schema import Pose
+from burg_drake.evaluation.campaign import Campaign, load_campaign
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.results import load_runs, read_results
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.summary import summarize
+from burg_drake.evaluation.table import TEXT, Columns
+from burg_drake.scene.scene import Scene, load_scene, save_scene
+from burg_drake.scene.scene_files import scene_references
+from burg_drake.station.station import Station
+
+pytest.importorskip("pyarrow")
+OPTIONS = {"grasps_per_object": 5, "blind": True, "progress": False}
+
+
+@pytest.fixture
+def scenes(scene: Scene, tmp_path: Path) -> list[Path]:
+    """Three scenes of the same library: one moved, one without the bar."""
+    document = scene.document
+    moved = replace(document.instances[0], X_SO=Pose((0.12, 0.2, 0.025)))
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    for name, instances in (
+        ("cubes", document.instances[:2]),
+        ("moved", (moved, *document.instances[1:])),
+        ("three", document.instances),
+    ):
+        changed = replace(document, name=name, library="../shapes", instances=instances)
+        save_scene(changed, folder / f"{name}.yaml")
+    return sorted(folder.iterdir())
+
+
+def run_all(scenes: list[Path], station: Station, out: Path, **options) -> Campaign:
+    executor = options.pop("executor", None) or Inline()
+    return evaluate(scenes, station, out, executor=executor, **{**OPTIONS, **options})
+
+
+def same(a: Columns, b: Columns) -> bool:
+    """Whether tables agree bit for bit in everything but time."""
+    names = [name for name in a if not name.startswith("cpu_")]
+    assert names == [name for name in b if not name.startswith("cpu_")]
+    return all(np.array_equal(a[n], b[n], equal_nan=n not in TEXT) for n in names)
+
+
+def test_each_scene_is_as_on_its_own(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    campaign = run_all(scenes, station, tmp_path / "all")
+    assert campaign.names == ["cubes", "moved", "three"] and campaign.complete
+    alone: list[Run] = [
+        evaluate(path, station, tmp_path / path.stem, executor=Inline(1), **OPTIONS)
+        for path in scenes
+    ]
+    for run, own in zip(load_runs(campaign.path), alone, strict=True):
+        assert same(run.results, own.results)
+        assert {p.name for p in run.path.iterdir()} == {p.name for p in own.path.iterdir()}
+    whole = campaign.results
+    for name in ("id", "outcome", "slip", "run", "seed", "X_OG", "given_none"):
+        parts = [run.results.get(name, np.full(len(run.results["id"]), np.nan)) for run in alone]
+        found = read_results(campaign.path, [name])[name]
+        assert np.array_equal(found, np.concatenate(parts), equal_nan=name not in TEXT)
+    assert np.isnan(whole["moved_bar"][:10]).all()
+    summary, own = summarize(campaign), [summarize(run) for run in alone]
+    assert [group.judged for group in summary.scenes] == [10, 15, 15]
+    assert summary.total.outcomes == sum((s.total.outcomes for s in own), start=Counter())
+    for name in ("cube", "bar"):
+        (group,) = [g for g in summary.objects if g.name == name]
+        assert group.judged == sum(g.judged for s in own for g in s.objects if g.name == name)
+
+
+def test_any_program_reads_the_parts(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    campaign = run_all(scenes, station, tmp_path / "all")
+    theirs = pandas.read_parquet(campaign.path / "parts")
+    ours = campaign.frame()
+    assert len(theirs) == len(ours) == 40
+    assert theirs["id"].tolist() == ours["id"].tolist() == campaign.results["id"].tolist()
+    assert np.array_equal(theirs["moved_bar"], ours["moved_bar"], equal_nan=True)
+    assert ours["outcome"].tolist() == [expected(id) for id in ours["id"]]
+    assert ours["outcome"].cat.categories.tolist() == [o.value for o in Outcome]
+    assert ours["stage"].cat.ordered and ours["name"].tolist()[:10] == ["cubes"] * 10
+    single = campaign.run("three").frame(["id", "outcome", "slip"])
+    assert single["outcome"].tolist() == ours["outcome"].tolist()[25:]
+    assert single["outcome"].dtype == ours["outcome"].dtype
+
+
+def test_an_interrupted_call_goes_on(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_all(scenes, station, tmp_path / "whole")
+    executor = Inline(seed=2, stop=17)
+    with pytest.raises(KeyboardInterrupt):
+        run_all(scenes, station, tmp_path / "again", executor=executor)
+    there = load_campaign(tmp_path / "again")
+    assert len(there.columns(["id"])["id"]) == 17 and not there.complete
+    rest = Inline(seed=3)
+    again = run_all(scenes, station, tmp_path / "again", executor=rest)
+    assert rest.judged == 40 - 17
+    assert same(whole.results, again.results)
+    assert [stretch.judged for stretch in again.document.stretches] == [17, 23]
+    nothing = Inline()
+    files = {p: p.stat().st_mtime_ns for p in again.path.rglob("*") if p.is_file()}
+    run_all(scenes, station, tmp_path / "again", executor=nothing)
+    assert nothing.judged == 0
+    assert {p: p.stat().st_mtime_ns for p in again.path.rglob("*") if p.is_file()} == files
+
+
+def test_without_what_can_be_deleted_it_is_the_same(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    campaign = run_all(scenes, station, tmp_path / "all")
+    before = campaign.results
+    shutil.rmtree(campaign.path / "parts")
+    assert same(before, load_campaign(campaign.path).results)
+    (campaign.path / "scenes.jsonl").unlink()
+    again = run_all(scenes, station, campaign.path, executor=(executor := Inline()))
+    assert executor.judged == 0 and again.complete
+    assert same(before, again.results) and list((campaign.path / "parts").iterdir())
+
+
+def test_what_is_not_the_same_is_refused(
+    scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    out = tmp_path / "all"
+    run_all(scenes, station, out)
+    text = scenes[1].read_text()
+    scenes[1].write_text(text.replace("0.12", "0.13"))
+    with pytest.raises(InvalidInputError, match=r"another run \(scenes: changed moved\); choose"):
+        run_all(scenes, station, out)
+    scenes[1].write_text(text)
+    with pytest.raises(InvalidInputError, match=r"\(scenes: only there three\)"):
+        run_all(scenes[:2], station, out)
+    with pytest.raises(InvalidInputError, match=r"\(seed is 0 there, 1 here\)"):
+        run_all(scenes, station, out, seed=1)
+    with pytest.raises(InvalidInputError, match="holds all of this run, and --shard 1/2 is given"):
+        run_all(scenes, station, out, shard="1/2")
+    with pytest.raises(InvalidInputError, match=r"holds no run .* is in it"):
+        run_all(scenes, station, tmp_path)
+    with pytest.raises(InvalidInputError, match=r"cubes\.yaml is given twice; give it once"):
+        run_all([scenes[0], scenes[0]], station, tmp_path / "twice")
+    with pytest.raises(InvalidInputError, match=r"three\.yaml are the same scene; give it once"):
+        run_all([scene, *scenes], station, tmp_path / "twice")
+    with pytest.raises(InvalidInputError, match=r"2 of 3 scenes cannot be read: .*gone.*other"):
+        run_all([scenes[0], "gone.yaml", "other.yaml"], station, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    with pytest.raises(UnknownNameError, match="only: none of 3 scenes has 'mug'; known: bar, cu"):
+        run_all(scenes, station, tmp_path / "new", only=["mug"])
+
+
+def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    def unsound(scene: Scene, station: Station, mode: str) -> None:
+        if scene.name == "cubes":
+            raise InvalidInputError("two cubes overlap")
+
+    def judge(scene: Scene, *_):
+        return refuse if scene.name == "moved" else made(scene)
+
+    from burg_drake.evaluation import cascade
+
+    made, sound = cascade.StationJudgeFactory, cascade._require_sound
+    monkeypatch.setattr("burg_drake.evaluation.cascade._require_sound", unsound)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", judge)
+    campaign = run_all(scenes, station, tmp_path / "all")
+    assert campaign.failed == {"cubes": "two cubes overlap", "moved": "no such model"}
+    assert not campaign.complete and campaign.run("three").complete
+    assert summarize(campaign).notes == ("2 scenes could not be judged: cubes, moved",)
+    monkeypatch.setattr("burg_drake.evaluation.cascade._require_sound", sound)
+    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", made)
+    mended = run_all(scenes, station, tmp_path / "all", executor=(executor := Inline()))
+    assert mended.complete and not mended.failed and executor.judged == 25
+
+
+def test_names_and_places(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    other = tmp_path / "cubes.yaml"
+    other.write_text(scenes[0].read_text().replace("0.1", "0.11").replace("../shapes", "shapes"))
+    campaign = run_all([*scenes, other], station, tmp_path / "all", grasps_per_object=1)
+    assert campaign.names == ["cubes", "moved", "three", "cubes_2"]
+    assert campaign.run("cubes_2").scene().path.parent == campaign.path / "scenes/cubes_2"
+    assert scene_references([str(tmp_path / "scenes")]) == [str(path) for path in scenes]
+    assert scene_references([str(tmp_path / "scenes/*e*.yaml")]) == [str(path) for path in scenes]
+    with pytest.raises(InvalidInputError, match="is a folder without scenes"):
+        scene_references([str(tmp_path / "all/scenes")])
+
+
+def test_given_grasps_go_where_their_objects_are(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    X_OG = np.array([make_pose(np.diag([1.0, -1.0, -1.0]), (0, 0, z)) for z in (0.0, 0.001)])
+    grasps = GraspSet.create(X_OG, object=["bar", "bar"], width=0.03)
+    campaign = run_all(scenes, station, tmp_path / "all", grasps=grasps)
+    assert {name: state.state for name, state in campaign.states.items()} == {
+        "cubes": "empty",
+        "moved": "done",
+        "three": "done",
+    }
+    assert campaign.complete and len(campaign.runs) == 2
+    alone = evaluate(
+        scenes[2], station, tmp_path / "one", grasps=grasps, executor=Inline(), progress=False
+    )
+    assert same(campaign.run("three").results, alone.results)
+    assert summarize(campaign).notes == ("no grasps to judge in 1 scenes: cubes",)
+    only = run_all(scenes, station, tmp_path / "only", only=["bar"])
+    assert set(only.columns(["object"])["object"].tolist()) == {"bar"}
+    assert load_scene(scenes[0]).content == only.document.scenes[0].content

@@ -1,0 +1,174 @@
+"""Shards of runs, and what comes of them: the rows of a run that nobody divided."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from inline_executor import Inline
+from test_many_scenes import OPTIONS, run_all, same, scenes
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.journal import JOURNAL_FILE, decode, encode
+from burg_drake.evaluation.merge import unite
+from burg_drake.evaluation.run_store import Run, load_run
+from burg_drake.evaluation.shard import Shard
+from burg_drake.scene.scene import Scene
+from burg_drake.station.station import Station
+
+__all__ = ["scenes"]
+
+
+def run_one(scene: Scene, station: Station, out: Path, **options) -> Run:
+    executor = options.pop("executor", None) or Inline()
+    return evaluate(scene, station, out, executor=executor, **{**OPTIONS, **options})
+
+
+def change(run: Run, **values) -> str:
+    """Changes the first verdict of a journal; the id of its grasp."""
+    journal = run.path / JOURNAL_FILE
+    first, *rest = journal.read_bytes().splitlines(keepends=True)
+    id, verdict = decode(first)
+    journal.write_bytes(b"".join([encode(id, replace(verdict, **values)), *rest]))
+    return id
+
+
+def test_shares_are_whole_and_apart() -> None:
+    for count in (1, 2, 3, 7):
+        shards = [Shard(k, count) for k in range(1, count + 1)]
+        assert all(sum(shard.has(place) for shard in shards) == 1 for place in range(20))
+    for text in ("0/2", "3/2", "1", "1/2/3", "-1/2", "a/b"):
+        with pytest.raises(InvalidInputError, match="shard"):
+            Shard.parse(text)
+
+
+def test_shards_of_one_scene(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_one(scene, station, tmp_path / "whole")
+    shards = [
+        run_one(scene, station, tmp_path / f"s{k}", shard=f"{k}/3", executor=Inline(seed=k))
+        for k in (1, 2, 3)
+    ]
+    for k, shard in enumerate(shards):
+        assert shard.complete and shard.document.hash == whole.document.hash
+        assert shard.results["id"].tolist() == whole.candidates.id[k::3]
+        assert f"share {k + 1}/3 of a run" in shard.report_path.read_text()
+        assert f"shard {k + 1}/3:" in (shard.path / "results.csv-metadata.json").read_text()
+    merged = unite([shard.path for shard in reversed(shards)], tmp_path / "merged")
+    assert merged.notes == () and isinstance(merged.result, Run)
+    assert same(whole.results, merged.result.results) and merged.result.complete
+    assert merged.result.scene().content == scene.content
+    nothing = Inline()
+    run_one(scene, station, tmp_path / "merged", executor=nothing)
+    assert nothing.judged == 0
+    two = unite([shards[0].path, shards[2].path], tmp_path / "two")
+    assert two.notes == (
+        "5 grasps are not judged",
+        "shards that were not given: 2/3",
+        f"to judge the rest: the command of the runs with no --shard and -o {tmp_path / 'two'}",
+    )
+    rest = run_one(scene, station, tmp_path / "two", executor=(executor := Inline()))
+    assert executor.judged == 5 and same(whole.results, rest.results)
+
+
+@pytest.mark.parametrize("count", [2, 5])  # scenes as wholes, and grasps of each
+def test_shards_of_many_scenes(
+    count: int, scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_all(scenes, station, tmp_path / "whole")
+    folders = []
+    for k in range(1, count + 1):
+        shard = run_all(scenes, station, tmp_path / f"s{k}", shard=f"{k}/{count}")
+        assert shard.complete and len(shard.document.scenes) == 3
+        folders.append(shard.path)
+    merged = unite(folders, tmp_path / "merged")
+    assert merged.notes == () and isinstance(merged.result, Campaign)
+    assert same(whole.results, merged.result.results) and merged.result.complete
+    nothing = Inline()
+    again = run_all(scenes, station, tmp_path / "merged", executor=nothing)
+    assert nothing.judged == 0 and same(whole.results, again.results)
+    part = unite(folders[1:], tmp_path / "part")
+    if count == 2:
+        alone = ("all that was given is shard 2/2, and so is the united run",)
+        assert part.notes == alone and part.result.complete
+        return
+    assert f"shards that were not given: 1/{count}" in part.notes
+    rest = run_all(scenes, station, tmp_path / "part", executor=(executor := Inline()))
+    assert same(whole.results, rest.results) and 0 < executor.judged < 40
+
+
+def test_interrupted_copies(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_all(scenes, station, tmp_path / "whole")
+    for name, seed, stop in (("a", 1, 22), ("b", 2, 31)):
+        with pytest.raises(KeyboardInterrupt):
+            run_all(scenes, station, tmp_path / name, executor=Inline(seed, stop))
+    merged = unite([tmp_path / "a", tmp_path / "b"], tmp_path / "ab")
+    assert merged.missing + len(merged.result.results["id"]) == 40 and merged.missing <= 9
+    run_all(scenes, station, tmp_path / "ab")
+    assert same(whole.results, Campaign(tmp_path / "ab", merged.result.document).results)
+
+
+def test_verdicts_give_way(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_one(scene, station, tmp_path / "whole")
+    for name in ("interrupted", "failed", "slow", "other"):
+        shutil.copytree(whole.path, tmp_path / name)
+    broken = {"outcome": Outcome.SIMULATION_FAILED, "reason": "ended"}
+    change(load_run(tmp_path / "interrupted"), **broken, interrupted=True)
+    id = change(load_run(tmp_path / "failed"), **broken)
+    change(load_run(tmp_path / "slow"), cpu={})
+    names = ("interrupted", "failed", "slow")
+    merged = unite([tmp_path / name for name in names], tmp_path / "three")
+    assert same(merged.result.results, whole.results)
+    merged = unite([tmp_path / name for name in names[:2]], tmp_path / "two").result
+    assert merged.failures == [id] and merged.interrupted == []
+    outcome = load_run(tmp_path / "other").verdicts[id].outcome
+    instead = Outcome.DROPPED if outcome is not Outcome.DROPPED else Outcome.LIFTED
+    change(load_run(tmp_path / "other"), outcome=instead)
+    message = (
+        f"grasp {id} ended as {outcome} in {whole.path} and as {instead} in {tmp_path}/other; the"
+        " same run gives the same verdict everywhere, so that one of them was judged otherwise:"
+        " leave it out"
+    )
+    with pytest.raises(InvalidInputError) as error:
+        unite([whole.path, tmp_path / "other"], tmp_path / "no")
+    assert str(error.value) == message.replace(" and as ", " and ", 1)
+    assert not (tmp_path / "no").exists() and not list(tmp_path.glob(".no.*"))
+
+
+def test_refusals(
+    scene: Scene, scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    a = run_one(scene, station, tmp_path / "a", grasps_per_object=1)
+    b = run_one(scene, station, tmp_path / "b", grasps_per_object=1, seed=1)
+    many = run_all(scenes, station, tmp_path / "many", grasps_per_object=1)
+    for paths, out, message in (
+        ([a.path, b.path], "c", "(seed is 0 there, 1 here); only shards and copies of one run"),
+        ([a.path, many.path], "c", "many one of many; only runs of the same can be united"),
+        ([a.path], "b", "b is there already; choose another -o"),
+        ([tmp_path / "nothing"], "c", "holds no run (run.yaml is missing)"),
+        ([], "c", "no runs are given; give the folders of one or more"),
+    ):
+        with pytest.raises(InvalidInputError) as error:
+            unite(paths, tmp_path / out)
+        assert message in str(error.value)
+
+
+def test_a_merge_that_was_killed_leaves_nothing(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    run = run_one(scene, station, tmp_path / "a", grasps_per_object=1)
+    left = tmp_path / ".b.0123456789abcdef"
+    left.mkdir()
+    (left / JOURNAL_FILE).write_bytes(b"half")
+    unite([run.path], tmp_path / "b")
+    assert not left.exists() and same(load_run(tmp_path / "b").results, run.results)

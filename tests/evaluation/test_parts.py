@@ -1,0 +1,146 @@
+"""The columnar store: never another result than the journals', whatever happens to it or them."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inline_executor import Inline
+from test_many_scenes import run_all, same, scenes
+
+from burg_drake.evaluation import part_writer
+from burg_drake.evaluation.campaign import Campaign, load_campaign
+from burg_drake.evaluation.journal import JOURNAL_FILE
+from burg_drake.evaluation.part_writer import PartWriter
+from burg_drake.evaluation.run_store import load_run
+from burg_drake.evaluation.table import Columns
+from burg_drake.station.station import Station
+
+__all__ = ["scenes"]
+
+
+@pytest.fixture
+def campaign(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> Campaign:
+    """With several parts."""
+    monkeypatch.setattr(part_writer, "PART_ROWS", 12)
+    return run_all(scenes, station, tmp_path / "all")
+
+
+def from_journals(campaign: Campaign) -> Columns:
+    tables = [load_run(place.folder).results for place in campaign.places]
+    names = ("id", "outcome", "slip", "X_OG", "run")
+    return {name: np.concatenate([table[name] for table in tables]) for name in names}
+
+
+def require_true(campaign: Campaign) -> None:
+    truth = from_journals(campaign)
+    assert same(truth, load_campaign(campaign.path).columns(list(truth)))
+
+
+def refresh(campaign: Campaign) -> PartWriter:
+    writer = PartWriter(campaign.path, campaign.places, campaign.document.instances)
+    writer.catch_up()
+    writer.close()
+    return writer
+
+
+def test_damage(campaign: Campaign) -> None:
+    parts = sorted((campaign.path / "parts").iterdir())
+    assert len(parts) > 1
+    part = parts[0]
+    data = part.read_bytes()
+    rng = random.Random(0)
+    places = [
+        0,
+        3,
+        4,
+        len(data) - 1,
+        len(data) - 5,
+        len(data) - 9,
+        *rng.sample(range(len(data)), 20),
+    ]
+    for place in places:
+        part.write_bytes(
+            data[:place] + bytes([data[place] ^ (1 << rng.randrange(8))]) + data[place + 1 :]
+        )
+        require_true(campaign)
+    for length in (0, 7, len(data) // 2, len(data) - 1):
+        part.write_bytes(data[:length])
+        require_true(campaign)
+    refresh(campaign)
+    require_true(campaign)
+    assert load_campaign(campaign.path).rows(["id"]).table.num_rows != 0
+    (campaign.path / "parts" / "part-000099-0123456789abcdef.parquet").write_bytes(b"PAR1")
+    require_true(campaign)
+
+
+def test_journals_count(campaign: Campaign) -> None:
+    journal = campaign.folder("moved") / JOURNAL_FILE
+    data = journal.read_bytes()
+    lines = data.splitlines(keepends=True)
+    states = [
+        data + b'{"id":"torn',
+        data[:-1],
+        data[: len(data) // 2],
+        b"",
+        b"".join(reversed(lines)),
+        data.replace(b'"outcome":"lifted"', b'"outcome":"slippd"'),
+        data.replace(b'"outcome":"lifted"', b'"outcome":"dropped"').replace(
+            b'"slip":0', b'"slip":1'
+        ),
+    ]
+    for state in states:
+        journal.write_bytes(state)
+        require_true(campaign)
+        refresh(campaign)
+        require_true(campaign)
+
+
+def test_grown_journals_and_later_verdicts(campaign: Campaign) -> None:
+    journal = campaign.folder("moved") / JOURNAL_FILE
+    data = journal.read_bytes()
+    lines = data.splitlines(keepends=True)
+    ends = [sum(map(len, lines[:k])) for k in (0, 4, 9, len(lines))]
+    for begin, end in itertools.pairwise(ends):
+        journal.write_bytes(data[:begin])
+        refresh(campaign)
+        journal.write_bytes(data[:end] + b"to")
+        require_true(campaign)
+        refresh(campaign)
+        require_true(campaign)
+    journal.write_bytes(data + lines[3])
+    require_true(campaign)
+    refresh(campaign)
+    require_true(campaign)
+    import pyarrow.parquet
+
+    table = pyarrow.parquet.read_table(campaign.path / "parts")
+    pairs = zip(table.column("run").to_pylist(), table.column("id").to_pylist(), strict=True)
+    assert table.num_rows == len(set(pairs)) == 40
+
+
+def test_kills_at_every_byte(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    whole = run_all(scenes, station, tmp_path / "all").results
+    rng = random.Random(1)
+    for path in ("scenes.jsonl", "scenes/moved/journal.jsonl", "scenes/three/grasps.npz"):
+        file = tmp_path / "all" / path
+        data = file.read_bytes()
+        for length in (rng.randrange(len(data)), len(data) - 1):
+            if path.endswith("npz"):  # comes before run.yaml, whole or not at all
+                (file.parent / "run.yaml").unlink()
+                for name in file.parent.iterdir():
+                    if name.name not in (JOURNAL_FILE, "grasps.npz"):
+                        name.unlink()
+                (file.parent / JOURNAL_FILE).write_bytes(b"")
+            else:
+                file.write_bytes(data[:length])
+            again = run_all(scenes, station, tmp_path / "all", executor=Inline(seed=length))
+            assert same(whole, again.results) and again.complete
+            file.write_bytes(data) if path.endswith("jsonl") and "scenes/" not in path else None

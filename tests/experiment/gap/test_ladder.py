@@ -1,0 +1,237 @@
+"""The same grasps in steps: what a step reuses, what it repeats, and what is told."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from burg_drake.apps import gap as gap_verb
+from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import grasp_from_axes, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.evaluation.judge import Verdict, judge_grasp
+from burg_drake.evaluation.rerun import differences
+from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.station_judge import StationJudge
+from burg_drake.experiment.gap.changes import changes
+from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, climb
+from burg_drake.experiment.gap.placement_noise import PlacementNoise
+from burg_drake.experiment.gap.report.sections import push_section
+from burg_drake.experiment.gap.report.tables import gap_json
+from burg_drake.experiment.gap.steps_reality import agreement_by_step
+from burg_drake.experiment.trials.sheet import RealTrial
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+TILT = math.radians(115.0)
+FROM_BELOW = grasp_from_axes((1, 0, 0), (0, math.sin(TILT), -math.cos(TILT)), (0.0, -0.064, 0.19))
+"""At its upper edge, from the side and below: the hand lifts it, but the arm would be in the
+table."""
+GRASPS = np.stack([ABOVE, FROM_BELOW, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
+NONE = PlacementNoise(place=0.0, turn=0.0)
+ASKED: dict[str, Any] = {
+    "grasps": {"box": GraspSet.create(GRASPS, object="box", width=0.06)},
+    "engine": "screening",
+    "executor": LocalExecutor(1),
+    "progress": False,
+}
+
+
+@pytest.fixture(scope="module")
+def by_hand(tmp_path_factory: pytest.TempPathFactory) -> Ladder:
+    """Three grasps by the hand alone, and the same in a scene that is displaced by nothing."""
+    return climb(
+        "tabletop_six",
+        tmp_path_factory.mktemp("gap") / "steps",
+        last="hand",
+        noise=NONE,
+        samples=1,
+        **ASKED,
+    )
+
+
+@pytest.fixture(scope="module")
+def ladder(by_hand: Ladder) -> Ladder:
+    """The same folder with one step more."""
+    found = climb("tabletop_six", by_hand.path, last="reach", noise=NONE, samples=0, **ASKED)
+    return replace(found, steps=(*found.steps, by_hand.steps[1]))
+
+
+def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: Ladder) -> None:
+    hand, (run,) = by_hand.first, by_hand.steps[1].runs
+    assert run.document.scene.content == hand.document.scene.content
+    assert run.candidates.id == hand.candidates.id[:2]
+    for id in run.candidates.id:
+        assert differences(hand.verdicts[id], run.verdicts[id]) == []
+
+
+def test_reach_has_the_bits_of_a_run_of_its_own(ladder: Ladder) -> None:
+    """The oracle is the judge that nobody has shortened."""
+    hand, reach = (step.runs[0] for step in ladder.steps[:2])
+    judge = StationJudge(hand.scene(), hand.station(), engine=hand.document.engine, mode="reach")
+    for candidate in hand.candidates:
+        plain = judge_grasp(judge, candidate)
+        assert differences(plain, reach.verdicts[candidate.id]) == []
+        assert plain.q_grasp == reach.verdicts[candidate.id].q_grasp
+    outcomes = [reach.verdicts[id].outcome for id in reach.candidates.id]
+    assert outcomes == [Outcome.LIFTED, Outcome.ARM_COLLISION, Outcome.COLLISION_TARGET]
+    assert hand.verdicts[hand.candidates.id[1]].outcome is Outcome.LIFTED
+    (change, _) = changes(ladder, "lifted")
+    assert [move.grasp for move in change.lost] == [hand.candidates.id[1]]
+    assert "table" in change.lost[0].blocker
+
+
+def test_the_page_and_the_figures_tell_the_same(
+    ladder: Ladder, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["gap", str(ladder.steps[0].runs[0].path), "-o", str(ladder.path.parent / "again")]
+    words += ["--mode", "hand", "--samples", "0", "--quiet"]
+    assert main(words) == 0
+    page = (ladder.path.parent / "again" / "gap.html").read_text()
+    assert "Where grasps are lost: tabletop_six on panda_tabletop" in page
+    found = changes(ladder, "lifted")
+    told = gap_json(ladder, found, (), "lifted")
+    assert told["changes"][0]["lost"] == 1 and told["changes"][1]["lost"] == 0
+    assert sum(item["count"] for item in told["changes"][0]["flow"]) == 3
+    assert json.loads(json.dumps(told)) == told
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.split("report ")[-1].split("\n", 1)[1])["steps"]
+
+
+def test_other_steps_are_refused_and_more_scenes_are_not(ladder: Ladder) -> None:
+    run = ladder.steps[0].runs[0]
+    with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '' there"):
+        climb(run, ladder.path, last="hand", noise=NONE, samples=2, progress=False)
+    with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
+        climb("tabletop_six", ladder.path, last="reach", progress=False)
+
+
+def test_options_of_a_scene_are_refused_with_a_run(
+    ladder: Ladder, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    words = ["gap", str(ladder.steps[0].runs[0].path), "-o", str(tmp_path / "out")]
+    assert main([*words, "--engine", "standard"]) == 2
+    assert "--engine is about a scene;" in capsys.readouterr().err
+    assert main([*words, "--lift-mm", "100"]) == 2
+    assert "--lift-mm is about a scene;" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_defaults_of_the_verb_are_those_of_the_library() -> None:
+    assert gap_verb.DEFAULT_SAMPLES == DEFAULT_SAMPLES
+    assert pytest.approx(USUAL_NOISE.place) == gap_verb.DEFAULT_MM / 1e3
+    assert pytest.approx(USUAL_NOISE.turn) == math.radians(gap_verb.DEFAULT_DEG)
+
+
+def stated(run: Run, outcomes: dict[str, Outcome]) -> Run:
+    """The run with other verdicts."""
+    verdicts = {
+        id: Verdict(outcome, outcome.stage, blocker="bowl" if outcome.stage != "executed" else "")
+        for id, outcome in outcomes.items()
+    }
+    found = Run(run.path, run.document)
+    found.__dict__["verdicts"] = verdicts
+    return found
+
+
+@pytest.fixture
+def known(ladder: Ladder) -> Ladder:
+    """Steps with verdicts that are given: of three grasps one is lost in each step."""
+    hand = ladder.steps[0].runs[0]
+    one, two, three = hand.candidates.id
+    good = Outcome.LIFTED
+    tables = [
+        {one: good, two: good, three: Outcome.SLIPPED},
+        {one: good, two: Outcome.NO_IK, three: good},
+        {one: good, three: Outcome.ONE_FINGER},
+    ]
+    places = [step.runs[0] for step in ladder.steps]
+    places[2] = replace(places[2], path=hand.path)
+    steps = [
+        replace(step, runs=(stated(place, table),))
+        for step, place, table in zip(ladder.steps, places, tables, strict=True)
+    ]
+    return replace(ladder, steps=tuple(steps))
+
+
+def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
+    for run in (step.runs[0] for step in known.steps):
+        run.__dict__["candidates"] = [c for c in known.first.candidates if c.id in run.verdicts]
+    reach, placed = changes(known, "lifted")
+    assert (reach.successes, len(reach.lost), len(reach.won)) == (2, 1, 1)
+    assert reach.lost[0].after is Outcome.NO_IK and reach.blockers == {"bowl": 1}
+    assert (placed.successes, len(placed.lost), len(placed.won)) == (2, 1, 0)
+    assert placed.flow[Outcome.LIFTED, Outcome.ONE_FINGER] == 1
+    low, high = placed.share_lost  # Wilson's interval of 1 in 2, by hand
+    assert (low, high) == pytest.approx((0.0945, 0.9055), abs=1e-4)
+
+
+def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+    one, two, three = known.first.candidates.id
+    real = {one: RealOutcome.LIFTED, two: RealOutcome.SLIPPED, three: RealOutcome.LIFTED}
+    trials = [
+        RealTrial(
+            number=number,
+            block=1,
+            run="a",
+            grasp=grasp,
+            content="",
+            instance="box",
+            object="box",
+            simulated=Outcome.LIFTED,
+            stratum="all",
+            outcome=outcome,
+        )
+        for number, (grasp, outcome) in enumerate(real.items(), 1)
+    ]
+    later = replace(trials[0], number=4, outcome=None)
+    found = agreement_by_step(known, [*trials, later], "lifted")
+    assert [(a.step, *a.found.cells) for a in found] == [
+        ("hand", 1, 1, 1, 0),
+        ("reach", 2, 0, 0, 1),
+        ("placed", 1, 0, 1, 0),
+    ]
+    assert found[1].found.precision.value == 1.0
+    assert found[2].found.recall.value == 0.5
+
+
+def test_the_page_shows_all_sections(ladder: Ladder) -> None:
+    from burg_drake.experiment.gap.report.page import gap_page
+
+    page = gap_page(ladder, "lifted", (), "burg-drake gap tabletop_six -o gap")
+    for head in ("From step to step", "By object", "With the arm", "How to repeat"):
+        assert f"<h2>{head}</h2>" in page, head
+    counts = re.findall(r"<text[^>]*>(\d+) (lifted|arm cannot reach|hand collides)</text>", page)
+    assert ("1", "arm cannot reach") in counts
+    assert "burg-drake replay" in page
+
+
+def test_what_the_approach_pushes_is_told_by_object(known: Ladder) -> None:
+    """Five trials of the arm, as a table has them; one has failed."""
+    arm = Run(known.first.path, known.first.document)
+    arm.__dict__["results"] = {
+        "instance": np.array(["box", "box", "mug", "mug", "mug"]),
+        "object": np.array(["box", "box", "mug", "mug", "mug"]),
+        "outcome": np.array(["lifted", "slipped", "lifted", "lifted", "simulation_failed"]),
+        "pushed": np.array([0.0, 0.004, 0.03, 0.0, np.nan]),
+        "pushed_box": np.array([0.0, 0.004, 0.0, 0.0, np.nan]),
+        "pushed_mug": np.array([0.0, 0.0, 0.03, 0.0, np.nan]),
+    }
+    page = push_section(replace(known, steps=(*known.steps, Step("arm", (arm,)))))
+    assert page is not None and "in 2 of 4 trials (largest 30.0 mm)" in page
+    rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in page.split("<tr>")[2:]]
+    assert rows == [
+        ["box", "2", "1", "2.0", "4.0", "0 of 1", "1 of 1"],
+        ["mug", "2", "1", "15.0", "30.0", "1 of 1", "1 of 1"],
+    ]
+    assert push_section(known) is None

@@ -1,0 +1,42 @@
+"""Trials of two scenes, and their pictures, made once a process."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from burg_drake.evaluation.results import load_runs
+from burg_drake.experiment.pages.trial_pictures import TrialPictures
+from burg_drake.experiment.pages.tried_runs import TriedRuns
+from tests.experiment.pages.tried import make_runs, make_trials
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the runs; copy it to change anything."""
+    folder = tmp_path_factory.mktemp("tried")
+    with pytest.MonkeyPatch.context() as patch:
+        make_trials(folder, make_runs(folder, patch))
+    return folder
+
+
+@pytest.fixture
+def trials(made: Path, tmp_path: Path) -> Path:
+    """A trials file of one's own, with its runs."""
+    shutil.copytree(made, tmp_path / "lab")
+    return tmp_path / "lab" / "trials.yaml"
+
+
+@pytest.fixture(scope="session")
+def runs(made: Path) -> TriedRuns:
+    """The runs of the trials file."""
+    assert load_runs(made / "run_one")
+    return TriedRuns(made / "trials.yaml")
+
+
+@pytest.fixture(scope="session")
+def pictures(runs: TriedRuns) -> TrialPictures:
+    """By Drake's renderer."""
+    return TrialPictures(runs)

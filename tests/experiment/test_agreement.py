@@ -1,0 +1,220 @@
+"""Figures of a confusion matrix, held against scikit-learn and statsmodels."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sklearn import metrics
+from statsmodels.stats.contingency_tables import mcnemar
+from statsmodels.stats.inter_rater import cohens_kappa
+from statsmodels.stats.proportion import proportion_confint
+
+from burg_drake.experiment.comparison.agreement import (
+    Agreement,
+    agreement,
+    agreements,
+    grouped,
+    matrix_of,
+)
+from burg_drake.experiment.comparison.measures import MEASURES
+from burg_drake.experiment.comparison.paired import paired, paired_counts
+from burg_drake.experiment.comparison.resampling import PRIOR, prior
+
+PAPER = (
+    ((21, 9, 10, 20), "70.00", "67.74"),
+    ((10, 13, 12, 25), "43.48", "45.45"),
+)
+"""The two tables of the paper: (TP, FP, FN, TN), precision and recall in per cent."""
+Cells = st.tuples(*[st.integers(0, 40)] * 4)
+
+
+def trials(cells: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Predicted and actual success of as many trials."""
+    predicted = np.repeat([True, True, False, False], cells)
+    return predicted, np.repeat([True, False, True, False], cells)
+
+
+@pytest.mark.parametrize(("cells", "precision", "recall"), PAPER)
+def test_tables_of_the_paper(cells: tuple[int, ...], precision: str, recall: str) -> None:
+    found = agreement(np.array(cells))
+    assert found.cells == cells
+    assert f"{100 * (found.precision.value or 0):.2f}" == precision
+    assert f"{100 * (found.recall.value or 0):.2f}" == recall
+
+
+ORACLES = {
+    "precision": lambda y, p, w: metrics.precision_score(y, p, sample_weight=w),
+    "recall": lambda y, p, w: metrics.recall_score(y, p, sample_weight=w),
+    "specificity": lambda y, p, w: metrics.recall_score(~y, ~p, sample_weight=w),
+    "f1": lambda y, p, w: metrics.f1_score(y, p, sample_weight=w),
+    "accuracy": lambda y, p, w: metrics.accuracy_score(y, p, sample_weight=w),
+    "balanced_accuracy": lambda y, p, w: metrics.balanced_accuracy_score(y, p, sample_weight=w),
+    "matthews": lambda y, p, w: metrics.matthews_corrcoef(y, p, sample_weight=w),
+    "kappa": lambda y, p, w: metrics.cohen_kappa_score(y, p, sample_weight=w),
+    "predicted": lambda y, p, w: np.average(p, weights=w),
+    "actual": lambda y, p, w: np.average(y, weights=w),
+}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_selected_trials_as_scikit_learn_has_them(seed: int) -> None:
+    predicted, actual = trials(tuple(np.random.default_rng(seed).integers(1, 30, 4)))
+    found = agreement(matrix_of(predicted, actual))
+    for name, oracle in ORACLES.items():
+        expected = oracle(actual, predicted, None)
+        assert found.figure(name).value == pytest.approx(expected, abs=1e-12), name
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_all_grasps_as_scikit_learn_has_them_with_weights(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    predicted, actual = rng.random((2, 80)) < 0.6
+    stratum = rng.integers(0, 5, 80)
+    population = rng.integers(50, 900, 5).astype(float)
+    weight = (population / np.bincount(stratum))[stratum]
+    found = agreement(grouped(predicted, actual, stratum, 5), population=population)
+    assert sum(found.cells) == pytest.approx(population.sum())
+    for name, oracle in ORACLES.items():
+        expected = oracle(actual, predicted, weight)
+        assert found.figure(name).value == pytest.approx(expected, abs=1e-12), name
+
+
+def test_shares_have_wilsons_intervals_as_statsmodels_has_them() -> None:
+    found = agreement(np.array((21, 9, 10, 20)))
+    for figure, part, whole in (
+        (found.precision, 21, 30),
+        (found.recall, 21, 31),
+        (found.specificity, 20, 29),
+        (found.accuracy, 41, 60),
+    ):
+        expected = proportion_confint(part, whole, method="wilson")
+        assert (figure.low, figure.high) == pytest.approx(expected, abs=1e-9)
+
+
+def test_interval_of_kappa_meets_the_asymptotic_one_where_there_are_many_trials() -> None:
+    cells = np.array((4200, 1800, 2000, 4000))
+    found = agreement(cells).kappa
+    table = cells[[0, 1, 2, 3]].reshape(2, 2)
+    expected = cohens_kappa(table)
+    assert found.value == pytest.approx(expected.kappa)
+    assert found.low == pytest.approx(expected.kappa_low, abs=2e-3)
+    assert found.high == pytest.approx(expected.kappa_upp, abs=2e-3)
+
+
+def test_intervals_of_the_rest_meet_drawing_trials_anew_where_there_are_many() -> None:
+    predicted, actual = trials((420, 180, 200, 400))
+    found = agreement(matrix_of(predicted, actual))
+    rng = np.random.default_rng(3)
+    rows = rng.integers(0, len(actual), (300, len(actual)))
+    drawn = [np.corrcoef(actual[k], predicted[k])[0, 1] for k in rows]  # the same for yes and no
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    assert found.matthews.low == pytest.approx(low, abs=0.015)
+    assert found.matthews.high == pytest.approx(high, abs=0.015)
+
+
+def test_weights_of_equal_strata_change_nothing_but_the_scale() -> None:
+    counts = np.array([(8, 2, 3, 7), (6, 4, 1, 9)])
+    selected = agreement(counts)
+    represented = agreement(counts, population=np.array([200.0, 200.0]))
+    for name in MEASURES:
+        assert represented.figure(name).value == pytest.approx(selected.figure(name).value)
+
+
+def test_a_stratum_that_stands_for_many_widens_recall() -> None:
+    counts = np.array([(20, 0, 0, 0), (0, 0, 0, 20)])  # no failure was seen to succeed
+    few = agreement(counts, population=np.array([100.0, 100.0])).recall
+    many = agreement(counts, population=np.array([100.0, 5000.0])).recall
+    assert few.value == many.value == 1.0
+    assert (many.low or 0) < 0.5 < (few.low or 0)
+
+
+def test_prior_is_half_a_trial_a_cell() -> None:
+    counts = np.array([(3.0, 1, 0, 0), (0, 0, 2, 2), (1, 1, 1, 1)])
+    assert prior(counts, np.array([10.0, 20.0, 30.0])).sum(axis=0) == pytest.approx([PRIOR] * 4)
+
+
+@given(Cells)
+@settings(max_examples=30, deadline=None)
+def test_undefined_figures_have_a_reason_and_others_lie_within_their_intervals(
+    cells: tuple[int, int, int, int],
+) -> None:
+    for found in (agreement(np.array(cells)), *agreements(np.array([cells]))):
+        check(found)
+
+
+def check(found: Agreement) -> None:
+    for name, measure in MEASURES.items():
+        figure = found.figure(name)
+        if figure.value is None:
+            assert figure.reason and figure.low is None and figure.high is None
+        else:
+            assert figure.low is not None and figure.high is not None and not figure.reason
+            assert measure.low - 1e-9 <= figure.low <= figure.value
+            assert figure.value <= figure.high <= measure.high + 1e-9
+
+
+@given(st.lists(Cells, min_size=1, max_size=5), st.integers(0, 5))
+@settings(max_examples=25, deadline=None)
+def test_strata_without_trials_and_of_one_kind(
+    counts: list[tuple[int, int, int, int]], seed: int
+) -> None:
+    population = np.random.default_rng(seed).integers(1, 300, len(counts)).astype(float)
+    check(agreement(np.array(counts), population=population, seed=seed))
+
+
+@pytest.mark.parametrize(
+    ("cells", "undefined"),
+    [
+        ((0, 0, 0, 0), set(MEASURES)),
+        ((5, 0, 0, 0), {"specificity", "balanced_accuracy", "matthews", "kappa"}),
+        ((0, 0, 0, 5), {"precision", "recall", "f1", "balanced_accuracy", "matthews", "kappa"}),
+        ((0, 0, 3, 5), {"precision", "matthews"}),
+        ((0, 4, 0, 5), {"recall", "balanced_accuracy", "matthews"}),
+        ((1, 1, 1, 1), set()),
+    ],
+)
+def test_what_is_undefined(cells: tuple[int, ...], undefined: set[str]) -> None:
+    found = agreement(np.array(cells))
+    assert {name for name in MEASURES if found.figure(name).value is None} == undefined
+
+
+def test_intervals_depend_on_the_seed_alone() -> None:
+    counts = np.array((21, 9, 10, 20))
+    assert agreement(counts, seed=4) == agreement(counts, seed=4)
+    assert agreement(counts, seed=4).matthews != agreement(counts, seed=5).matthews
+
+
+def test_swapping_success_and_failure_swaps_the_figures() -> None:
+    found, swapped = agreement(np.array((21, 9, 10, 25))), agreement(np.array((25, 10, 9, 21)))
+    assert found.specificity == swapped.recall
+    assert found.accuracy == swapped.accuracy
+    assert found.matthews.value == pytest.approx(swapped.matthews.value)
+
+
+@pytest.mark.parametrize("counts", [(20, 9, 3, 8), (5, 1, 0, 2), (3, 7, 7, 1), (0, 0, 12, 0)])
+def test_mcnemar_as_statsmodels_has_it(counts: tuple[int, int, int, int]) -> None:
+    both, one, other, neither = counts
+    found = paired_counts(*counts)
+    expected = mcnemar(np.array([[both, one], [other, neither]]), exact=True)
+    assert found.p_value == pytest.approx(expected.pvalue)
+    assert found.difference.value == pytest.approx((one - other) / sum(counts))
+
+
+def test_paired_answers_are_counted() -> None:
+    first = np.array([True, True, False, False, True])
+    found = paired(first, np.array([True, False, True, False, False]))
+    assert (found.both, found.only_first, found.only_second, found.neither) == (1, 2, 1, 1)
+    assert paired(first, first).p_value == 1.0
+    assert paired(first[:0], first[:0]).p_value is None
+    assert paired(first[:0], first[:0]).difference.value is None
+
+
+def test_nothing_warns() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for cells in ((0, 0, 0, 0), (1, 0, 0, 0), (0, 0, 0, 1), (0, 1, 1, 0)):
+            agreement(np.array(cells))

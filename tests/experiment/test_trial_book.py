@@ -1,0 +1,280 @@
+"""A trials file with several writers: nothing is lost, and nobody's text is touched."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.outcome import RealOutcome
+from burg_drake.core.schema import Pose, parse_document, plain_data
+from burg_drake.experiment.trials.book import TrialBook, TrialChanged
+from burg_drake.experiment.trials.sheet import ObjectPlace, RobotReport, TrialSheet, load_trials
+from burg_drake.experiment.trials.trial_text import with_trial
+from tests.experiment.trial_sheets import make_sheet, write_sheet
+
+PLACE = ObjectPlace(
+    status="measured", offset_mm=(1.25, -0.5), offset_sd_mm=(0.1, 0.2), X_SO=Pose((0.1, 0.2, 0.0))
+)
+WRITER = """
+import sys
+from burg_drake.experiment.trials.book import TrialBook
+book = TrialBook(sys.argv[1])
+for number in map(int, sys.argv[2:]):
+    book.record(number, outcome="slipped", note=f"by {number}")
+    print(number, flush=True)
+"""
+
+
+def start(path: Path, *numbers: int) -> subprocess.Popen[str]:
+    words = [sys.executable, "-c", WRITER, str(path), *map(str, numbers)]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+
+
+def test_writers_at_once_lose_nothing(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path, 40)
+    writers = [start(path, *range(1 + k, 41, 4)) for k in range(4)]
+    assert [writer.wait() for writer in writers] == [0] * 4
+    sheet = load_trials(path)
+    assert [trial.note for trial in sheet.trials] == [f"by {n}" for n in range(1, 41)]
+    assert {trial.outcome for trial in sheet.trials} == {RealOutcome.SLIPPED}
+    book = TrialBook(path)
+    assert len(book.entries()) == 40 and book.lacking() == []
+
+
+def test_what_was_told_before_a_kill_is_there(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path, 60)
+    writer = start(path, *range(1, 61))
+    assert writer.stdout is not None
+    told = [int(writer.stdout.readline()) for _ in range(7)]
+    writer.send_signal(signal.SIGKILL)
+    told += map(int, writer.stdout.read().split())
+    writer.wait()
+    book = TrialBook(path)
+    assert all(book.sheet().trial(number).note == f"by {number}" for number in told)
+    book.record(60, outcome="lifted")  # the lock is free
+
+
+@pytest.mark.parametrize("step", ["append_entry", "with_trial", "atomic_write"])
+def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str) -> None:
+    path = write_sheet(tmp_path)
+    where = "burg_drake.experiment.trials.book"
+    script = f"import os, {where} as b; b.{step} = lambda *_: os.kill(os.getpid(), 9)\n" + WRITER
+    ended = subprocess.run([sys.executable, "-c", script, str(path), "2"], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    book = TrialBook(path)
+    assert book.sheet() == make_sheet()
+    journalled = step == "atomic_write"
+    assert [found.number for found in book.lacking()] == [2] * journalled
+    if journalled:
+        (restored,) = book.restore()
+        assert (restored.outcome, restored.note) == (RealOutcome.SLIPPED, "by 2")
+    assert book.record(2, outcome="slipped").outcome is RealOutcome.SLIPPED
+
+
+def test_a_torn_line_of_the_journal_is_left_behind(tmp_path: Path) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    book.record(1, outcome="lifted")
+    with (tmp_path / "trials.entries.jsonl").open("ab") as file:
+        file.write(b'{"number": 2, "gra')
+    book.record(3, outcome="lifted")
+    assert [entry.number for entry in book.entries()] == [1, 3]
+
+
+def test_comments_and_layout_of_people_stay(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path)
+    lines = path.read_text().splitlines()
+    at = next(i for i, line in enumerate(lines) if "number: 2" in line)
+    lines[at:at] = ["", "  # the camera was moved here"]
+    lines[at + 2] += "   # after lunch"
+    lines.insert(at + 4, "    # within the trial")
+    path.write_text("\n".join(lines) + "\n# the end\n")
+    before = path.read_text().splitlines()
+    book = TrialBook(path)
+    trial = book.record(2, outcome="dropped", note="Ärger: it fell", placement={"mug": PLACE})
+    after = path.read_text().splitlines()
+    assert [line for line in after if line not in before] != []
+    assert [line for line in after if line in before] == before  # all are there, in order
+    assert book.sheet() == replace(
+        make_sheet(), trials=tuple(trial if t.number == 2 else t for t in make_sheet().trials)
+    )
+    assert "Ärger" in path.read_text()
+    book.record(2, again=True, outcome="not_attempted", time=trial.time)
+    assert book.sheet().trial(2).note == "" and "# within the trial" in path.read_text()
+
+
+def test_the_same_entry_twice_is_one_and_another_one_is_refused(tmp_path: Path) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    first = book.record(1, outcome="slipped", operator="Ada")
+    assert book.record(1, outcome="slipped", operator="Ada") == first
+    assert len(book.entries()) == 1
+    with pytest.raises(InvalidInputError, match=r"trial 1 has outcome 'slipped' already"):
+        book.record(1, outcome="lifted")
+    more = book.record(1, note="more is known", robot={"width_mm": 41.5})
+    assert (more.outcome, more.time) == (first.outcome, first.time)
+    with pytest.raises(InvalidInputError, match="has robot already"):
+        book.record(1, robot={"width_mm": 40.0})
+    assert book.record(1, robot={"effort_n": 30.0}).robot == RobotReport(width_mm=41.5, effort_n=30)
+    right = book.record(1, correct=True, outcome="lifted")
+    assert (right.operator, right.note) == ("Ada", "more is known")
+    once_more = book.record(1, again=True, outcome="dropped")
+    assert (once_more.operator, once_more.note, once_more.robot) == ("", "", None)
+    assert [entry.after.get("outcome") for entry in book.entries()] == [
+        *("slipped", "slipped", "slipped", "lifted", "dropped")
+    ]
+    assert book.record("next", outcome="lifted").number == 2
+    with pytest.raises(TrialChanged, match="trial 1 was changed meanwhile") as caught:
+        book.record(1, expected=first, correct=True, outcome="lifted")
+    assert caught.value.trial == once_more
+    assert book.record(1, expected=once_more, note="so it is").note == "so it is"
+
+
+def test_an_old_buffer_loses_nothing_and_an_edit_is_kept(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path)
+    book = TrialBook(path)
+    book.record(1, outcome="lifted")
+    buffer = path.read_text()
+    book.record(2, outcome="slipped", note="wet")
+    book.record(3, outcome="lifted")
+    edited = buffer.replace("- number: 3\n", "- number: 3\n    outcome: dropped\n")
+    path.write_text(edited)
+    lost = {found.number: found for found in book.lacking()}
+    assert lost[2].values.keys() == {"outcome", "note", "time"}
+    assert lost[3].edited == ("outcome",) and "outcome" not in lost[3].values
+    book.restore([2])
+    assert book.sheet().trial(2).note == "wet"
+    assert [found.number for found in book.lacking()] == [3]
+    before = path.read_text()
+    book.keep()
+    assert book.lacking() == [] and path.read_text() == before
+    path.write_text(edited)
+    book.restore()
+    assert book.sheet().trial(2).note == "wet"
+    assert book.sheet().trial(3).outcome is RealOutcome.DROPPED
+
+
+def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path)
+    TrialBook(path).record(1, outcome="lifted")
+    path.write_text(path.read_text().replace("mug-0001", "mug-0f01"))
+    assert TrialBook(path).lacking() == []
+
+
+TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=40)
+PLAIN = st.text("abc: #'\"-{}[]&*!|>%@`,?\n\t~äß€ 7", max_size=60)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    note=TEXTS | PLAIN,
+    second=PLAIN,
+    comment=st.text("abc #:'\"ä{}[]-", max_size=30),
+    blank=st.integers(0, 2),
+    newline=st.sampled_from(["\n", "\r\n"]),
+    first=st.sampled_from(["number", "note", "block"]),
+)
+def test_any_note_survives_any_layout(
+    note: str, second: str, comment: str, blank: int, newline: str, first: str
+) -> None:
+    plain = plain_data(make_sheet(3))
+    head = {first: {**plain["trials"][1], "note": second}[first]}
+    plain["trials"][1] = head | plain["trials"][1] | {"note": second}
+    lines = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True).splitlines()
+    at = next(i for i, line in enumerate(lines) if "number: 3" in line)
+    lines[at:at] = [""] * blank + [f"# {comment}"]
+    text = newline.join(lines) + newline
+    sheet = parse_document(text, TrialSheet, "text")
+    assert sheet.trial(2).note == second  # what was written is what is read
+    for wanted in (
+        replace(sheet.trial(2), note=note, outcome=RealOutcome.SLIPPED),
+        replace(sheet.trial(2), note="", robot=RobotReport(width_mm=1.5)),
+        make_sheet(3).trial(2),
+    ):
+        text = with_trial(text, "text", parse_document(text, TrialSheet, "text"), wanted)
+        found = parse_document(text, TrialSheet, "text")
+        assert found.trials == (sheet.trial(1), wanted, sheet.trial(3))
+        end = newline.join(["", *lines[at + blank :], ""])  # all from the comment on
+        assert text.endswith(end) and text.count(end) == 1
+
+
+def test_flow_style_can_be_changed_and_an_alias_is_refused(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path)
+    text = path.read_text()
+    at = text.index("  - number: 1")
+    one, rest = text[at:].split("  - number: 2", 1)
+    keys = [line.strip(" -") for line in one.strip().splitlines()]
+    path.write_text(text[:at] + "  - {" + ", ".join(keys) + "} # so\n  - number: 2" + rest)
+    book = TrialBook(path)
+    assert book.record(1, note="a: b, {c}").note == "a: b, {c}"
+    assert "# so" in path.read_text()
+    path.write_text(
+        text.replace("simulated: slipped", "simulated: &s slipped", 1).replace(
+            "number: 3", "note: *s\n    number: 3"
+        )
+    )
+    with pytest.raises(DocumentError, match=r"trials.yaml:\d+: trial 3 is written in a way"):
+        TrialBook(path).record(3, correct=True, note="x")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("note_", "notes", r":\d+: trials\[0\]: unknown key 'notes'; did you mean 'note'\?"),
+        ("number: 2", "number: 1", r":\d+: number 1 is given twice, to trials 1 and 2"),
+        ("stratum: mug", "stratum: mag", r":\d+: there is no stratum 'mag'; did you mean 'mug'\?"),
+        (
+            "run: two\n    gr",
+            "run: too\n    gr",
+            r":\d+: there is no run 'too'; did you mean 'two'",
+        ),
+        ("number: 1", "number: 0", r":\d+: trials\[0\]: number is 0; it has to be 1 at least"),
+        ("block: 1", "time: lunch", r":\d+: trials\[0\]: time is 'lunch'; write it as in 2026"),
+        ("block: 1", "outcome: sliped", r":\d+: .*'sliped' is not valid; did you mean 'slipped'"),
+        ("population: 4", "population: 3", r":\d+: strata.mug: population 3 is less than selected"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_line(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = write_sheet(tmp_path)
+    text = path.read_text().replace("number: 1\n", "number: 1\n    note_: x\n", 1)
+    text = text if old == "note_" else path.read_text()
+    keep = "block: 1\n    " if old.startswith("block") else ""
+    path.write_text(text.replace(old, keep + new, 1))
+    with pytest.raises(DocumentError, match=message):
+        load_trials(path)
+
+
+def test_wrong_calls_are_refused_and_leave_nothing(tmp_path: Path) -> None:
+    path = write_sheet(tmp_path)
+    book, text = TrialBook(path), path.read_text()
+    with pytest.raises(InvalidInputError, match="no outcome 'sliped'; did you mean 'slipped'"):
+        book.record(1, outcome="sliped")
+    with pytest.raises(UnknownNameError, match="no entry 'notes'; did you mean 'note'"):
+        book.record(1, notes="x")
+    with pytest.raises(
+        InvalidInputError, match=r"trials.yaml: there is no trial 9; they have 1 to"
+    ):
+        book.record(9, outcome="lifted")
+    with pytest.raises(InvalidInputError, match="NUL"):
+        book.record(1, note="a\0b")
+    with pytest.raises(InvalidInputError, match="below 0"):
+        book.record(1, robot={"width_mm": -1.0})
+    assert path.read_text() == text and book.entries() == []
+    assert not [name for name in os.listdir(tmp_path) if name.endswith(".jsonl")]
+
+
+def test_the_example_of_the_document_is_a_sheet() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs" / "trials.md"
+    example = page.read_text(encoding="utf-8").split("```yaml\n", 1)[1].split("```", 1)[0]
+    trial = parse_document(example, TrialSheet, "docs/trials.md").trial(17)
+    assert trial.outcome is RealOutcome.SLIPPED and trial.placement["mug"].turn_deg == 0.8

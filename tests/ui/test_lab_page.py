@@ -1,0 +1,62 @@
+"""The page of the lab in a real browser: what is clicked is never lost."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from burg_drake.core.outcome import RealOutcome
+from burg_drake.experiment.trials.entries import journal_path, read_entries
+from burg_drake.experiment.trials.sheet import load_trials
+from tests.apps.test_lab_server import free_port, kill, serve_again, start
+from tests.experiment.pages.conftest import made as made
+from tests.experiment.pages.conftest import trials as trials
+
+
+def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> None:
+    port = free_port()
+    process = start(trials, port)
+    saved, number = page.locator("#saved"), page.locator("#number")
+    page.goto(f"http://127.0.0.1:{port}/")
+    expect(saved).to_have_text("All saved")
+    expect(number).to_have_text("1")
+    page.fill("#operator", "AB")
+    page.fill("#note", "<b>wet</b> & cold")
+    page.wait_for_timeout(700)  # clicks right after a trial comes up do not count
+    page.click('[data-outcome="slipped"]')
+    expect(number).to_have_text("2")
+    expect(saved).to_have_text("All saved")
+    kill(process)
+    trial = load_trials(trials).trial(1)
+    assert (trial.outcome, trial.note) == (RealOutcome.SLIPPED, "<b>wet</b> & cold")
+
+    page.wait_for_timeout(700)
+    page.keyboard.press("1")  # lifted, with nobody to hear it
+    expect(number).to_have_text("3")
+    expect(saved).to_contain_text("1 entry is kept here")
+    kept = page.evaluate("() => JSON.stringify(localStorage)")
+    assert [
+        json.loads(v)["entry"]["outcome"] for k, v in json.loads(kept).items() if " entry " in k
+    ]
+    assert load_trials(trials).trial(2).outcome is None
+
+    server = serve_again(trials, port)
+    try:
+        expect(saved).to_have_text("All saved")
+        trial = load_trials(trials).trial(2)
+        assert (trial.outcome, trial.operator) == (RealOutcome.LIFTED, "AB")
+        page.click("#undo")  # the last one, which is shown then
+        expect(number).to_have_text("2")
+        expect(page.locator("#entered")).to_have_text("How did it end?")
+        expect(saved).to_have_text("All saved")
+        assert load_trials(trials).trial(2).outcome is None
+        told = [(e.number, e.after.get("outcome")) for e in read_entries(journal_path(trials))]
+        assert told == [(1, "slipped"), (2, "lifted"), (2, None)]
+        page.locator(".chips button").first.click()
+        expect(page.locator("#entered")).to_contain_text("Entered: slipped, AB")
+        expect(page.locator("#note")).to_have_value("<b>wet</b> & cold")
+    finally:
+        server.shelf.close()
+        server.close()
