@@ -50,6 +50,7 @@ __all__, __getattr__, __dir__ = attach(
         "burg_drake.evaluation.sampled_set": ["sample_grasps"],
         "burg_drake.evaluation.sampling_settings": ["SamplingSettings"],
         "burg_drake.evaluation.scored_set": ["scored_set"],
+        "burg_drake.evaluation.cluster.dask_executor": ["DaskExecutor", "connect_cluster"],
         "burg_drake.evaluation.executor": ["Executor", "LocalExecutor"],
         "burg_drake.experiment.gap.changes": ["gap_changes"],
         "burg_drake.experiment.gap.ladder": ["measure_gap"],
