@@ -3,7 +3,7 @@
 The run is synthetic: scenes that differ in one pose, random grasps, random verdicts with the
 margins of real ones; it is written by the program's own writers, without reports and tables.
 
-    python benchmarks/many_scenes.py --scenes 1000 --grasps 1000 -o /tmp/many
+    python benchmarks/many_scenes.py --scenes 1000 --grasps 1000 --merge -o /tmp/many
 """
 
 from __future__ import annotations
@@ -170,7 +170,8 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=1000)
     parser.add_argument("--grasps", type=int, default=1000)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--ask", action="store_true")
+    parser.add_argument("--ask", action="store_true", help="of the run that is there")
+    parser.add_argument("--merge", action="store_true", help="of two shards, too")
     arguments = parser.parse_args()
     whole = arguments.output / "whole"
     if arguments.ask:
@@ -179,13 +180,15 @@ def main() -> None:
     if not whole.exists():
         size = arguments.scenes, arguments.grasps
         timed("write", lambda: write(whole, *size, None))
-        for k in (1, 2):
+        for k in (1, 2) if arguments.merge else ():
             write(arguments.output / f"shard{k}", *size, Shard(k, 2))
     journals = sum(path.stat().st_size for path in whole.glob("scenes/*/journal.jsonl"))
     parts = sum(path.stat().st_size for path in (whole / "parts").iterdir())
     print(f"journals {journals / 2**20:,.0f} MiB, parts {parts / 2**20:,.0f} MiB")
     command = [sys.executable, __file__, "--ask", "-o", str(arguments.output)]
     subprocess.run(command, check=True)
+    if not arguments.merge:
+        return
     from burg_drake.evaluation.merge import merge_runs
 
     merged = arguments.output / "merged"

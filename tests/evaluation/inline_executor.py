@@ -28,9 +28,9 @@ class Inline:
     judged: int = 0
 
     def judge(
-        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+        self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
-        for job in jobs:
+        for job in filter(None, jobs):
             candidates = list(job.candidates)
             random.Random(self.seed).shuffle(candidates)
             try:

@@ -37,8 +37,8 @@ def scenes(scene: Scene, tmp_path: Path, request: pytest.FixtureRequest) -> list
     `reports`, pages take no time."""
     if "reports" not in request.fixturenames:
         patch = request.getfixturevalue("monkeypatch")
-        for place in ("preparation.write_report", "many_scenes.write_campaign_report"):
-            patch.setattr(f"burg_drake.evaluation.{place}", write_nothing)
+        patch.setattr("burg_drake.evaluation.preparation.write_report", write_nothing)
+        patch.setattr("burg_drake.evaluation.many_scenes.renew_report", lambda campaign: None)
         patch.setattr("burg_drake.evaluation.merge_campaigns.write_campaign_report", write_nothing)
     document = scene.document
     moved = replace(document.instances[0], X_SO=Pose((0.12, 0.2, 0.025)))

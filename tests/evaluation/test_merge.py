@@ -58,7 +58,7 @@ def test_shards_of_one_scene(
     for k, shard in enumerate(shards):
         assert shard.complete and shard.document.hash == whole.document.hash
         assert shard.results["id"].tolist() == whole.candidates.id[k::3]
-        assert f"shard {k + 1} of 3" in shard.report_path.read_text()
+        assert f"This is shard {k + 1} of 3" in shard.report_path.read_text()
         assert f"shard {k + 1}/3:" in (shard.path / "results.csv-metadata.json").read_text()
     merged = unite([shard.path for shard in reversed(shards)], tmp_path / "merged")
     assert merged.notes == () and isinstance(merged.result, Run)
