@@ -29,11 +29,10 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "evaluation"))
-from known_judge import KnownJudge, Make
+from known_judge import Make, TimedJudge
 
-from burg_drake.core.outcome import Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.dask_executor import connect
+from burg_drake.evaluation.cluster.dask_executor import connect_cluster
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 
 SLOWEST = 1800.0
@@ -165,25 +164,28 @@ def table(folder: Path) -> dict[str, Any]:
 
 def overhead(workers: int) -> None:
     """Measures what is lost between trials."""
-    with connect(f"local:{workers}") as cluster:
+    with connect_cluster(f"local:{workers}") as cluster:
         for name, executor in (("cluster", cluster), ("local pool", LocalExecutor(workers))):
             lost(name, executor, workers)
 
 
 def lost(name: str, executor: Executor, workers: int) -> None:
+    """Prints how long the workers were idle."""
     grasps = [Candidate(f"cube-{k:05d}", "cube", np.eye(4)) for k in range(160 * workers)]
-    job = Job("sleep", Make(KnownJudge(pause=TRIAL)), grasps)
-    ends, slept = [], 0
-    for _, _, verdict in executor.judge([job]):
-        ends.append(time.monotonic())
-        slept += verdict.stage is Stage.EXECUTED
-        if len(ends) == 1:
-            began, first = ends[0], slept
-    share = TRIAL * (slept - first) / workers
-    took = ends[-1] - began
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "trials"
+        job = Job("sleep", Make(TimedJudge(pause=TRIAL, trials=log)), grasps)
+        for _ in executor.judge([job]):
+            pass
+        trials = [tuple(map(float, line.split())) for line in log.read_text().splitlines()]
+    busy = sum(end - begin for _, begin, end in trials)
+    by_process = [[t for t in trials if t[0] == process] for process in {t[0] for t in trials}]
+    spans = [max(end for *_, end in own) - min(own)[1] for own in by_process]
+    whole = max(end for *_, end in trials) - min(begin for _, begin, _ in trials)
     print(
-        f"{name}, {workers} workers, {len(grasps)} grasps: {took:.2f} s from the first verdict on"
-        f" for {share:.2f} s of trials a worker: {100 * (took / share - 1):.1f} %",
+        f"{name}, {workers} workers, {len(grasps)} grasps, {len(trials)} trials of {TRIAL} s:"
+        f" {100 * (sum(spans) / busy - 1):.1f} % idle between trials,"
+        f" {100 * (whole * workers / busy - 1):.1f} % from the first begin to the last end",
         flush=True,
     )
 

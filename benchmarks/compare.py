@@ -33,8 +33,10 @@ from burg_drake.experiment.comparison.matching import match_rows
 from burg_drake.experiment.comparison.measures import MEASURES
 from burg_drake.experiment.comparison.of_runs import pairs_of_runs
 from burg_drake.experiment.comparison.ordered import Ordered
+from burg_drake.experiment.comparison.pairs import NAMES, REFERENCE_NAMES
 from burg_drake.experiment.comparison.ranking import ranking
 from burg_drake.experiment.comparison.resampling import bounds
+from burg_drake.experiment.comparison.table import Table
 
 FIGURES = ("precision", "recall", "specificity", "f1", "accuracy", "matthews", "kappa", "actual")
 
@@ -161,8 +163,10 @@ def _cover_ranking(repeats: int, rng: np.random.Generator) -> None:
 
 def speed(arguments: argparse.Namespace) -> None:
     """Prints wall times."""
-    tables = _made_up(arguments.rows, 0), _made_up(arguments.rows, 0)
-    tables[1]["outcome"] = np.random.default_rng(5).permutation(tables[1]["outcome"])
+    columns = _made_up(arguments.rows, 0)
+    outcomes = np.random.default_rng(5).permutation(columns["outcome"])
+    first = Table.of_columns(columns, NAMES)
+    tables = first, Table.of_columns(columns | {"outcome": outcomes}, REFERENCE_NAMES)
     with _timed(f"{arguments.rows} rows in memory"):
         with _timed("  matching"):
             found = match_rows(*tables)

@@ -36,6 +36,7 @@ HEAVY = {
 }
 # Distributions whose import name is another one.
 IMPORT_NAMES = {
+    "dask-jobqueue": "dask_jobqueue",
     "pillow": "PIL",
     "drake": "pydrake",
     "opencv-python-headless": "cv2",

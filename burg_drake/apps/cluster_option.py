@@ -31,7 +31,7 @@ def chosen_cluster(arguments: argparse.Namespace) -> Iterator[Executor | None]:
     if arguments.cluster is None:
         yield None
         return
-    from burg_drake.evaluation.cluster.dask_executor import connect
+    from burg_drake.evaluation.cluster.dask_executor import connect_cluster
 
-    with connect(arguments.cluster) as executor:
+    with connect_cluster(arguments.cluster) as executor:
         yield executor

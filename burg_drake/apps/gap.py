@@ -33,7 +33,7 @@ from burg_drake.core.errors import InvalidInputError
 if TYPE_CHECKING:
     from burg_drake.evaluation.executor import Executor
     from burg_drake.evaluation.run_store import Run
-    from burg_drake.experiment.gap.ladder import Ladder
+    from burg_drake.experiment.gap.steps import Ladder
     from burg_drake.experiment.trials.sheet import TrialSheet
 
 DEFAULT_GRASPS = 20
@@ -126,7 +126,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     """Judges step by step and reports; 1 if some grasps could not be simulated."""
     from burg_drake.core.files import atomic_write
     from burg_drake.evaluation.run_store import RUN_FILE, load_run
-    from burg_drake.experiment.gap.changes import changes
+    from burg_drake.experiment.gap.changes import gap_changes
     from burg_drake.experiment.gap.report.page import REPORT_FILE, write_gap_report
     from burg_drake.experiment.gap.report.story import story
     from burg_drake.experiment.gap.report.tables import gap_json, reality_view, steps_view
@@ -137,11 +137,11 @@ def run_gap(arguments: argparse.Namespace) -> int:
     of_run = (Path(arguments.source) / RUN_FILE).is_file()
     run = load_run(arguments.source) if of_run else None
     with chosen_cluster(arguments) as cluster:
-        ladder = _climb(arguments, run, sheet, cluster)
+        ladder = _measure(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
     tried = [] if sheet is None else tried_grasps(sheet, ladder.first.document.scene.content)
     agreement = agreement_by_step(ladder, tried, success) if tried else ()
-    found = changes(ladder, success)
+    found = gap_changes(ladder, success)
     line = shlex.join(["burg-drake", *sys.argv[1:]])
     write_gap_report(ladder, success, agreement, line)
     text = json.dumps(gap_json(ladder, found, agreement, success), indent=1) + "\n"
@@ -161,7 +161,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
     return _failures(ladder)
 
 
-def _climb(
+def _measure(
     arguments: argparse.Namespace,
     run: Run | None,
     sheet: TrialSheet | None,
@@ -169,7 +169,7 @@ def _climb(
 ) -> Ladder:
     from burg_drake.core.processes import default_workers
     from burg_drake.evaluation.executor import LocalExecutor
-    from burg_drake.experiment.gap.ladder import climb
+    from burg_drake.experiment.gap.ladder import measure_gap
     from burg_drake.experiment.gap.placement_noise import PlacementNoise
     from burg_drake.scene.scene import load_scene
     from burg_drake.station.station import load_station
@@ -191,14 +191,14 @@ def _climb(
     require_file(arguments)
     if run is not None:
         _require_own(arguments, run)
-        return climb(run, arguments.output, **options)
+        return measure_gap(run, arguments.output, **options)
     require_sampled(arguments)
     scene = load_scene(arguments.source)
     station = load_station(arguments.station or DEFAULT_STATION)
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
     for note in given.notes if given else ():
         print(f"note: {note}", file=sys.stderr)
-    return climb(
+    return measure_gap(
         scene,
         arguments.output,
         station=station,

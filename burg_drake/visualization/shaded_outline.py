@@ -81,10 +81,15 @@ _SURFACES: dict[tuple[str, str, str], Solid] = {}
 
 def footprint(solid: Solid, view: FlatView) -> str:
     """The `d` of what a solid covers of the plane that it stands on."""
+    hull = cv2.convexHull(view.places(grounded(solid)).astype(np.float32))
+    return path_data(hull[:, 0, :])
+
+
+def grounded(solid: Solid) -> Array:
+    """(N, 3) its vertices, moved straight down onto the plane that it stands on [m]."""
     ground = solid.vertices.copy()
     ground[:, 2] = solid.vertices[:, 2].min()
-    hull = cv2.convexHull(view.places(ground).astype(np.float32))
-    return path_data(hull[:, 0, :])
+    return ground
 
 
 def _levels(solids: Sequence[Solid], view: FlatView) -> NDArray[np.uint8]:

@@ -150,6 +150,20 @@ class CrashingJudge(KnownJudge):
 
 
 @dataclass(frozen=True)
+class TimedJudge(KnownJudge):
+    """Writes process, begin and end of each trial to `trials`, by a clock that all share."""
+
+    trials: Path = Path()
+
+    def execute(self, grasp: Candidate) -> Decision:
+        begin = time.monotonic()
+        decision = super().execute(grasp)
+        with self.trials.open("a") as file:
+            file.write(f"{os.getpid()} {begin!r} {time.monotonic()!r}\n")
+        return decision
+
+
+@dataclass(frozen=True)
 class ShortOfMemory(KnownJudge):
     """Some grasps end its process in the stage `executed`, as the system does or by themselves.
 

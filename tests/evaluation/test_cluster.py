@@ -26,7 +26,7 @@ from burg_drake.evaluation.limits import Limits
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect  # noqa: E402
+from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
 
 LIMITS = Limits(cpu=0.5, wall=4.0)
@@ -153,7 +153,7 @@ def test_other_versions_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         patch.syspath_prepend(tmp_path)
         nodes = LocalNodes(1)
     try:
-        with connect(nodes.address) as executor:
+        with connect_cluster(nodes.address) as executor:
             job = Job("job", Make(KnownJudge()), grasps(3))
             other = r"^worker tcp://127\S+ has code of burg_drake \w{12} \(here \w{12}\); verdicts"
             with pytest.raises(ClusterError, match=other):
@@ -168,7 +168,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line() -> None:
     answers = []
     try:
         lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
-        with pytest.raises(ClusterError, match=lost), connect(nodes.address) as executor:
+        with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
             for answer in executor.judge([job]):
                 answers.append(answer)
                 nodes.scheduler.kill()
@@ -181,7 +181,7 @@ DRIVER = """
 import sys
 sys.path.insert(0, {tests!r})
 from test_cluster import *
-with connect("local:2") as executor:
+with connect_cluster("local:2") as executor:
     job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps(400))
     for answer in executor.judge([job]):
         print(answer[1].id, flush=True)
@@ -207,7 +207,7 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
     start = time.monotonic()
     reached = r"^no scheduler of Dask is reached at tcp://127.0.0.1:9 within 1 s: .*refused"
-    with pytest.raises(ClusterError, match=reached), connect("tcp://127.0.0.1:9"):
+    with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass
     assert time.monotonic() - start < 5.0
 

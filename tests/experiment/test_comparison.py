@@ -21,9 +21,11 @@ from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
 from burg_drake.experiment.comparison.matching import match_rows
+from burg_drake.experiment.comparison.pairs import NAMES
 from burg_drake.experiment.comparison.placement import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
+from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.comparison.texts import Factor, text_keys
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
@@ -151,11 +153,14 @@ def test_two_simulators_against_the_same_trials(tmp_path: Path) -> None:
 
 def test_grasps_are_the_same_by_id_and_content(tmp_path: Path) -> None:
     first, second = make_runs(tmp_path)
-    a, b = dict(first.results), dict(second.results)
+    run_only = {name: first.results[name] for name in first.results}
+    missing = {name: np.full(12, np.nan) for name in NAMES if name not in run_only}
+    a, b = run_only | missing, dict(second.results) | missing
     b["x"] = b["x"].copy()
     b["x"][3] += 1e-3
     rows = np.array([5, 4, 3, 2, 1, 0])
-    found = match_rows(a, {name: values[rows] for name, values in b.items()})
+    tables = [Table.of_columns(columns, NAMES) for columns in (a, b)]
+    found = match_rows(tables[0], tables[1].take(rows))
     assert found.other_content == 1 and found.only_first == 6 and found.only_second == 0
     assert (a["id"][found.first] == b["id"][rows][found.second]).all() and len(found.first) == 5
 
@@ -233,6 +238,10 @@ def test_texts_as_numbers() -> None:
     assert Factor.of(many).take(np.array([8999]))[0] == "grasp-2327"
     assert Factor.of(np.broadcast_to("a", 5)).index.tolist() == [0] * 5
     assert Factor.of(np.array([], dtype=str)).names == ()
+    coded = Factor.of_codes(np.array([1, -1, 0]), ["mug", "box"])
+    assert [coded[k] for k in range(3)] == ["box", "", "mug"]
+    assert Factor.of_codes(np.array([1, 0]), ["mug", "box"]).names == ("box", "mug")
+    assert Factor.of_codes(np.array([], dtype=int), []).names == ()
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

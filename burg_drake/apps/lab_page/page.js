@@ -132,7 +132,7 @@ function show(number) {
   if (plan.camera && (!before || before.block !== trial.block)) post("watch", { number });
   render();
   const next = plan.trials.find((one) => one.number > number);
-  if (next) new Image().src = `picture/grasp/${next.number}.jpg`;
+  if (next) new Image().src = pictureOf(`grasp/${next.number}`);  // it is kept for later
 }
 
 function step(by) {
@@ -216,6 +216,8 @@ function renderTroubles() {
   }));
 }
 
+const pictureOf = (name) => `picture/${name}.jpg?plan=${plan.plan}`;
+
 function renderTrial() {
   const trial = trialOf(current);
   $("number").textContent = trial.number;
@@ -226,7 +228,7 @@ function renderTrial() {
   }
   if (view !== "camera") {
     const name = view === "grasp" ? `grasp/${trial.number}` : `${view}/${trial.block}`;
-    const address = `picture/${name}.jpg`;
+    const address = pictureOf(name);
     if ($("picture").getAttribute("src") !== address) $("picture").src = address;
     $("picture").alt = view === "grasp"
       ? `the hand at the grasp of trial ${trial.number}, on ${instance}`
@@ -271,6 +273,11 @@ function clock(time) { return time ? time.slice(11, 16) : ""; }
 
 // --- What the viewer does
 
+$("picture").addEventListener("error", async () => {  // such as while there is no connection
+  const address = $("picture").getAttribute("src");
+  await sleep(2000);
+  if (view !== "camera" && $("picture").getAttribute("src") === address) $("picture").src = address;
+});
 $("previous").addEventListener("click", () => step(-1));
 $("next").addEventListener("click", () => step(1));
 $("undo").addEventListener("click", undo);

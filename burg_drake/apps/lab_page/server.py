@@ -3,7 +3,7 @@
     GET  /                    the page, with its style sheet and scripts
     GET  /plan                JSON: trials in their order, outcomes; does not change
     GET  /states              JSON: what was entered so far; with ?after=VERSION 204 if it is that
-    GET  /picture/NAME.jpg    grasp/NUMBER, above/BLOCK or front/BLOCK
+    GET  /picture/NAME.jpg    grasp/NUMBER, above/BLOCK or front/BLOCK, kept by browsers
     GET  /frame.jpg           the newest picture of the camera; with ?epoch=E&after=N another one
     GET  /camera              JSON, see `LabCamera.status`
     POST /entry               an entry, see `entry_requests`; it is on the disk when this answers
@@ -67,6 +67,8 @@ HEADERS = {
     "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
     " base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 }
+KEPT = "private, max-age=86400"
+"""Of pictures of grasps, whose addresses name the plan."""
 NO_TOKEN = (
     "this page opens by the address with a token that burg-drake printed last; each opens it in one"
     " browser"
@@ -227,7 +229,7 @@ class Handler(BaseHTTPRequestHandler):
         if picture is None:
             fault = self.server.shelf.fault or f"there is no picture {name[:100]}"
             raise RequestError(HTTPStatus.NOT_FOUND, fault)
-        self._send(HTTPStatus.OK, "image/jpeg", picture)
+        self._send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": KEPT})
 
     def _send_frame(self, query: dict[str, str]) -> None:
         after = picture_number(query)

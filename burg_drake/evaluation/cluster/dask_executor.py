@@ -71,7 +71,7 @@ class DaskExecutor:
 
 
 @contextlib.contextmanager
-def connect(cluster: str, limits: Limits | None = None) -> Iterator[DaskExecutor]:
+def connect_cluster(cluster: str, limits: Limits | None = None) -> Iterator[DaskExecutor]:
     """An executor on a cluster, until the block is left.
 
     Args:

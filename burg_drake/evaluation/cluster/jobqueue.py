@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from typing import Any
 
 from burg_drake.core.errors import ClusterError, MissingDependencyError
@@ -39,7 +40,7 @@ def start_jobqueue(cluster: Cluster, security: Any) -> Any:
         import dask_jobqueue
     except ImportError as error:
         raise MissingDependencyError(
-            "jobqueue in a cluster file needs dask-jobqueue: pip install dask-jobqueue"
+            "jobqueue in a cluster file needs dask-jobqueue: pip install burg-drake[dask,jobqueue]"
         ) from error
     if security is None:
         try:
@@ -47,9 +48,15 @@ def start_jobqueue(cluster: Cluster, security: Any) -> Any:
         except ImportError as error:
             raise MissingDependencyError(
                 "a jobqueue without tls files makes certificates of its own, which needs"
-                " cryptography: pip install cryptography, or give tls: {ca, cert, key}"
+                " cryptography: pip install burg-drake[jobqueue], or give tls: {ca, cert, key}"
             ) from error
     make = getattr(dask_jobqueue, CLASSES[document.jobqueue.kind])
+    submit = str(make.job_cls.submit_command).split()[0]
+    if shutil.which(submit) is None:
+        raise ClusterError(
+            f"{document.jobqueue.kind} is not here, as there is no {submit}: run this on a machine"
+            " from which jobs are submitted"
+        )
     try:
         started = make(security=security or True, **parameters(document.jobqueue))
         if document.adapt is not None:

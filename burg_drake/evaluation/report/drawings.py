@@ -24,6 +24,7 @@ from burg_drake.visualization.portrait import best_yaw, camera_rotation
 from burg_drake.visualization.shaded_outline import (
     Solid,
     footprint,
+    grounded,
     shaded_outline,
     surface_of,
 )
@@ -33,8 +34,8 @@ SCENE_ELEVATION = float(np.deg2rad(56.0))
 ELEVATION = float(np.deg2rad(30.0))
 """By which the cameras look down: over a whole scene, and at one object [rad]."""
 PANEL = 220.0
-CAPTION = 22.0
-"""Side of a picture of grasps and height of the line above it [SVG units]."""
+CAPTION, FOOT = 22.0, 16.0
+"""Side of a picture of grasps, heights of the line above it and of its scale [SVG units]."""
 RULER = 0.05
 """Length of the scale in pictures of grasps [m]."""
 NAMED = 16
@@ -112,7 +113,8 @@ def grasp_drawing(name: str, solid: Solid, X_SO: Array, grasps: DrawnGrasps) -> 
     X_WS = make_pose(rot_z(best_yaw(solid.vertices - solid.vertices.mean(axis=0), R_WC)))
     turned = Solid(transform_points(X_WS, solid.vertices), solid.faces)
     corners = grasp_corners(X_WS @ X_SO @ grasps.X_OG, grasps.width)
-    view = fit_view(np.vstack([turned.vertices, corners.reshape(-1, 3)]), R_WC, PANEL, PANEL)
+    everything = np.vstack([turned.vertices, grounded(turned), corners.reshape(-1, 3)])
+    view = fit_view(everything, R_WC, PANEL, PANEL)
     behind = join(
         element("path", d=footprint(turned, view), class_="ground"), *_tones([turned], view)
     )
@@ -137,7 +139,7 @@ def grasp_drawing(name: str, solid: Solid, X_SO: Array, grasps: DrawnGrasps) -> 
     return element(
         "svg",
         *panels,
-        viewBox=f"0 0 {2 * PANEL:g} {PANEL + CAPTION:g}",
+        viewBox=f"0 0 {2 * PANEL:g} {CAPTION + PANEL + FOOT:g}",
         class_="drawing grasps",
         role="img",
         aria_label=f"Grasps on {name}: {counts[0]} lifted it, {counts[1]} did not",
@@ -169,7 +171,7 @@ def _tones(solids: Sequence[Solid], view: FlatView) -> list[Html]:
 
 def _ruler(view: FlatView) -> Html:
     length = RULER * view.scale
-    x, y = PANEL - 8 - length, PANEL - 5
+    x, y = PANEL - 8 - length, PANEL + FOOT - 3
     return element(
         "g",
         element("line", x1=f"{x:.1f}", x2=f"{x + length:.1f}", y1=y, y2=y),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
@@ -104,7 +105,10 @@ def calibrations(
         success: (N,) truth values.
         weight: (N,) what each trial stands for.
     """
-    found = (calibration(name, values, success, weight) for name, values in margins.items())
+    with ThreadPoolExecutor() as pool:  # sorting takes most of the time, and leaves Python alone
+        found = list(
+            pool.map(lambda name: calibration(name, margins[name], success, weight), margins)
+        )
     return tuple(c for c in found if c.bins and c.bins[0].low < c.bins[-1].high)
 
 

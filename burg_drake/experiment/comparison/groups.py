@@ -53,11 +53,14 @@ def by_factor(
     Args:
         pairs: the trials.
         factor: (N,) the column.
-        names: what its texts are called; as they are if None.
+        names: what its texts are called, in the order of the groups; as they are if None.
         seed: of the intervals' resampling.
     """
     counts = grouped(pairs.predicted, pairs.actual, factor.index, len(factor.names))
-    seen = np.flatnonzero(counts.sum(axis=1))
+    seen = np.flatnonzero(counts.sum(axis=1)).tolist()
+    if names:
+        rank = {text: k for k, text in enumerate(names)}
+        seen.sort(key=lambda k: rank.get(factor.names[k], len(rank)))
     found = agreements(counts[seen], seed=seed)
     labels = [factor.names[k] for k in seen]
     return tuple(

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.evaluation.table import Columns
 from burg_drake.experiment.comparison.arrays import Rows, Values
+from burg_drake.experiment.comparison.table import ID, Table
 from burg_drake.experiment.comparison.texts import text_keys
 
-KEY = ("scene_content", "id")
+SCENE = "scene_content"
+KEY = (SCENE, ID)
+_FAR = np.uint64(0x9E3779B97F4A7C15)
 CONTENT = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
 """What makes a grasp, beside its instance, which is a part of its id."""
 SAME = 1e-9
@@ -34,7 +36,7 @@ class Match:
     only_second: int
 
 
-def match_rows(first: Columns, second: Columns) -> Match:
+def match_rows(first: Table, second: Table) -> Match:
     """Finds the grasps that two tables have in common; of equal rows the first one counts."""
     keys = _keys(first), _keys(second)
     if np.array_equal(*keys):
@@ -45,7 +47,7 @@ def match_rows(first: Columns, second: Columns) -> Match:
         one, other = one[order], other[order]
     same = np.ones(len(one), dtype=bool)
     for name in CONTENT:
-        a, b = first[name][one], second[name][other]
+        a, b = first.numbers[name][one], second.numbers[name][other]
         same &= (np.abs(a - b) <= SAME) | (np.isnan(a) & np.isnan(b))
     return Match(
         one[same],
@@ -56,6 +58,6 @@ def match_rows(first: Columns, second: Columns) -> Match:
     )
 
 
-def _keys(columns: Columns) -> Values:
-    scenes, ids = (text_keys(columns[name]) for name in KEY)
-    return ids + scenes * np.uint64(0x9E3779B97F4A7C15)
+def _keys(table: Table) -> Values:
+    scenes = table.texts[SCENE]
+    return text_keys(table.id) + (text_keys(np.array(scenes.names)) * _FAR)[scenes.index]

@@ -9,8 +9,6 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import Columns
-from burg_drake.experiment.comparison.arrays import Rows
 from burg_drake.experiment.comparison.calibration import PROBABILITY
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
@@ -26,7 +24,7 @@ from burg_drake.experiment.comparison.pairs import (
 )
 from burg_drake.experiment.comparison.probability import predicted_probability
 from burg_drake.experiment.comparison.side import Judged, require_common_scene, settings_apart
-from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.trials.sheet import Success
 
 
@@ -41,7 +39,7 @@ def compare_runs(
     """Compares the verdicts of two runs; see `comparison.compare`."""
     sides = Judged.load(first), Judged.load(second)
     require_common_scene(*sides)
-    tables = sides[0].columns(NAMES), sides[1].columns(REFERENCE_NAMES)
+    tables = sides[0].table(NAMES), sides[1].table(REFERENCE_NAMES)
     found = match_rows(*tables)
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))
@@ -72,12 +70,11 @@ def compare_runs(
 
 
 def pairs_of_runs(
-    tables: tuple[Columns, Columns], found: Match, success: Success
+    tables: tuple[Table, Table], found: Match, success: Success
 ) -> tuple[Pairs, dict[str, int]]:
     """Pairs of verdicts of the grasps in common, and what is left out by reason."""
-    one = _rows(tables[0], found.first)
-    ended = Factor.of(_rows({"outcome": tables[1]["outcome"]}, found.second)["outcome"])
-    pairs = make_pairs(one, ended, successes(ended, success), success)
+    ended = tables[1].texts["outcome"].take(found.second)
+    pairs = make_pairs(tables[0].take(found.first), ended, successes(ended, success), success)
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}
     for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
@@ -86,14 +83,6 @@ def pairs_of_runs(
                 left_out[f"{outcome} in the {where}"] = int((rows & keep).sum())
                 keep &= ~rows
     return pairs if keep.all() else pairs.take(keep), left_out
-
-
-def _rows(columns: Columns, rows: Rows) -> Columns:
-    """Some rows of a table; the table itself if they are all of it, in order."""
-    count = len(next(iter(columns.values())))
-    if len(rows) == count and np.array_equal(rows, np.arange(count)):
-        return columns
-    return {name: values[rows] for name, values in columns.items()}
 
 
 def _nothing_in_common(sides: tuple[Judged, Judged], found: Match) -> str:

@@ -18,10 +18,11 @@ from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
 from burg_drake.experiment.comparison.judgement import Judgement, Strata, judgement
 from burg_drake.experiment.comparison.paired import paired
-from burg_drake.experiment.comparison.pairs import Pairs, make_pairs, undecided
+from burg_drake.experiment.comparison.pairs import NAMES, Pairs, make_pairs, undecided
 from burg_drake.experiment.comparison.placement import offsets, placement_agreement
 from burg_drake.experiment.comparison.probability import predicted_probability
 from burg_drake.experiment.comparison.side import Judged, settings_apart, side_of_trials
+from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.comparison.texts import Factor
 from burg_drake.experiment.comparison.tried import find_tried
 from burg_drake.experiment.trials.sheet import (
@@ -120,7 +121,8 @@ def _pairs(
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    return make_pairs({n: v[rows] for n, v in columns.items()}, ended, actual, success)
+    table = Table.of_columns(columns, NAMES).take(rows)
+    return make_pairs(table, ended, actual, success)
 
 
 def _judgement(

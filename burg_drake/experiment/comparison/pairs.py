@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.table import Columns
 from burg_drake.experiment.comparison.arrays import Flags, Values
 from burg_drake.experiment.comparison.calibration import MARGINS
 from burg_drake.experiment.comparison.matching import CONTENT, KEY
+from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.comparison.texts import Factor
 from burg_drake.experiment.trials.sheet import Success, succeeded
 
@@ -68,7 +68,7 @@ class Pairs:
         )
 
 
-def make_pairs(verdicts: Columns, ended: Factor, actual: Flags, success: Success) -> Pairs:
+def make_pairs(verdicts: Table, ended: Factor, actual: Flags, success: Success) -> Pairs:
     """Pairs from rows of results.
 
     Args:
@@ -77,19 +77,19 @@ def make_pairs(verdicts: Columns, ended: Factor, actual: Flags, success: Success
         actual: (N,) whether that is success.
         success: what counts as success.
     """
-    simulated = Factor.of(verdicts["outcome"])
+    texts = verdicts.texts
     return Pairs(
-        id=verdicts["id"],
-        run=Factor.of(verdicts["run"]),
-        scene=Factor.of(verdicts["scene_content"]),
-        object=Factor.of(verdicts["object"]),
-        simulated=simulated,
-        stage=Factor.of(verdicts["stage"]),
-        blocker=Factor.of(verdicts["blocker"]),
+        id=verdicts.id,
+        run=texts["run"],
+        scene=texts["scene_content"],
+        object=texts["object"],
+        simulated=texts["outcome"],
+        stage=texts["stage"],
+        blocker=texts["blocker"],
         ended=ended,
-        predicted=successes(simulated, success),
+        predicted=successes(texts["outcome"], success),
         actual=actual,
-        margins={name: verdicts[name] for name in MARGINS if name in verdicts},
+        margins={name: verdicts.numbers[name] for name in MARGINS},
     )
 
 

@@ -14,7 +14,7 @@ from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.results import open_results, read_results
 from burg_drake.evaluation.run_document import HASH_DIGITS, differences, what_is_asked
 from burg_drake.evaluation.run_store import RUN_FILE, Run, load_run
-from burg_drake.evaluation.table import Columns
+from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.trials.sheet import TrialSheet
 
 MOST_NAMED = 3
@@ -86,9 +86,11 @@ class Judged:
         folders = [Path(self.folders[content]) for content in self.scenes if content in wanted]
         return [load_run(folder) for folder in folders if (folder / RUN_FILE).exists()]
 
-    def columns(self, names: Sequence[str]) -> Columns:
-        """Columns of all judged grasps; see `evaluation.results.read_results`."""
-        return read_results(self.path, names)
+    def table(self, names: Sequence[str]) -> Table:
+        """Columns of all judged grasps; `evaluation.table` says which there are."""
+        if isinstance(self.found, Campaign):
+            return Table.of_rows(self.found.rows(names), names)
+        return Table.of_columns(read_results(self.path, names), names)
 
     @property
     def side(self) -> Side:

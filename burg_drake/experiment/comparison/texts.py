@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.experiment.comparison.arrays import Flags, Values
+from burg_drake.experiment.comparison.arrays import Flags, Rows, Values
 
 SAMPLE = 4096
 """Rows that are looked at first; where they have all texts, nothing needs sorting."""
@@ -61,11 +62,23 @@ class Factor:
         index = np.searchsorted(known, keys).clip(max=max(len(known) - 1, 0))
         if not np.array_equal(known[index], keys) if len(keys) else False:
             known, first, index = np.unique(keys, return_index=True, return_inverse=True)
-        names = texts[first]
+        return cls._sorted(texts[first], index)
+
+    @classmethod
+    def of_codes(cls, codes: Rows, names: Sequence[str]) -> Factor:
+        """From (N,) numbers and the texts that they stand for; -1 stands for an empty one."""
+        empty = codes < 0
+        if not empty.any():
+            return cls._sorted(np.array(names, dtype=np.str_), codes)
+        known = list(names) if "" in names else [*names, ""]
+        return cls._sorted(np.array(known), np.where(empty, known.index(""), codes))
+
+    @classmethod
+    def _sorted(cls, names: NDArray[np.str_], index: Rows) -> Factor:
         order = np.argsort(names)
         rank = np.empty(len(order), dtype=np.intp)
         rank[order] = np.arange(len(order))
-        return cls(tuple(names[order].tolist()), rank[index] if len(keys) else index)
+        return cls(tuple(names[order].tolist()), rank[index] if len(index) else index)
 
     def take(self, rows: Values) -> Factor:
         """The column of some rows."""

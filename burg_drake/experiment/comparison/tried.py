@@ -14,13 +14,11 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.evaluation.run_document import HASH_DIGITS
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import Columns
+from burg_drake.evaluation.table import TEXT, Columns
 from burg_drake.experiment.comparison.pairs import NAMES
 from burg_drake.experiment.comparison.side import Judged, named
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 from burg_drake.experiment.trials.sources import grasp_content
-
-TEXTS = ("scene_content", "id", "object", "outcome", "stage", "blocker", "run")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +109,7 @@ def _nothing_in_common(sheet: TrialSheet, path: Path, side: Judged, missing: Cou
 def _columns(found: Sequence[tuple[int, _Table, int]]) -> Columns:
     columns: Columns = {"trial": np.array([k for k, _, _ in found], dtype=np.intp)}
     for name in NAMES:
-        text = name in TEXTS
+        text = name in TEXT
         missing = "" if text else np.nan
         cells = [
             t.run.results[name][row] if name in t.run.results else missing for _, t, row in found

@@ -94,6 +94,9 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     who, other = ("simulator promises", "the robot achieved")
     if comparison.kind == "runs":
         who, other = "first run sees", "the second"
+    elif comparison.other is not None:
+        which = "second" if judged is comparison.other else "first"
+        who = f"{which} simulator promises"
     return (
         f"The {who} {size} {other} {interval(b.difference, percent=True)}: {b.only_first:,}"
         f" predicted successes did not come true, {b.only_second:,} came about against the"

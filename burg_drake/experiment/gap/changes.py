@@ -11,8 +11,8 @@ from itertools import pairwise
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.gap.ladder import Ladder, Step, StepName
 from burg_drake.experiment.gap.rejudged import succeeded
+from burg_drake.experiment.gap.steps import Ladder, Step, StepName
 from burg_drake.experiment.trials.sheet import Success
 
 
@@ -84,7 +84,7 @@ class Change:
         return Counter(move.blocker for move in self.lost if move.blocker)
 
 
-def changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
+def gap_changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
     """What each step but the first changes.
 
     Args:

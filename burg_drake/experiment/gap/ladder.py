@@ -15,9 +15,9 @@ gap.html, gap.json     what was found
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -40,83 +40,17 @@ from burg_drake.evaluation.screens import arm_settings
 from burg_drake.experiment.gap.displaced import commanded_candidates
 from burg_drake.experiment.gap.placement_noise import NoisyScene, PlacementNoise, noisy_scene
 from burg_drake.experiment.gap.reach_step import reach_verdicts
+from burg_drake.experiment.gap.steps import GapDocument, Ladder, Step
 from burg_drake.scene.scene import Scene, load_scene, save_scene
 from burg_drake.station.station import Station, load_station
 
-StepName = Literal["hand", "reach", "arm", "placed"]
 DOCUMENT_FILE = "gap.yaml"
 HEADER = "Where grasps are lost, step by step; written by burg-drake gap."
 DEFAULT_SAMPLES = 5
 USUAL_NOISE = PlacementNoise()
 
 
-@dataclass(frozen=True, kw_only=True)
-class GapDocument:
-    """Schema of gap.yaml.
-
-    Attributes:
-        source: hash of the run whose grasps are judged; empty if they were sampled.
-        scene, station: content hashes.
-        last: the last mode.
-        place_mm, turn_deg: standard deviations of the objects' places [mm, degrees].
-        seed: of the places.
-        samples: number of displaced scenes.
-        redrawn: how many places were drawn again, by scene.
-        kept: objects that stay as planned in a scene, as no other place was found.
-        versions: of the software.
-    """
-
-    version: int = 1
-    source: str = ""
-    scene: str
-    station: str
-    last: Mode
-    place_mm: float
-    turn_deg: float
-    seed: int
-    samples: int
-    redrawn: tuple[int, ...] = ()
-    kept: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    versions: dict[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One step.
-
-    Attributes:
-        name: which.
-        runs: one, or one for each displaced scene.
-    """
-
-    name: StepName
-    runs: tuple[Run, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Ladder:
-    """All steps.
-
-    Attributes:
-        path: folder.
-        document: what was asked.
-        steps: in order.
-        tried: further grasps in the displaced scenes of the last step, those of real trials that
-            fail in the last mode.
-    """
-
-    path: Path
-    document: GapDocument
-    steps: tuple[Step, ...]
-    tried: tuple[Run, ...] = ()
-
-    @property
-    def first(self) -> Run:
-        """The run of the hand alone."""
-        return self.steps[0].runs[0]
-
-
-def climb(
+def measure_gap(
     source: Run | Scene | str | Path,
     out: str | Path,
     *,

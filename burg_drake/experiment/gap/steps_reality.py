@@ -9,8 +9,8 @@ import numpy as np
 
 from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.comparison.agreement import Agreement, agreement, matrix_of
-from burg_drake.experiment.gap.ladder import Ladder, StepName
 from burg_drake.experiment.gap.rejudged import succeeded
+from burg_drake.experiment.gap.steps import Ladder, StepName
 from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
 
 

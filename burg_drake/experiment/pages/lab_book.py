@@ -89,11 +89,7 @@ class LabBook:
             DocumentError: it cannot be read, which may pass: somebody may be editing it.
             InvalidInputError: it is another plan by now.
         """
-        return self._read()[0]
-
-    def version(self) -> str:
-        """Changes with the file's contents."""
-        return self._read()[1]
+        return self.sheet_and_version()[0]
 
     def enter(self, entry: LabEntry) -> RealTrial:
         """Writes an entry; it is on the disk when this returns.
@@ -154,7 +150,8 @@ class LabBook:
             for past in self.book.entries()
         )
 
-    def _read(self) -> tuple[TrialSheet, str]:
+    def sheet_and_version(self) -> tuple[TrialSheet, str]:
+        """What the file holds now, and a text that changes with it; raises as `sheet` does."""
         path = Path(self.runs.path)
         try:
             status = path.stat()
@@ -258,7 +255,7 @@ def _place_data(place: ObjectPlace) -> dict[str, Any]:
 def states(lab: LabBook) -> dict[str, Any]:
     """What has been entered so far, for the page; says so if the file cannot be read just now."""
     try:
-        sheet, version = lab.sheet(), lab.version()
+        sheet, version = lab.sheet_and_version()
     except BurgError as error:
         return {"plan": lab.plan, "problem": str(error)}
     entries = [entry_data(trial) for trial in sheet.trials]

@@ -15,61 +15,42 @@ import pytest
 from burg_drake.apps import gap as gap_verb
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.executor import LocalExecutor
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
-from burg_drake.experiment.gap.changes import changes
-from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, Ladder, Step, climb
+from burg_drake.experiment.gap.changes import gap_changes
+from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.experiment.gap.report.sections import push_section
 from burg_drake.experiment.gap.report.tables import gap_json
+from burg_drake.experiment.gap.steps import Ladder, Step
 from burg_drake.experiment.gap.steps_reality import agreement_by_step
 from burg_drake.experiment.trials.sheet import RealTrial
 
-ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
-"""Across the narrow side of the household box, from above."""
-TILT = math.radians(115.0)
-FROM_BELOW = grasp_from_axes((1, 0, 0), (0, math.sin(TILT), -math.cos(TILT)), (0.0, -0.064, 0.19))
-"""At its upper edge, from the side and below: the hand lifts it, but the arm would be in the
-table."""
-GRASPS = np.stack([ABOVE, FROM_BELOW, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
 NONE = PlacementNoise(place=0.0, turn=0.0)
-ASKED: dict[str, Any] = {
-    "grasps": {"box": GraspSet.create(GRASPS, object="box", width=0.06)},
-    "engine": "screening",
-    "executor": LocalExecutor(1),
-    "progress": False,
-}
+ASKED: dict[str, Any] = {"noise": NONE, "executor": LocalExecutor(1), "progress": False}
 
 
 @pytest.fixture(scope="module")
-def by_hand(tmp_path_factory: pytest.TempPathFactory) -> Ladder:
-    """Three grasps by the hand alone, and the same in a scene that is displaced by nothing."""
-    return climb(
-        "tabletop_six",
-        tmp_path_factory.mktemp("gap") / "steps",
-        last="hand",
-        noise=NONE,
-        samples=1,
-        **ASKED,
-    )
+def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Ladder:
+    """The grasps of a run by the hand alone, and in a scene that is displaced by nothing."""
+    out = tmp_path_factory.mktemp("gap") / "steps"
+    return measure_gap(run, out, last="hand", samples=1, **ASKED)
 
 
 @pytest.fixture(scope="module")
-def ladder(by_hand: Ladder) -> Ladder:
+def ladder(run: Run, by_hand: Ladder) -> Ladder:
     """The same folder with one step more."""
-    found = climb("tabletop_six", by_hand.path, last="reach", noise=NONE, samples=0, **ASKED)
+    found = measure_gap(run, by_hand.path, last="reach", samples=0, **ASKED)
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
 def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: Ladder) -> None:
     hand, (run,) = by_hand.first, by_hand.steps[1].runs
-    assert run.document.scene.content == hand.document.scene.content
+    assert hand is not run and run.document.scene.content == hand.document.scene.content
     assert run.candidates.id == hand.candidates.id[:2]
     for id in run.candidates.id:
         assert differences(hand.verdicts[id], run.verdicts[id]) == []
@@ -86,7 +67,7 @@ def test_reach_has_the_bits_of_a_run_of_its_own(ladder: Ladder) -> None:
     outcomes = [reach.verdicts[id].outcome for id in reach.candidates.id]
     assert outcomes == [Outcome.LIFTED, Outcome.ARM_COLLISION, Outcome.COLLISION_TARGET]
     assert hand.verdicts[hand.candidates.id[1]].outcome is Outcome.LIFTED
-    (change, _) = changes(ladder, "lifted")
+    (change, _) = gap_changes(ladder, "lifted")
     assert [move.grasp for move in change.lost] == [hand.candidates.id[1]]
     assert "table" in change.lost[0].blocker
 
@@ -99,7 +80,7 @@ def test_the_page_and_the_figures_tell_the_same(
     assert main(words) == 0
     page = (ladder.path.parent / "again" / "gap.html").read_text()
     assert "Where grasps are lost: tabletop_six on panda_tabletop" in page
-    found = changes(ladder, "lifted")
+    found = gap_changes(ladder, "lifted")
     told = gap_json(ladder, found, (), "lifted")
     assert told["changes"][0]["lost"] == 1 and told["changes"][1]["lost"] == 0
     assert sum(item["count"] for item in told["changes"][0]["flow"]) == 3
@@ -108,12 +89,11 @@ def test_the_page_and_the_figures_tell_the_same(
     assert json.loads(capsys.readouterr().out.split("report ")[-1].split("\n", 1)[1])["steps"]
 
 
-def test_other_steps_are_refused_and_more_scenes_are_not(ladder: Ladder) -> None:
-    run = ladder.steps[0].runs[0]
-    with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '' there"):
-        climb(run, ladder.path, last="hand", noise=NONE, samples=2, progress=False)
+def test_other_steps_are_refused(run: Run, ladder: Ladder) -> None:
+    with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '.*' there"):
+        measure_gap("tabletop_six", ladder.path, last="reach", **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
-        climb("tabletop_six", ladder.path, last="reach", progress=False)
+        measure_gap(run, ladder.path, last="reach", progress=False)
 
 
 def test_options_of_a_scene_are_refused_with_a_run(
@@ -167,7 +147,7 @@ def known(ladder: Ladder) -> Ladder:
 def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
     for run in (step.runs[0] for step in known.steps):
         run.__dict__["candidates"] = [c for c in known.first.candidates if c.id in run.verdicts]
-    reach, placed = changes(known, "lifted")
+    reach, placed = gap_changes(known, "lifted")
     assert (reach.successes, len(reach.lost), len(reach.won)) == (2, 1, 1)
     assert reach.lost[0].after is Outcome.NO_IK and reach.blockers == {"bowl": 1}
     assert (placed.successes, len(placed.lost), len(placed.won)) == (2, 1, 0)

@@ -18,7 +18,6 @@ from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose
-from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor, OnFailure
 from burg_drake.evaluation.journal import decode
 from burg_drake.evaluation.rerun import differences
@@ -52,21 +51,6 @@ def shifted(scene: Scene, name: str, x: float, y: float = 0.0, z: float = 0.0) -
     X = scene.X_SO(name).copy()
     X[:3, 3] += (x, y, z)
     return X
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return evaluate(
-        "tabletop_six",
-        "panda_tabletop",
-        tmp_path_factory.mktemp("rejudge") / "run",
-        only=["box"],
-        grasps_per_object=2,
-        engine="screening",
-        mode="hand",
-        workers=1,
-        progress=False,
-    )
 
 
 @pytest.fixture(scope="module")

@@ -83,7 +83,9 @@ def figure_section(judged: Named) -> Html:
     for key, measure in MEASURES.items():
         cells = [figure_cell(a.figure(key), percent=key in SHARES) for _, a in columns]
         rows.append(element("tr", element("th", measure.name, scope="row"), *cells))
-    return section("Figures", _how(judged), table(head, rows, numbers=range(1, len(head))))
+    return section(
+        "Figures", _how(judged), table(head, rows, numbers=range(1, len(head)), style="figures")
+    )
 
 
 def figure_cell(found: Figure, *, percent: bool) -> Html:
@@ -120,7 +122,7 @@ def _group_row(group: Group) -> Html:
     a = group.agreement
     counts = [
         element("td", count(round(n)), class_="number", data_label=name)
-        for name, n in zip(("trials", *CELLS), (a.trials, *a.cells), strict=True)
+        for name, n in zip(("trials", *map(str.upper, CELLS)), (a.trials, *a.cells), strict=True)
     ]
     shares = [
         element("td", share_mark(found), class_="estimate", data_label=name)

@@ -37,7 +37,7 @@ def margin_section(judged: Judgement) -> Html | None:
         "Do margins tell what will succeed?",
         text,
         element("div", *plots, class_="charts plots"),
-        table(head, rows, numbers=range(1, len(head))),
+        table(head, rows, numbers=range(1, len(head)), style="figures"),
     )
 
 

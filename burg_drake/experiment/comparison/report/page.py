@@ -99,7 +99,9 @@ def _lead(c: Comparison) -> Html:
     first = " (first simulator)" if c.kind == "simulators" else ""
     return element(
         "div",
-        element("p", element("b", headline(c)), f" {bias_words(c)}", class_="lead"),
+        element(
+            "p", element("b", _unbroken(headline(c))), _unbroken(f" {bias_words(c)}"), class_="lead"
+        ),
         tiles(entries),
         element(
             "p",
@@ -109,6 +111,11 @@ def _lead(c: Comparison) -> Html:
             class_="note",
         ),
     )
+
+
+def _unbroken(text: str) -> str:
+    """Keeps per cent signs with their numbers."""
+    return text.replace(" %", "\u00a0%")
 
 
 def _tile(name: str, found: Figure, key: str) -> tuple[str, Child, str]:
@@ -150,7 +157,7 @@ def _named(part: Html | None, name: str) -> Html | None:
     """Says in a section's title which simulator it is about."""
     if part is None or not name:
         return part
-    return Html(part.replace("</h2>", f", {name} simulator</h2>", 1))
+    return Html(part.replace("</h2>", f" ({name} simulator)</h2>", 1))
 
 
 def _difference(c: Comparison) -> Html | None:

@@ -9,8 +9,7 @@ from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.origin import engine_label
 from burg_drake.evaluation.report.html_page import header, html_page, tiles
 from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
-from burg_drake.experiment.gap.changes import Change, changes
-from burg_drake.experiment.gap.ladder import Ladder
+from burg_drake.experiment.gap.changes import Change, gap_changes
 from burg_drake.experiment.gap.report.flow_chart import STYLE
 from burg_drake.experiment.gap.report.sections import (
     change_section,
@@ -20,6 +19,7 @@ from burg_drake.experiment.gap.report.sections import (
     reality_section,
 )
 from burg_drake.experiment.gap.report.story import TITLES, story
+from burg_drake.experiment.gap.steps import Ladder
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
 
@@ -48,7 +48,7 @@ def gap_page(
     ladder: Ladder, success: Success, agreement: Sequence[StepAgreement], command_line: str
 ) -> str:
     """The page as HTML."""
-    found = changes(ladder, success)
+    found = gap_changes(ladder, success)
     document = ladder.first.document
     title = f"{document.scene.name} on {document.station.name}"
     return html_page(

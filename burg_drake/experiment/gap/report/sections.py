@@ -16,9 +16,9 @@ from burg_drake.evaluation.summary import PUSH, pushes
 from burg_drake.evaluation.trial import PUSHED
 from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
-from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
 from burg_drake.experiment.gap.report.story import TITLES, replay_command, words
+from burg_drake.experiment.gap.steps import Ladder
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
 
@@ -63,7 +63,8 @@ def objects_section(ladder: Ladder, success: Success) -> Html:
         cells: list[Child] = [grasps]
         for step, counts in zip(ladder.steps, by_step, strict=True):
             good, all = counts.get(name, (0, 0))
-            cells.append(f"{good} of {all}" if step.name == "placed" else good)
+            share = f"{good} of {all}" if all else "-"
+            cells.append(share if step.name == "placed" else good)
         numbers = [element("td", cell, class_="number") for cell in cells]
         rows.append(element("tr", element("th", name, scope="row"), *numbers))
     return section(

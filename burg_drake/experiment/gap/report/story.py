@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from burg_drake.core.figures import percent
 from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.gap.changes import Change
-from burg_drake.experiment.gap.ladder import GapDocument, Ladder, StepName
 from burg_drake.experiment.gap.rejudged import succeeded
+from burg_drake.experiment.gap.steps import GapDocument, Ladder, StepName
 from burg_drake.experiment.trials.sheet import Success
 
 TITLES: dict[StepName, str] = {

@@ -15,8 +15,8 @@ from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.comparison.record import plain
 from burg_drake.experiment.comparison.wording import interval
 from burg_drake.experiment.gap.changes import Change, successes_by_object
-from burg_drake.experiment.gap.ladder import Ladder
 from burg_drake.experiment.gap.report.story import TITLES, replay_command, story, words
+from burg_drake.experiment.gap.steps import Ladder
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
 

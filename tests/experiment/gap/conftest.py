@@ -1,0 +1,36 @@
+"""A run of the hand alone that all tests of the gap share."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from burg_drake.core.frames import grasp_from_axes, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run_store import Run
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+TILT = math.radians(115.0)
+FROM_BELOW = grasp_from_axes((1, 0, 0), (0, math.sin(TILT), -math.cos(TILT)), (0.0, -0.064, 0.19))
+"""At its upper edge, from the side and below: the hand lifts it, but the arm would be in the
+table."""
+GRASPS = np.stack([ABOVE, FROM_BELOW, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Of the household box: lifted; lifted where no arm comes; within the box."""
+    return evaluate(
+        "tabletop_six",
+        "panda_tabletop",
+        tmp_path_factory.mktemp("gap_source") / "run",
+        grasps={"box": GraspSet.create(GRASPS, object="box", width=0.06)},
+        engine="screening",
+        mode="hand",
+        workers=1,
+        progress=False,
+    )

@@ -1,0 +1,61 @@
+"""Runs over several scenes compared: as each of their runs alone, put together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.outcome import Outcome
+from burg_drake.core.schema import Pose
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.experiment.comparison.comparison import compare
+from burg_drake.scene.scene import save_scene
+from burg_drake.station.station import load_station
+from tests.evaluation import known_judge
+from tests.evaluation.inline_executor import Inline
+from tests.evaluation.known_scene import write_scene
+
+pytest.importorskip("pyarrow")
+
+
+def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    document, paths = write_scene(tmp_path).document, []
+    for k, name in enumerate(("here", "there")):
+        place = replace(document.instances[0], X_SO=Pose((0.1 + 0.01 * k, 0.2, 0.025)))
+        instances = (place, *document.instances[1:])
+        paths.append(tmp_path / f"{name}.yaml")
+        save_scene(replace(document, name=name, instances=instances), paths[-1])
+    options = {"grasps_per_object": 6, "blind": True, "progress": False, "executor": Inline()}
+    station = load_station("panda_tabletop")
+    known_judge.install(monkeypatch.setattr)
+    first = evaluate(paths, station, tmp_path / "first", **options)
+    monkeypatch.setattr(known_judge, "expected", _other)
+    second = evaluate(paths, station, tmp_path / "second", engine="screening", **options)
+    whole = compare(first, second.path)
+    parts = [compare(first.run(name), second.run(name)) for name in ("here", "there")]
+    assert whole.coverage.compared == sum(p.coverage.compared for p in parts) == 36
+    assert [g.name for g in whole.judgement.scenes] == ["here", "there"]
+    found = [g.agreement.cells for g in whole.judgement.scenes]
+    assert found == [p.judgement.selected.cells for p in parts]
+    for cell in ("tp", "fp", "fn", "tn"):
+        alone = [getattr(p.judgement.selected, cell) for p in parts]
+        assert getattr(whole.judgement.selected, cell) == sum(alone)
+    assert whole.judgement.selected.fp > 0 and whole.judgement.selected.tp > 0
+    one = compare(first, second.run("there"))
+    assert one.judgement.selected == parts[1].judgement.selected
+    assert one.coverage.only_first == 18
+    assert {text.split()[0] for text in whole.settings} == {"engine"}
+    replays = {line for d in whole.judgement.disagreements for line in d.replays}
+    assert all(str(tmp_path) in line for line in replays)
+
+
+_first = known_judge.expected
+
+
+def _other(id: str) -> Outcome:
+    """Every third grasp that was lifted slips."""
+    outcome = _first(id)
+    slips = outcome is Outcome.LIFTED and known_judge.number(id) % 3 == 0
+    return Outcome.SLIPPED if slips else outcome
