@@ -24,6 +24,7 @@ from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
+from burg_drake.evaluation.part_writer import keep_parts
 from burg_drake.evaluation.preparation import finish_run, open_grasps, open_run
 from burg_drake.evaluation.preparation import require_sound as _require_sound
 from burg_drake.evaluation.request import Given, Request, names
@@ -224,7 +225,9 @@ def _evaluate_one(
         left = open_grasps(run, retry_failed=request.retry_failed)
         if left:
             run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
-        return finish_run(run, request.table)
+        run = finish_run(run, request.table)
+        keep_parts(run)
+        return run
 
 
 def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: Reporter) -> Run:

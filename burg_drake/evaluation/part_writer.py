@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,12 @@ from burg_drake.evaluation.part_store import (
     with_instances,
 )
 from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.segments import Segment, chain, segment_of, whole_lines
+from burg_drake.evaluation.segments import Segment, chain, line_end, segment_of, whole_lines
 
 PART_ROWS = 50_000
 """Rows of a part: few enough to be made in a second or two, enough that parts are few."""
+STRETCH = 32 << 20
+"""Bytes of a journal whose rows are made at a time; a row has some hundred."""
 
 
 class PartWriter:
@@ -73,14 +76,17 @@ class PartWriter:
         """Takes what the journal of a scene has beyond the parts."""
         place = self._places[scene]
         begin, end = self._ends.get(scene, 0), whole_lines(place.journal)
-        if end <= begin:
-            return
-        table = segment_table(run or load_run(place.folder), begin, end)
-        segment = segment_of(scene, place.journal, begin, end, table.num_rows)
-        self._pending.append((with_instances(table, self._instances), segment))
-        self._ends[scene] = end
-        if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
-            self.flush()
+        if end > begin and run is None:
+            run = load_run(place.folder)
+        while begin < end:
+            assert run is not None
+            upto = min(end, line_end(place.journal, min(end, begin + STRETCH)))
+            table = segment_table(run, begin, upto)
+            segment = segment_of(scene, place.journal, begin, upto, table.num_rows)
+            self._pending.append((with_instances(table, self._instances), segment))
+            self._ends[scene] = begin = upto
+            if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
+                self.flush()
 
     def flush(self) -> None:
         """Writes what was taken."""
@@ -162,3 +168,13 @@ class PartWriter:
             for segment in kept if table is None else ():  # damaged: made again
                 self._ends[segment.scene] = min(self._ends[segment.scene], segment.begin)
             part.path.unlink(missing_ok=True)
+
+
+def keep_parts(run: Run) -> None:
+    """Keeps parts of a run of one scene, if it is so large that they matter and pyarrow is
+    installed."""
+    if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
+        return
+    writer = PartWriter(run.path, [Place("", run.path)], ())
+    writer.catch_up()
+    writer.close()

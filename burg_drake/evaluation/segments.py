@@ -97,6 +97,13 @@ def whole_lines(journal: Path) -> int:
     return 0
 
 
+def line_end(journal: Path, place: int) -> int:
+    """Where the line ends that a byte of a journal is in."""
+    with open_regular(journal) as stream:
+        stream.seek(place)
+        return place + len(stream.readline())
+
+
 def _hash(stream: BinaryIO, begin: int, end: int) -> str:
     digest = hashlib.blake2b(digest_size=12)
     stream.seek(begin)

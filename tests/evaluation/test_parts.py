@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from inline_executor import Inline
-from test_many_scenes import run_all, same, scenes
+from test_many_scenes import OPTIONS, run_all, same, scenes
 
 from burg_drake.evaluation import part_writer
 from burg_drake.evaluation.campaign import Campaign, load_campaign
+from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.part_writer import PartWriter
+from burg_drake.evaluation.results import read_results
 from burg_drake.evaluation.run_store import load_run
 from burg_drake.evaluation.table import Columns
 from burg_drake.station.station import Station
@@ -144,3 +146,15 @@ def test_kills_at_every_byte(
             again = run_all(scenes, station, tmp_path / "all", executor=Inline(seed=length))
             assert same(whole, again.results) and again.complete
             file.write_bytes(data) if path.endswith("jsonl") and "scenes/" not in path else None
+
+
+def test_a_large_run_of_one_scene(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    monkeypatch.setattr(part_writer, "PART_ROWS", 7)
+    monkeypatch.setattr(part_writer, "STRETCH", 2000)
+    run = evaluate(scenes[1], station, tmp_path / "one", executor=Inline(), **OPTIONS)
+    assert len(list((run.path / "parts").iterdir())) == 2
+    assert same(run.results, read_results(run.path))
+    names = ["outcome", "slip", "none"]
+    assert list(read_results(run.path, names)) == names
