@@ -75,6 +75,21 @@ def test_success_and_failure_are_balanced_as_far_as_there_are_enough(hand: Run) 
     assert {s.population for s in held.strata.values() if s.object == "mug"} == {15, 3}
 
 
+def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
+    tmp_path: Path,
+) -> None:
+    lifted = [ended("lifted")] * 4
+    run = make_run(tmp_path / "run", make_scene(tmp_path), {"mug": lifted, "box": lifted})
+    assert plan_trials(run, per_object=4).notes == (
+        "box, mug of run two: 0 of 2 with failure; others make up for it",
+        "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
+        " predicted",
+    )
+    verdicts = {"mug": lifted, "box": [ended("slipped")]}
+    mixed = make_run(tmp_path / "mixed", make_scene(tmp_path), verdicts)
+    assert not any("almost nothing" in note for note in plan_trials(mixed, per_object=4).notes)
+
+
 def test_strata_by_outcome_and_without_any(hand: Run) -> None:
     sheet = plan_trials(hand, per_object=6, balance="stage", among="clear")
     labels = {s.label: s.population for s in sheet.strata.values() if s.object == "mug"}

@@ -14,8 +14,9 @@ import numpy as np
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.trials.pool import Pool
-from burg_drake.experiment.trials.sheet import Selection, Stratum
+from burg_drake.experiment.trials.sheet import Selection, Stratum, succeeded
 from burg_drake.experiment.trials.strata import (
     FAILURE,
     SUCCESS,
@@ -29,6 +30,10 @@ Chosen = list[tuple[Pool, int, str]]
 """Grasps with the key of their stratum; a number is a place in the pool."""
 MOST_NOTES = 20
 """Of the same kind; more than these are counted."""
+RARE = 0.1
+"""Share of the trials below which there are almost none of a class."""
+Shortfalls = defaultdict[str, list[tuple[str, str]]]
+"""Runs and objects by what they lack."""
 
 
 def drawn_scenes(pools: list[Pool], selection: Selection) -> list[Pool]:
@@ -47,7 +52,7 @@ def choose(
     """Strata, the grasps chosen, and notes about what is missing."""
     strata: dict[str, Stratum] = {}
     chosen: Chosen = []
-    short: list[str] = []
+    short: Shortfalls = defaultdict(list)
     unknown = 0
     for pool in pools:
         labels = labels_of(pool, selection, lambda run: robustness_of(run, table))
@@ -60,18 +65,44 @@ def choose(
             if selection.balance == "outcome":
                 members[SUCCESS], members[FAILURE]  # also without any
             if not members:
-                short.append(f"{held} of run {pool.key}: no grasp to choose from")
+                short["no grasp to choose from"].append((pool.key, held))
                 continue
             found = _strata(pool, held, members, selection)
             strata |= found
-            short += _shortfalls(found, selection.per_object)
+            for kind in _shortfall(found, selection.per_object):
+                short[kind].append((pool.key, held))
             for key, stratum in found.items():
                 ranked = _ranked(pool, members[stratum.label], selection.seed)
                 chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
     notes = [f"{unknown} grasps have no {_balanced(selection)}; left out"] if unknown else []
-    if len(short) > MOST_NOTES:
-        short = [*short[:MOST_NOTES], f"and {len(short) - MOST_NOTES} more such shortfalls"]
-    return strata, chosen, notes + short
+    lines = [f"{_objects_text(where)}: {kind}" for kind, where in short.items()]
+    if len(lines) > MOST_NOTES:
+        lines = [*lines[:MOST_NOTES], f"and {len(lines) - MOST_NOTES} more such shortfalls"]
+    return strata, chosen, notes + lines + _rare_class(chosen, selection)
+
+
+def _objects_text(where: Sequence[tuple[str, str]]) -> str:
+    """Objects of runs, run by run; of many the first ones."""
+    by_run: defaultdict[str, list[str]] = defaultdict(list)
+    for run, held in where[:MOST_NOTES]:
+        by_run[run].append(held)
+    told = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
+    return told + (f" and {len(where) - MOST_NOTES} others" if len(where) > MOST_NOTES else "")
+
+
+def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
+    """A sentence where nearly all that was chosen succeeds, or nearly all fails."""
+    pools = {pool.key: pool for pool, _, _ in chosen}
+    outcomes = {key: pool.cells("outcome") for key, pool in pools.items()}
+    found = [Outcome(str(outcomes[pool.key][k])) for pool, k, _ in chosen]
+    good = [succeeded(outcome, selection.success) for outcome in found]
+    for name, count in (("failures", good.count(False)), ("successes", good.count(True))):
+        if good and count < RARE * len(good):
+            return [
+                f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
+                f" how well {name} are predicted"
+            ]
+    return []
 
 
 def _strata(
@@ -95,8 +126,8 @@ def _strata(
     }
 
 
-def _shortfalls(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
-    """A line about an object that has too few grasps of a stratum, or in all."""
+def _shortfall(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
+    """What an object lacks that has too few grasps of a stratum, or in all; none if nothing."""
     parts = list(strata.values())
     total = sum(stratum.selected for stratum in parts)
     missing = [s for s in parts if s.selected < s.wanted]
@@ -104,7 +135,7 @@ def _shortfalls(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
         return []
     told = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
     rest = "others make up for it" if total == wanted else f"{total} of {wanted} in all"
-    return [f"{parts[0].object} of run {parts[0].run}: {told}; {rest}"]
+    return [f"{told}; {rest}"]
 
 
 def _balanced(selection: Selection) -> str:
