@@ -17,6 +17,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.trials.pool import Pool
 from burg_drake.experiment.trials.sheet import Selection, Stratum, succeeded
+from burg_drake.experiment.trials.shortfalls import Shortfall, shortfall, shortfall_notes
 from burg_drake.experiment.trials.strata import (
     FAILURE,
     SUCCESS,
@@ -28,12 +29,8 @@ from burg_drake.experiment.trials.strata import (
 
 Chosen = list[tuple[Pool, int, str]]
 """Grasps with the key of their stratum; a number is a place in the pool."""
-MOST_NOTES = 20
-"""Of the same kind; more than these are counted."""
 RARE = 0.1
 """Share of the trials below which there are almost none of a class."""
-Shortfalls = defaultdict[str, list[tuple[str, str]]]
-"""Runs and objects by what they lack."""
 
 
 def drawn_scenes(pools: list[Pool], selection: Selection) -> list[Pool]:
@@ -52,7 +49,7 @@ def choose(
     """Strata, the grasps chosen, and notes about what is missing."""
     strata: dict[str, Stratum] = {}
     chosen: Chosen = []
-    short: Shortfalls = defaultdict(list)
+    short: list[Shortfall] = []
     unknown = 0
     for pool in pools:
         labels = labels_of(pool, selection, lambda run: robustness_of(run, table))
@@ -65,29 +62,16 @@ def choose(
             if selection.balance == "outcome":
                 members[SUCCESS], members[FAILURE]  # also without any
             if not members:
-                short["no grasp to choose from"].append((pool.key, held))
+                short.append(Shortfall(pool.key, held, "no grasp to choose from"))
                 continue
             found = _strata(pool, held, members, selection)
             strata |= found
-            for kind in _shortfall(found, selection.per_object):
-                short[kind].append((pool.key, held))
+            short += shortfall(list(found.values()), selection.per_object)
             for key, stratum in found.items():
                 ranked = _ranked(pool, members[stratum.label], selection.seed)
                 chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
     notes = [f"{unknown} grasps have no {_balanced(selection)}; left out"] if unknown else []
-    lines = [f"{_objects_text(where)}: {kind}" for kind, where in short.items()]
-    if len(lines) > MOST_NOTES:
-        lines = [*lines[:MOST_NOTES], f"and {len(lines) - MOST_NOTES} more such shortfalls"]
-    return strata, chosen, notes + lines + _rare_class(chosen, selection)
-
-
-def _objects_text(where: Sequence[tuple[str, str]]) -> str:
-    """Objects of runs, run by run; of many the first ones."""
-    by_run: defaultdict[str, list[str]] = defaultdict(list)
-    for run, held in where[:MOST_NOTES]:
-        by_run[run].append(held)
-    told = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
-    return told + (f" and {len(where) - MOST_NOTES} others" if len(where) > MOST_NOTES else "")
+    return strata, chosen, notes + shortfall_notes(short) + _rare_class(chosen, selection)
 
 
 def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
@@ -124,18 +108,6 @@ def _strata(
         )
         for label in sorted(members)
     }
-
-
-def _shortfall(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
-    """What an object lacks that has too few grasps of a stratum, or in all; none if nothing."""
-    parts = list(strata.values())
-    total = sum(stratum.selected for stratum in parts)
-    missing = [s for s in parts if s.selected < s.wanted]
-    if not missing:
-        return []
-    told = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
-    rest = "others make up for it" if total == wanted else f"{total} of {wanted} in all"
-    return [f"{told}; {rest}"]
 
 
 def _balanced(selection: Selection) -> str:
