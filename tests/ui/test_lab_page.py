@@ -25,12 +25,20 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     page.fill("#operator", "AB")
     page.fill("#note", "<b>wet</b> & cold")
     page.wait_for_timeout(700)  # clicks right after a trial comes up do not count
+    page.fill("#width", "abc")
+    page.click('[data-outcome="slipped"]')
+    expect(page.locator("#widthnote")).to_contain_text("Not a width in mm")
+    expect(page.locator("#width")).to_have_value("abc")
+    expect(number).to_have_text("1")
+    page.fill("#width", "500")
+    expect(page.locator("#widthnote")).to_have_text("The hand opens 80 mm; is 500 right?")
     page.click('[data-outcome="slipped"]')
     expect(number).to_have_text("2")
     expect(saved).to_have_text("All saved")
     kill(process)
     trial = load_trials(trials).trial(1)
     assert (trial.outcome, trial.note) == (RealOutcome.SLIPPED, "<b>wet</b> & cold")
+    assert trial.robot is not None and trial.robot.width_mm == 500.0
 
     page.wait_for_timeout(700)
     page.keyboard.press("1")  # lifted, with nobody to hear it

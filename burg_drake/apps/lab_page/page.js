@@ -19,6 +19,7 @@ let current = 0;
 let shownSince = 0;
 let view = "grasp";
 let camera = null;
+let asked = null;            // for a placement check, which waits for a picture
 let refused = "";            // why the last placement check was not begun
 let history = [];            // own entries that can be undone, the last one at the end
 
