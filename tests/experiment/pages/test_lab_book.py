@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.session import Session
 from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
@@ -154,7 +155,9 @@ def test_the_page_is_not_told_what_was_simulated(lab: LabBook) -> None:
     assert plan_data(told)["trials"][0]["simulated"] == lab.runs.sheet.trials[0].simulated
 
 
-def test_a_photo_and_the_placement_are_kept_before_a_trial(lab: LabBook, trials: Path) -> None:
+def test_a_photo_and_the_placement_are_kept_before_a_trial(
+    lab: LabBook, trials: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     camera = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
     board = lab.runs.of(lab.runs.sheet.trial(5)).scene.board
     photo = board_image(board, camera, make_pose(np.diag([1.0, -1.0, -1.0]), (0.3, 0.21, 0.6)))
@@ -172,6 +175,16 @@ def test_a_photo_and_the_placement_are_kept_before_a_trial(lab: LabBook, trials:
         assert trial.placement["bottle"].status == "not_seen"  # the board is empty
         lab.enter(entry(lab, 5, "lifted"))
         assert load_trials(trials).trial(5).photo == trial.photo
+
+        def broken(*_: object) -> None:
+            raise cv2.error("no such matrix")
+
+        monkeypatch.setattr(Session, "check", broken)
+        over.check(4, keep=True)
+        over.wait_for_check()
+        told = over.status()["check"]
+        assert (told["number"], told["kept"]) == (4, False)
+        assert told["problem"] == "the check failed: error: no such matrix"
     finally:
         over.close()
     with pytest.raises(InvalidInputError, match="carried out already"):
