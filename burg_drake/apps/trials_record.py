@@ -20,6 +20,7 @@ from burg_drake.core.errors import InvalidInputError, quoted
 
 if TYPE_CHECKING:
     from burg_drake.cameras.placement_document import PlacementCheck
+    from burg_drake.experiment.trials.book import TrialBook
     from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 
 OF_PHOTO = ("intrinsics", "depth", "depth_unit", "scene")
@@ -108,12 +109,12 @@ def run_record(arguments: argparse.Namespace) -> int:
         entry |= {"photo": photo} if photo else {}
     if check is not None and found:
         entry["placement"] = object_places(check)
-    recorded = book.record(trial.number, correct=arguments.correct, again=arguments.again, **entry)
+    recorded = _record(book, arguments, trial, entry)
     if arguments.photo and not (arguments.intrinsics or arguments.placement):
         print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
     if arguments.width_mm is not None:
-        _warn_of_width(arguments, sheet, trial)
+        _warn_of_width(arguments, sheet, recorded)
     if check is not None and not found:
         print(
             f"burg-drake: {arguments.photo}: {check.reason}; recorded without placement",
@@ -142,6 +143,27 @@ def _time(text: str) -> str:
     except (ValueError, OverflowError) as error:
         raise argparse.ArgumentTypeError(
             f"{quoted(text)} is no time; give ISO 8601 such as 2026-05-04T16:30"
+        ) from error
+
+
+def _record(
+    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
+) -> RealTrial:
+    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
+    is the one that the evidence is about, or none."""
+    from burg_drake.experiment.trials.book import TrialChanged
+
+    how = {"correct": arguments.correct, "again": arguments.again}
+    if arguments.number != "next":
+        return book.record(trial.number, **how, **entry)
+    if not (arguments.photo or arguments.placement):
+        return book.record("next", **how, **entry)
+    try:
+        return book.record(trial.number, expected=trial, **how, **entry)
+    except TrialChanged as error:
+        kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
+        raise InvalidInputError(
+            f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
         ) from error
 
 

@@ -204,25 +204,6 @@ function say(kind, text) {
   if ($("saved").textContent !== text) $("saved").textContent = text;
 }
 
-function renderTroubles() {
-  const troubled = outbox.troubled;
-  $("troubles").hidden = !troubled.length;
-  $("troubles").replaceChildren(...troubled.map((item) => {
-    const line = make("li"), { entry, trouble } = item;
-    const mine = entry.outcome ? labelOf(entry.outcome) : "taken back";
-    line.append(make("span", "", `Trial ${entry.number}, ${mine}, is not saved: ${trouble.text}. `));
-    const drop = make("button", "", trouble.state ? "Keep theirs" : "Drop it");
-    drop.addEventListener("click", () => outbox.discard(item));
-    line.append(drop);
-    if (trouble.state) {
-      const insist = make("button", "", `Replace by ${mine}`);
-      insist.addEventListener("click", () => outbox.insist(item));
-      line.append(insist);
-    }
-    return line;
-  }));
-}
-
 const pictureOf = (name) => `picture/${name}.jpg?plan=${plan.plan}`;
 
 function renderTrial() {

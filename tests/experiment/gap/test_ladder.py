@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,20 +16,25 @@ import pytest
 from burg_drake.apps import gap as gap_verb
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.core.outcome import Outcome, RealOutcome, Stage
+from burg_drake.evaluation.executor import Job, LocalExecutor
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
+from burg_drake.evaluation.run_document import run_hash
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import gap_changes
 from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
-from burg_drake.experiment.gap.report.sections import push_section
+from burg_drake.experiment.gap.report.sections import change_section, push_section
+from burg_drake.experiment.gap.report.story import story
 from burg_drake.experiment.gap.report.tables import gap_json
 from burg_drake.experiment.gap.steps import Ladder, Step
-from burg_drake.experiment.gap.steps_reality import agreement_by_step
-from burg_drake.experiment.trials.sheet import RealTrial
+from burg_drake.experiment.gap.steps_reality import agreement_by_step, tried_grasps
+from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, TrialSheet
+from burg_drake.experiment.trials.sources import grasp_contents
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import ENGINES
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
 ASKED: dict[str, Any] = {"noise": NONE, "executor": LocalExecutor(1), "progress": False}
@@ -96,6 +102,54 @@ def test_other_steps_are_refused(run: Run, ladder: Ladder) -> None:
         measure_gap(run, ladder.path, last="reach", progress=False)
 
 
+class Killed(Exception):
+    """The end of a process."""
+
+
+class Ending:
+    """Answers one question and is killed."""
+
+    workers = 1
+
+    def judge(self, jobs: Iterable[Job]) -> Iterator[Any]:
+        for job in jobs:
+            yield job, job.candidates[0], Verdict(Outcome.NO_IK, Stage.CLEAR)
+            raise Killed
+
+
+def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) -> None:
+    """Killed within the second step; then comes the same run by another engine."""
+    with pytest.raises(Killed):
+        measure_gap(run, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    journal = tmp_path / "reach" / "journal.jsonl"
+    before = journal.read_bytes()
+    assert before.count(b"\n") == 1
+    document = replace(run.document, engine=ENGINES["standard"], hash="")
+    other = Run(run.path, replace(document, hash=run_hash(document)))
+    with pytest.raises(InvalidInputError, match="steps of something else"):
+        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    (tmp_path / "gap.yaml").unlink()  # which older versions wrote at the end
+    with pytest.raises(InvalidInputError, match=r"holds another run \(engine is"):
+        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    assert journal.read_bytes() == before
+
+
+def test_a_gap_that_came_to_nothing_does_not_take_the_folder(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="overlap"):
+        measure_gap(overlapping(run.scene()), tmp_path, last="hand", samples=0, **ASKED)
+    again = measure_gap(run, tmp_path, last="hand", samples=0, **ASKED)
+    assert again.document.source == run.document.hash
+
+
+def overlapping(scene: Scene) -> Scene:
+    """With the mug where the box is."""
+    there = scene.instance("box").X_SO
+    instances = [
+        replace(i, X_SO=there) if i.object == "mug" else i for i in scene.document.instances
+    ]
+    return replace(scene, document=replace(scene.document, instances=tuple(instances)))
+
+
 def test_options_of_a_scene_are_refused_with_a_run(
     ladder: Ladder, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -156,24 +210,66 @@ def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
     assert (low, high) == pytest.approx((0.0945, 0.9055), abs=1e-4)
 
 
-def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: Ladder) -> None:
+    """The second one, which the first step lost, was ended from outside."""
     one, two, three = known.first.candidates.id
-    real = {one: RealOutcome.LIFTED, two: RealOutcome.SLIPPED, three: RealOutcome.LIFTED}
-    trials = [
+    reach = known.steps[1].runs[0]
+    table = {id: verdict.outcome for id, verdict in reach.verdicts.items()}
+    killed = stated(reach, table | {two: Outcome.SIMULATION_FAILED})
+    steps = (known.steps[0], replace(known.steps[1], runs=(killed,)))
+    (change,) = gap_changes(replace(known, steps=steps), "lifted")
+    assert (change.successes, len(change.lost), len(change.won), change.failed) == (1, 0, 1, 1)
+    assert [move.grasp for move in change.moves] == [one, three]
+    told = "With the arm: 1 could not be simulated here or in the step before, and counts as"
+    assert story(replace(known, steps=steps), (change,), "lifted")[-1].startswith(told)
+    assert told in change_section(change)
+    found = gap_json(replace(known, steps=known.steps[:1]), (change,), (), "lifted")
+    assert found["changes"][0]["not_simulated"] == 1
+
+
+def real_trials(run: Run, *outcomes: RealOutcome) -> list[RealTrial]:
+    """One of each grasp."""
+    contents = grasp_contents(run, run.candidates.id)
+    return [
         RealTrial(
             number=number,
             block=1,
             run="a",
-            grasp=grasp,
-            content="",
+            grasp=id,
+            content=contents[id],
             instance="box",
             object="box",
             simulated=Outcome.LIFTED,
             stratum="all",
             outcome=outcome,
         )
-        for number, (grasp, outcome) in enumerate(real.items(), 1)
+        for number, (id, outcome) in enumerate(zip(run.candidates.id, outcomes, strict=True), 1)
     ]
+
+
+def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
+    document = run.document
+    trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
+    changed = (trials[0], replace(trials[1], content="0123456789ab"))
+    source = SourceRun(
+        path=str(run.path),
+        hash="another",
+        scene=document.scene,
+        station=document.station,
+        mode="hand",
+        engine="screening",
+    )
+    selection = Selection(per_object=1, balance="none")
+    sheet = TrialSheet(runs={"a": source}, selection=selection, trials=changed)
+    assert tried_grasps(sheet, "trials.yaml", run) == trials[:1]
+    own = replace(sheet, runs={"a": replace(source, hash=document.hash)})
+    with pytest.raises(InvalidInputError, match=r"trial 2: grasp .* it had 0123456789ab when"):
+        tried_grasps(own, "trials.yaml", run)
+
+
+def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+    real = (RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED)
+    trials = real_trials(known.first, *real)
     later = replace(trials[0], number=4, outcome=None)
     found = agreement_by_step(known, [*trials, later], "lifted")
     assert [(a.step, *a.found.cells) for a in found] == [

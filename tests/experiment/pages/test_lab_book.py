@@ -19,6 +19,7 @@ from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.outcome import RealOutcome
+from burg_drake.experiment.pages import lab_book
 from burg_drake.experiment.pages.lab_book import (
     EntryConflict,
     LabBook,
@@ -30,7 +31,7 @@ from burg_drake.experiment.pages.lab_book import (
 from burg_drake.experiment.pages.lab_camera import LabCamera
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import load_trials
+from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 
 TIME = "2026-05-05T10:02:11+02:00"
 
@@ -75,6 +76,27 @@ def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
     lab.enter(replace(mine, replaces=state_of(load_trials(trials).trial(1))))
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
+
+
+def test_what_another_program_enters_in_between_is_not_replaced(
+    lab: LabBook, trials: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes after the state was looked at: once a photo, which contradicts nothing."""
+    others = iter([{"photo": "photos/001.png"}, {"outcome": "dropped"}])
+
+    def seen(trial: RealTrial) -> str:
+        state = state_of(trial)
+        for other in others:
+            TrialBook(trials).record(trial.number, **other)
+            break
+        return state
+
+    mine = entry(lab, 1, "lifted")
+    monkeypatch.setattr(lab_book, "state_of", seen)
+    with pytest.raises(EntryConflict, match="changed meanwhile: it has dropped"):
+        lab.enter(mine)
+    trial = load_trials(trials).trial(1)
+    assert (trial.outcome, trial.photo) == (RealOutcome.DROPPED, "photos/001.png")
 
 
 def test_what_is_taken_back_is_as_before(lab: LabBook, trials: Path) -> None:
@@ -198,3 +220,18 @@ def test_an_outcome_that_comes_while_a_check_is_at_work(
     assert over.status()["drawn"] == 6
     over.watch(7)
     assert over.status()["drawn"] == 0
+
+
+def test_a_check_that_fails_says_why(over: LabCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    over.watch(5)
+    assert over.next_picture(0, 0, 30.0) is not None
+
+    def broken(*_: object) -> None:
+        raise cv2.error("no such matrix")
+
+    monkeypatch.setattr(Session, "check", broken)
+    over.check(5, keep=True)
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert (told["number"], told["kept"]) == (5, False)
+    assert told["problem"] == "the check failed: error: no such matrix"
