@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -62,7 +63,7 @@ def test_examples_of_the_help_can_be_parsed(capsys: pytest.CaptureFixture[str]) 
             parser.parse_args([*verb, "--help"])
         for line in capsys.readouterr().out.splitlines():
             if line.startswith("  burg-drake "):
-                parser.parse_args(line.split()[1:])
+                parser.parse_args(shlex.split(line)[1:])
 
 
 def test_help_imports_nothing_heavy() -> None:
