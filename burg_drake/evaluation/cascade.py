@@ -238,7 +238,7 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
-    stretch = begun_now(executor.workers)
+    stretch = begun_now(executor.workers, len(run.verdicts))
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = time.monotonic()
     judged = 0

@@ -22,6 +22,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.campaign import (
     LOCK_FILE,
+    SCENES_FOLDER,
     Campaign,
     is_campaign,
     load_campaign,
@@ -159,9 +160,10 @@ class _Call:
         document = self.campaign.document
         self.expected = self.campaign.expected_by_scene
         there = sum(n for name, n in self.expected.items() if name not in left)
-        event = Progress(STARTING, there, sum(self.expected.values()), outcomes=self._found())
+        found = self._found()
+        event = Progress(STARTING, there, sum(self.expected.values()), outcomes=found)
         self.pace = Pace(self.reporter.show, event, "judging")
-        stretch = begun_now(self.executor.workers)
+        stretch = begun_now(self.executor.workers, found.total())
         stretches = document.stretches
         save_campaign(
             replace(self.campaign, document=replace(document, stretches=(*stretches, stretch)))
@@ -252,7 +254,7 @@ class _Call:
 
     def _found(self) -> Counter[Outcome]:
         """Grasps that were judged before, by outcome."""
-        if not self.ledger.states:
+        if not (self.folder / SCENES_FOLDER).exists():
             return Counter()
         codes, texts = self.campaign.rows(["outcome"]).codes("outcome")
         counts = np.bincount(codes, minlength=len(texts)).tolist()

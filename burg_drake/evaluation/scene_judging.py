@@ -43,6 +43,7 @@ class SceneJudging:
         again = {grasp.id for grasp in self.left}
         self.mine = len(self._run.mine)
         self.known = self.mine - len(self.left)
+        self._before = len(self._run.verdicts)
         # verdicts are not kept: a thousand runs have a million
         self._failed = {
             id: v.interrupted
@@ -61,7 +62,7 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Writes into the run's document that it is worked on."""
-        self._stretch = begun_now(self._workers)
+        self._stretch = begun_now(self._workers, self._before)
         self._begun = time.monotonic()
         self._save(self._stretch)
 
