@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import itertools
 import random
 from pathlib import Path
@@ -124,6 +125,39 @@ def test_grown_journals_and_later_verdicts(campaign: Campaign) -> None:
     table = pyarrow.parquet.read_table(campaign.path / "parts")
     pairs = zip(table.column("run").to_pylist(), table.column("id").to_pylist(), strict=True)
     assert table.num_rows == len(set(pairs)) == 40
+
+
+def test_an_edit_is_noticed_wherever_it_is(campaign: Campaign, monkeypatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.segments.TAIL", 64)
+    journal = campaign.folder("moved") / JOURNAL_FILE
+    data = journal.read_bytes()
+    lines = data.splitlines(keepends=True)
+    cut = sum(map(len, lines[:7]))
+    journal.write_bytes(data[:cut])
+    refresh(campaign)
+    journal.write_bytes(data)
+    for grown in (False, True):  # into a segment of its own
+        if grown:
+            refresh(campaign)
+        for place in (0, 3, 5):
+            edited = lines[place].replace(b'"blocker":"', b'"blocker":"un')
+            journal.write_bytes(b"".join([*lines[:place], edited, *lines[place + 1 :]]))
+            require_true(campaign)
+            same_length = lines[place].replace(b'"slip":0.', b'"slip":1.')
+            journal.write_bytes(b"".join([*lines[:place], same_length, *lines[place + 1 :]]))
+            require_true(campaign)
+        journal.write_bytes(data)
+        refresh(campaign)
+
+
+def test_what_nobody_touched_is_not_read(campaign: Campaign, monkeypatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.segments.TAIL", 64)
+    read = []
+    segments = importlib.import_module("burg_drake.evaluation.segments")
+    hashed = segments._hash
+    monkeypatch.setattr(segments, "_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1])
+    load_campaign(campaign.path).columns(["slip"])
+    assert read and max(read) <= 64
 
 
 def test_kills_at_every_byte(
