@@ -137,6 +137,8 @@ class _Call:
         # a scene whose grasps are shared out knows its share
         self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
         self.judged = 0
+        asked = self.request.scene_reports
+        self.reports = self.campaign.document.has_few_scenes if asked is None else asked
 
     def run(self) -> Campaign:
         """Judges what is left."""
@@ -146,6 +148,7 @@ class _Call:
             tuple(self.campaign.places),
             self.campaign.document.instances,
             self.request.table,
+            self.reports,
         )
         with ExitStack() as stack:
             crew = stack.enter_context(
@@ -275,4 +278,5 @@ class _Call:
             return False
         if self.request.retry_failed and state.failed:
             return False
-        return is_finished(self.campaign.folder(name), state.size, self.request.table)
+        folder = self.campaign.folder(name)
+        return is_finished(folder, state.size, self.request.table, report=self.reports)

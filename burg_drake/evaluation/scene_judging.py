@@ -112,11 +112,12 @@ class SceneJudging:
         save_run(replace(self._run, document=replace(document, stretches=stretches)))
 
 
-def is_finished(folder: Path, size: int, table: str) -> bool:
-    """Whether a run's journal has this size, and its table and report are not older."""
+def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
+    """Whether a run's journal has this size, and its table is not older, nor its report."""
+    names = [f"results.{table}", *([REPORT_FILE] if report else [])]
     try:
         journal = (folder / JOURNAL_FILE).stat()
-        others = [(folder / name).stat() for name in (f"results.{table}", REPORT_FILE)]
+        others = [(folder / name).stat() for name in names]
     except OSError:
         return False
     newer = all(other.st_mtime_ns >= journal.st_mtime_ns for other in others)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from inline_executor import Inline
 from known_judge import expected, refuse
+from page_reading import read_page
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
@@ -19,6 +20,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.report import campaign_page
 from burg_drake.evaluation.results import load_runs, read_results
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import summarize
@@ -206,6 +208,41 @@ def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", made)
     mended = run_all(scenes, station, tmp_path / "all", executor=(executor := Inline()))
     assert mended.complete and not mended.failed and executor.judged == 25
+
+
+def test_of_many_scenes_only_who_asks_gets_reports(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    def reports() -> list[bool]:
+        return [run.report_path.exists() for run in campaign.runs]
+
+    monkeypatch.setattr("burg_drake.evaluation.campaign_document.FEW_SCENES", 2)
+    campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
+    assert campaign.complete and reports() == [False] * 3
+    assert all(run.table_path.exists() for run in campaign.runs)
+    dates = {run.table_path: run.table_path.stat().st_mtime_ns for run in campaign.runs}
+    prepared: list[str] = []
+    monkeypatch.setattr(
+        "burg_drake.evaluation.scene_work.open_run", lambda folder, *_: prepared.append(folder.name)
+    )
+    run_all(scenes, station, tmp_path / "all", grasps_per_object=1)  # has nothing to do
+    assert not prepared and all(p.stat().st_mtime_ns == date for p, date in dates.items())
+    monkeypatch.undo()
+    page = read_page(campaign_page(campaign))
+    assert f"burg-drake report {tmp_path}/all/scenes/" in page.text
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_reports_of_scenes_as_asked(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, asked: bool
+) -> None:
+    campaign = run_all(scenes[:2], station, tmp_path / "all", scene_reports=not asked, only=["bar"])
+    again = run_all(scenes[:2], station, campaign.path, scene_reports=asked, only=["bar"])
+    assert again.run("moved").report_path.exists()  # one that is not out of date stays
+    journal = again.run("moved").path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes()[:-1])
+    run_all(scenes[:2], station, campaign.path, scene_reports=asked, only=["bar"])
+    assert again.run("moved").report_path.exists() == asked
 
 
 def test_names_and_places(
