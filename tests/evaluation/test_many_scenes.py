@@ -41,7 +41,7 @@ def scenes(scene: Scene, tmp_path: Path, request: pytest.FixtureRequest) -> list
         patch = request.getfixturevalue("monkeypatch")
         patch.setattr("burg_drake.evaluation.preparation.write_report", write_nothing)
         patch.setattr("burg_drake.evaluation.many_scenes.renew_report", lambda campaign: None)
-        patch.setattr("burg_drake.evaluation.merge_campaigns.write_campaign_report", write_nothing)
+        patch.setattr("burg_drake.evaluation.merge_finish.write_campaign_report", write_nothing)
     document = scene.document
     moved = replace(document.instances[0], X_SO=Pose((0.12, 0.2, 0.025)))
     folder = tmp_path / "scenes"
