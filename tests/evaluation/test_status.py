@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 from inline_executor import Inline
-from test_many_scenes import OPTIONS, run_all, same, scenes
+from known_many import OPTIONS, run_all, same
 
 from burg_drake.apps.cli import main
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation import part_writer
-from burg_drake.evaluation.campaign import load_campaign
+from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, decode, encode
 from burg_drake.evaluation.journal_tail import tails_of
@@ -30,7 +30,7 @@ from burg_drake.evaluation.status import Watch, read_status
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
-__all__ = ["scenes"]
+pytestmark = pytest.mark.usefixtures("pages")
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -87,11 +87,9 @@ def test_the_rate_is_that_of_the_stretch_under_way(
             assert read_status(out).rate == (None if rate is None else pytest.approx(rate, rel=0.1))
 
 
-def test_parts_are_not_counted_again(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
-) -> None:
+def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(part_writer, "PART_ROWS", 12)
-    campaign = run_all(scenes, station, tmp_path / "all")
+    campaign = load_campaign(shutil.copytree(whole.path, tmp_path / "all"))
     for journal in campaign.path.glob("scenes/[mt]*/journal.jsonl"):
         first, *rest = journal.read_bytes().splitlines(keepends=True)
         id, verdict = decode(first)
@@ -114,7 +112,12 @@ def test_parts_are_not_counted_again(
 
 
 def test_of_a_campaign_that_is_killed(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, capsys
+    scenes: list[Path],
+    whole: Campaign,
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    capsys,
 ) -> None:
     out = tmp_path / "killed"
     names = [str(path) for path in scenes]
@@ -138,7 +141,6 @@ def test_of_a_campaign_that_is_killed(
     assert not there.working and there.judged >= status.judged and not there.complete
     assert len(load_campaign(out).columns(["id"])["id"]) == there.judged
     again = run_all(scenes, station, out)
-    whole = run_all(scenes, station, tmp_path / "whole")
     assert same(whole.results, again.results)
     capsys.readouterr()
     assert main(["status", str(out), "--json", "--follow"]) == 0
