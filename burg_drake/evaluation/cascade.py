@@ -68,6 +68,7 @@ def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts
     mode: Mode | None = ...,
     motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
+    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Run: ...
 
@@ -92,6 +93,7 @@ def evaluate(
     mode: Mode | None = ...,
     motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
+    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Campaign: ...
 
@@ -115,6 +117,7 @@ def evaluate(
     mode: Mode | None = None,
     motion: GraspMotion | None = None,
     retry_failed: bool = False,
+    scene_reports: bool | None = None,
     progress: bool | Listener = True,
 ) -> Run | Campaign:
     """Judges grasps and writes a run, or a run over many scenes.
@@ -155,6 +158,8 @@ def evaluate(
             the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
         motion: how the hand goes to a grasp and away from it; as the station says if None.
         retry_failed: try all grasps again that an earlier call could not simulate.
+        scene_reports: whether each of several scenes gets a report of its own; None if they are at
+            most a hundred, as one takes some tenths of a second. `write_report` makes it later.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
@@ -190,6 +195,7 @@ def evaluate(
         table=table,
         shard=as_shard(shard),
         retry_failed=retry_failed,
+        scene_reports=scene_reports,
     )
     require_writer(table)
     if isinstance(scene, (Scene, str, Path)):
@@ -238,7 +244,7 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
-    stretch = begun_now(executor.workers)
+    stretch = begun_now(executor.workers, len(run.verdicts))
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = time.monotonic()
     judged = 0

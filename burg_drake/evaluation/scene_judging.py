@@ -43,6 +43,7 @@ class SceneJudging:
         again = {grasp.id for grasp in self.left}
         self.mine = len(self._run.mine)
         self.known = self.mine - len(self.left)
+        self._before = len(self._run.verdicts)
         # verdicts are not kept: a thousand runs have a million
         self._failed = {
             id: v.interrupted
@@ -61,7 +62,7 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Writes into the run's document that it is worked on."""
-        self._stretch = begun_now(self._workers)
+        self._stretch = begun_now(self._workers, self._before)
         self._begun = time.monotonic()
         self._save(self._stretch)
 
@@ -111,11 +112,12 @@ class SceneJudging:
         save_run(replace(self._run, document=replace(document, stretches=stretches)))
 
 
-def is_finished(folder: Path, size: int, table: str) -> bool:
-    """Whether a run's journal has this size, and its table and report are not older."""
+def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
+    """Whether a run's journal has this size, and its table is not older, nor its report."""
+    names = [f"results.{table}", *([REPORT_FILE] if report else [])]
     try:
         journal = (folder / JOURNAL_FILE).stat()
-        others = [(folder / name).stat() for name in (f"results.{table}", REPORT_FILE)]
+        others = [(folder / name).stat() for name in names]
     except OSError:
         return False
     newer = all(other.st_mtime_ns >= journal.st_mtime_ns for other in others)
