@@ -32,14 +32,11 @@ from burg_drake.station.station import Station
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-import dask  # noqa: E402
-
-from burg_drake.evaluation.cluster.crew import asking, threads_by_address  # noqa: E402
+from burg_drake.evaluation.cluster.crew import Crew, threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
 from burg_drake.evaluation.cluster.delivery import deliver_bundle  # noqa: E402
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
 from burg_drake.evaluation.cluster.node import NO_WEB  # noqa: E402
-from burg_drake.evaluation.cluster.remote import Supervisor  # noqa: E402
 from burg_drake.evaluation.cluster.sent_job import SentJob  # noqa: E402
 
 LIMITS = Limits(cpu=0.5, wall=2.0)
@@ -64,12 +61,20 @@ class Cluster:
 
 
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[Cluster]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.2)
-        cluster = Cluster()
-        yield cluster
+def clusters() -> Iterator[list[Cluster]]:
+    made: list[Cluster] = []
+    yield made
+    for cluster in made:
         cluster.close()
+
+
+@pytest.fixture
+def cluster(clusters: list[Cluster], monkeypatch: pytest.MonkeyPatch) -> Cluster:
+    """One for all tests; a new one if its scheduler has been killed."""
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.2)
+    if not clusters or clusters[-1].nodes.scheduler.poll() is not None:
+        clusters.append(Cluster())
+    return clusters[-1]
 
 
 def grasps(n: int, scene: str = "cube") -> list[Candidate]:
@@ -119,13 +124,13 @@ def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
 
 
 def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
-    jobs = [Job("bad", refuse, grasps(5, "bad")), Job("good", Make(KnownJudge()), grasps(5))]
+    jobs = [Job("bad", refuse, grasps(1, "bad")), Job("good", Make(KnownJudge()), grasps(5))]
     failed: list[JobFailed] = []
     found = outcomes(list(cluster.executor.judge(jobs, failed.append)))
     assert found == {g.id: expected(g.id) for g in grasps(5)}
     assert [(f.job.key, str(f.error)) for f in failed] == [("bad", "no such model")]
     with pytest.raises(InvalidInputError, match="no such model"):
-        list(cluster.executor.judge(jobs))
+        list(cluster.executor.judge(jobs[:1]))
 
 
 def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(cluster: Cluster) -> None:
@@ -208,34 +213,18 @@ def test_a_scheduler_that_can_be_reached_from_elsewhere_is_refused(cluster: Clus
         cluster.client.sync(scheduler.close)
 
 
-def test_a_scheduler_that_dies_is_said_in_one_line(scene: Scene, station: Station) -> None:
-    nodes = LocalNodes(1)
-    job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
-    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
-    answers = []
-    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
-    try:
-        with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
-            with pytest.raises(ClusterError, match=lost):
-                for answer in executor.judge([job]):
-                    answers.append(answer)
-                    nodes.scheduler.kill()
-            with dask.config.set({"distributed.comm.timeouts.connect": "0.2s"}):
-                with pytest.raises(ClusterError, match=lost):
-                    deliver_bundle(other.client, SentJob(Job("job", factory, ())), ["tcp://x:1"])
-                with pytest.raises(ClusterError, match=lost), asking(other.client):
-                    other.client.register_plugin(Supervisor("late"), name="late")
-        assert answers
-    finally:
-        nodes.close()
-
-
 DRIVER = """
 import sys
 sys.path.insert(0, {tests!r})
-from test_cluster import *
+from pathlib import Path
+import numpy as np
+from known_judge import KnownJudge, MakeAndTell
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.dask_executor import connect_cluster
+from burg_drake.evaluation.executor import Job
+grasps = [Candidate(str(k), "cube", np.eye(4)) for k in range(400)]
 with connect_cluster("local:1") as executor:
-    job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps(400))
+    job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps)
     for answer in executor.judge([job]):
         print(answer[1].id, flush=True)
 """
@@ -265,6 +254,49 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass
     assert time.monotonic() - start < 5.0
+
+
+def test_a_scheduler_that_dies_is_said_in_one_line(
+    cluster: Cluster, scene: Scene, station: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nodes = cluster.nodes
+    job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.5)
+    answers = []
+    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
+    with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
+        with pytest.raises(ClusterError, match=lost):
+            for answer in executor.judge([job]):
+                answers.append(answer)
+                nodes.scheduler.kill()
+                nodes.scheduler.wait()
+        with pytest.raises(ClusterError, match=lost):
+            deliver_bundle(other.client, SentJob(Job("job", factory, ())), ["tcp://127.0.0.1:9"])
+    assert answers
+
+
+def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After the first look at the workers."""
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.5)
+    nodes = LocalNodes(0)
+    look = Crew.look
+
+    def look_and_kill(self: Crew) -> list[Any]:
+        lost = look(self)
+        nodes.scheduler.kill()
+        nodes.scheduler.wait()
+        return lost
+
+    monkeypatch.setattr(Crew, "look", look_and_kill)
+    try:
+        lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
+        with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
+            list(executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
+    finally:
+        nodes.close()
 
 
 def is_alive(pid: int) -> bool:

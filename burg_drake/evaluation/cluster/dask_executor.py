@@ -169,10 +169,13 @@ def _of_files(distributed: Any, files: TlsFiles) -> Any:
 @contextlib.contextmanager
 def _without_its_log() -> Iterator[None]:
     """What Dask would say of lost connections is said by our errors, in one line."""
-    log = logging.getLogger("distributed")
-    level = log.level
-    log.setLevel(logging.CRITICAL)
+    # Dask's configuration gives the second one a level of its own
+    logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
