@@ -30,6 +30,7 @@ from burg_drake.evaluation.merge_finish import Left
 from burg_drake.evaluation.merge_journals import choose
 from burg_drake.evaluation.part_file import require_arrow
 from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex
+from burg_drake.evaluation.run_notes import shortfalls
 from burg_drake.evaluation.run_store import REPORT_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.shard import share
 
@@ -159,5 +160,6 @@ class _Merge:
             size=0 if missing else size,
             failed=failed,
             interrupted=interrupted,
+            missing="; ".join(shortfalls(run)),
         )
         self.states.append(state)

@@ -17,6 +17,7 @@ from burg_drake.evaluation.part_writer import PART_ROWS
 from burg_drake.evaluation.preparation import open_grasps
 from burg_drake.evaluation.request import Request
 from burg_drake.evaluation.run_document import Stretch, begun_now
+from burg_drake.evaluation.run_notes import shortfalls
 from burg_drake.evaluation.run_store import REPORT_FILE, Run, load_run, save_run
 
 
@@ -53,6 +54,7 @@ class SceneJudging:
         self._judged = 0
         self._workers = workers
         self._count = len(self._run.candidates)
+        self._missing = "; ".join(shortfalls(self._run))
         self._run = Run(folder, self._run.document)
 
     @property
@@ -104,6 +106,7 @@ class SceneJudging:
             size=journal.stat().st_size if state == "done" else 0,
             failed=len(self._failed) if state == "done" else 0,
             interrupted=sum(self._failed.values()) if state == "done" else 0,
+            missing=self._missing,
         )
 
     def _save(self, stretch: Stretch) -> None:

@@ -234,3 +234,21 @@ def test_given_grasps_go_where_their_objects_are(
     only = run_all(scenes, station, tmp_path / "only", only=["bar"])
     assert set(only.columns(["object"])["object"].tolist()) == {"bar"}
     assert load_scene(scenes[0]).content == only.document.scenes[0].content
+
+
+def test_fewer_grasps_than_asked_are_explained(
+    scenes: list[Path],
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def shortfall(name: str, asked: int, part: object, found: int) -> str:
+        return f"{name}: {found} of 6" if name == "bar" else ""
+
+    monkeypatch.setattr("burg_drake.evaluation.run_notes.shortfall", shortfall)
+    campaign = run_all(scenes, station, tmp_path / "all")
+    assert summarize(load_campaign(campaign.path)).notes == (
+        "scene moved: bar: 5 of 6",
+        "scene three: bar: 5 of 6",
+    )
