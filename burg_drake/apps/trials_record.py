@@ -19,6 +19,7 @@ from burg_drake.core.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.cameras.placement_document import PlacementCheck
+    from burg_drake.experiment.trials.book import TrialBook
     from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 
 OF_PHOTO = ("intrinsics", "depth", "depth_unit", "scene")
@@ -100,7 +101,7 @@ def run_record(arguments: argparse.Namespace) -> int:
         entry |= {"photo": photo} if photo else {}
     if check is not None and found:
         entry["placement"] = object_places(check)
-    recorded = book.record(trial.number, correct=arguments.correct, again=arguments.again, **entry)
+    recorded = _record(book, arguments, trial, entry)
     if arguments.photo and not (arguments.intrinsics or arguments.placement):
         print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
@@ -110,6 +111,27 @@ def run_record(arguments: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     return 0 if check is None or found else 1
+
+
+def _record(
+    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
+) -> RealTrial:
+    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
+    is the one that the evidence is about, or none."""
+    from burg_drake.experiment.trials.book import TrialChanged
+
+    how = {"correct": arguments.correct, "again": arguments.again}
+    if arguments.number != "next":
+        return book.record(trial.number, **how, **entry)
+    if not (arguments.photo or arguments.placement):
+        return book.record("next", **how, **entry)
+    try:
+        return book.record(trial.number, expected=trial, **how, **entry)
+    except TrialChanged as error:
+        kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
+        raise InvalidInputError(
+            f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
+        ) from error
 
 
 def _number(text: str) -> int | Literal["next"]:

@@ -21,6 +21,7 @@ from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.evaluation.complete import require_judged
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
@@ -172,7 +173,8 @@ def evaluate(
             the board, unwritable folder, or a folder that holds another run or is being written.
         UnknownNameError: a reference to something that does not exist.
         MissingDependencyError: Parquet, or several scenes, without pyarrow.
-        SimulationError: the simulation of the scene cannot be built.
+        SimulationError: the simulation of the scene cannot be built, or an executor ends before
+            all is judged.
     """
     if grasps is None and grasps_per_object < 1:
         raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
@@ -231,6 +233,7 @@ def _evaluate_one(
         left = open_grasps(run, retry_failed=request.retry_failed)
         if left:
             run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
+            require_judged(run)
         run = finish_run(run, request.table)
         keep_parts(run)
         return run

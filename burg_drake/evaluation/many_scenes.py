@@ -34,6 +34,7 @@ from burg_drake.evaluation.campaign_document import (
     campaign_hash,
     require_same_campaign,
 )
+from burg_drake.evaluation.complete import require_scenes_judged
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.ledger import Ledger, SceneState
@@ -94,6 +95,7 @@ def evaluate_scenes(
         call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
         judged = call.run()
         renew_report(judged)
+        require_scenes_judged(judged)
         return judged
 
 

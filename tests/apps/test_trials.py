@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from burg_drake.cameras.intrinsics import Intrinsics
 from burg_drake.cameras.intrinsics_file import save_intrinsics
 from burg_drake.cameras.placement_document import load_placement
 from burg_drake.core.frames import make_pose
+from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import Among, RealTrial, Success, load_trials
 from burg_drake.system_libraries import missing_render_libraries
 from tests.experiment.known_runs import ended, make_run, make_scene
@@ -99,6 +100,28 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
     assert printed.split("all  ")[1].split()[:3] == ["4", "1", "1"]
     assert trials("show", sheet, "--all", "--show-simulated") == 0
     assert "simulated" in capsys.readouterr().out
+
+
+def test_next_is_what_is_open_when_it_is_recorded(
+    sheet: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody else records the same just before."""
+    record = TrialBook.record
+
+    def faster(book: TrialBook, *words: Any, **entry: Any) -> RealTrial:
+        record(TrialBook(sheet), "next", outcome="slipped")
+        return record(book, *words, **entry)
+
+    monkeypatch.setattr(TrialBook, "record", faster)
+    assert trials("record", sheet, "next", "--outcome", "slipped") == 0
+    assert "trial 2: slipped" in capsys.readouterr().out
+    photo = sheet.parent / "any.png"
+    photo.write_bytes(b"any")
+    assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
+    told = capsys.readouterr().err
+    assert "trial 3 was changed meanwhile; nothing was recorded, but the photo is kept" in told
+    assert trial(sheet, 3).photo == "" and trial(sheet, 4).outcome is None
+    assert any((sheet.parent / f"photos/003{k}.png").exists() for k in ("", "_2"))
 
 
 def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:

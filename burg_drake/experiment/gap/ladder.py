@@ -32,10 +32,23 @@ from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import Executor, LocalExecutor
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
+from burg_drake.evaluation.lock import Lock
 from burg_drake.evaluation.mode import MODES, Mode, mode_for
 from burg_drake.evaluation.motion_numbers import motion_in
-from burg_drake.evaluation.run_document import Grasps, numbers, run_hash, software_versions
-from burg_drake.evaluation.run_store import RUN_FILE, Run, create_run
+from burg_drake.evaluation.run_document import (
+    Grasps,
+    numbers,
+    require_same_run,
+    run_hash,
+    software_versions,
+)
+from burg_drake.evaluation.run_store import (
+    RUN_FILE,
+    Run,
+    create_run,
+    load_run,
+    require_run_folder,
+)
 from burg_drake.evaluation.screens import arm_settings
 from burg_drake.experiment.gap.displaced import commanded_candidates
 from burg_drake.experiment.gap.placement_noise import NoisyScene, PlacementNoise, noisy_scene
@@ -45,6 +58,7 @@ from burg_drake.scene.scene import Scene, load_scene, save_scene
 from burg_drake.station.station import Station, load_station
 
 DOCUMENT_FILE = "gap.yaml"
+LOCK_FILE = ".gap.lock"
 HEADER = "Where grasps are lost, step by step; written by burg-drake gap."
 DEFAULT_SAMPLES = 5
 USUAL_NOISE = PlacementNoise()
@@ -111,8 +125,7 @@ def measure_gap(
         samples=samples,
         versions=software_versions(),
     )
-    _require_same(path, document)
-    writable_folder(path)
+    _begin(path, document)
     options = {"executor": executor, "progress": progress}
     steps: list[Step] = []
     for mode in MODES[: MODES.index(last) + 1]:
@@ -132,16 +145,25 @@ def measure_gap(
             redrawn=tuple(one.redrawn for one in scenes),
             kept={f"{k:03d}": one.kept for k, one in enumerate(scenes, 1) if one.kept},
         )
-    save_document(document, path / DOCUMENT_FILE, HEADER)
+    save_document(document, path / DOCUMENT_FILE, HEADER)  # with what was drawn, too
     return Ladder(path, document, tuple(steps), extra)
 
 
-def _require_same(path: Path, document: GapDocument) -> None:
-    """Refuses a folder with other steps; more scenes of the same kind are welcome."""
+def _begin(path: Path, document: GapDocument) -> None:
+    """Makes the folder and says first of all what is asked there, which refuses others from then
+    on, however this call ends."""
     file = path / DOCUMENT_FILE
     if not file.exists():
-        return
-    there = load_document(file, GapDocument)
+        writable_folder(path)
+    with Lock(path / LOCK_FILE):
+        if file.exists() and any(path.glob(f"*/{JOURNAL_FILE}")):  # else nothing came of it
+            _require_same(path, load_document(file, GapDocument), document)
+        else:
+            save_document(document, file, HEADER)
+
+
+def _require_same(path: Path, there: GapDocument, document: GapDocument) -> None:
+    """Refuses a folder with other steps; more scenes of the same kind are welcome."""
     for name in ("source", "scene", "station", "place_mm", "turn_deg", "seed"):
         old, new = getattr(there, name), getattr(document, name)
         if old != new:
@@ -213,12 +235,15 @@ def _begin_reach(
         stretches=(),
         hash="",
     )
-    if not (folder / RUN_FILE).exists():
-        document = replace(document, hash=run_hash(document))
-        create_run(folder, document, scene, station, hand.candidates)
-    journal = folder / JOURNAL_FILE
-    known = read_journal(journal)
-    with Journal(journal) as lines:
+    require_run_folder(folder)
+    writable_folder(folder)
+    with Journal(folder / JOURNAL_FILE) as lines:
+        if (folder / RUN_FILE).exists():
+            require_same_run(folder, load_run(folder).document, document)
+        else:
+            document = replace(document, hash=run_hash(document))
+            create_run(folder, document, scene, station, hand.candidates)
+        known = read_journal(folder / JOURNAL_FILE)
         for id, verdict in reach_verdicts(hand, known, **options):
             lines.append(id, verdict)
 

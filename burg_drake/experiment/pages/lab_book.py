@@ -24,7 +24,7 @@ from burg_drake.experiment.pages.words import (
     outcome_label,
     point_text,
 )
-from burg_drake.experiment.trials.book import TrialBook
+from burg_drake.experiment.trials.book import TrialBook, TrialChanged
 from burg_drake.experiment.trials.entries import entered
 from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
 
@@ -104,17 +104,19 @@ class LabBook:
         """
         with self._lock:
             trial = self.sheet().trial(entry.number)
-            values = _values(entry, trial)
-            if self._is_written(entry, values, trial):
-                return trial
-            if state_of(trial) != entry.replaces:
-                what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
-                who = f" by {trial.operator}" if trial.operator else ""
-                raise EntryConflict(
-                    f"trial {entry.number} was changed meanwhile: it has {what}{who}", trial
-                )
-            empty = all(getattr(trial, name) in ("", None) for name in OPERATOR_FIELDS)
-            return self.book.record(entry.number, correct=not empty, **values)
+            while True:
+                values = _values(entry, trial)
+                if self._is_written(entry, values, trial):
+                    return trial
+                if state_of(trial) != entry.replaces:
+                    raise _conflict(trial)
+                empty = all(getattr(trial, name) in ("", None) for name in OPERATOR_FIELDS)
+                try:
+                    return self.book.record(
+                        entry.number, correct=not empty, expected=trial, **values
+                    )
+                except TrialChanged as changed:  # by another program, since it was read
+                    trial = changed.trial
 
     def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
         """Enters what was seen before a trial.
@@ -123,19 +125,27 @@ class LabBook:
             BurgError: as for `enter`; the trial has an outcome already.
         """
         with self._lock:
-            self.require_open(number)
-            return self.book.record(number, correct=True, photo=photo, placement=placement)
+            while True:
+                trial = self.require_open(number)
+                try:
+                    return self.book.record(
+                        number, correct=True, expected=trial, photo=photo, placement=placement
+                    )
+                except TrialChanged:  # since it was read: look again
+                    continue
 
-    def require_open(self, number: int) -> None:
-        """Refuses a photo of what was before a trial that is over.
+    def require_open(self, number: int) -> RealTrial:
+        """The trial; refuses a photo of what was before one that is over.
 
         Raises:
             InvalidInputError: the trial has an outcome; or there is none of that number.
         """
-        if self.sheet().trial(number).outcome is not None:
+        trial = self.sheet().trial(number)
+        if trial.outcome is not None:
             raise InvalidInputError(
-                f"trial {number} is carried out already; photo and placement were not kept"
+                f"trial {number} is carried out already; photo and placement were not entered"
             )
+        return trial
 
     def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
         """Whether the entry is in the file, or was until something else was entered."""
@@ -166,6 +176,13 @@ class LabBook:
             cached = (key, sheet, content_hash(*map(str, key))[:DIGITS])
             self._cached = cached
         return cached[1], cached[2]
+
+
+def _conflict(trial: RealTrial) -> EntryConflict:
+    what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
+    who = f" by {trial.operator}" if trial.operator else ""
+    message = f"trial {trial.number} was changed meanwhile: it has {what}{who}"
+    return EntryConflict(message, trial)
 
 
 def _values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:

@@ -6,11 +6,7 @@ the disk, in the file and in its journal, see `experiment.trials.entries`.
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
-import os
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -39,11 +35,7 @@ from burg_drake.experiment.trials.given_entry import EMPTY, checked, includes, m
 from burg_drake.experiment.trials.given_entry import real_outcome as real_outcome
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 from burg_drake.experiment.trials.trial_text import with_trial
-
-WAIT = 30.0
-"""Time to wait for other writers, each of which takes some hundredths of a second [s]."""
-TURN = 0.01
-"""Time between two attempts to get the lock [s]."""
+from burg_drake.experiment.trials.turn import turn
 
 
 class TrialChanged(InvalidInputError):
@@ -212,7 +204,7 @@ class TrialBook:
     def _change(
         self, number: int | Literal["next"], change: Callable[[RealTrial], RealTrial], how: How
     ) -> RealTrial:
-        with self._locked():
+        with turn(self.path):
             while True:
                 text, sheet = self._read()
                 old = self._chosen(sheet, number)
@@ -244,38 +236,6 @@ class TrialBook:
     def _read(self) -> tuple[str, TrialSheet]:
         text = read_text(self.path)
         return text, parse_document(text, TrialSheet, str(self.path))
-
-    @contextlib.contextmanager
-    def _locked(self) -> Iterator[None]:
-        """One writer at a time; the end of its process, however it comes, releases the lock."""
-        path = self.path.with_name(f".{self.path.name}.lock")
-        try:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        try:
-            self._wait_for(file)
-            yield
-        finally:
-            os.close(file)
-
-    def _wait_for(self, file: int) -> None:
-        until = time.monotonic() + WAIT
-        while True:
-            try:
-                return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                if time.monotonic() > until:
-                    raise InvalidInputError(
-                        f"{self.path} has been locked by another process for {WAIT:g} s; nothing"
-                        " was recorded"
-                    ) from error
-                time.sleep(TURN)
-            except OSError as error:
-                raise InvalidInputError(
-                    f"{self.path} is on a file system without locks ({error.strerror}), where two"
-                    " writers could lose entries; move it to another one"
-                ) from error
 
 
 def _now() -> str:

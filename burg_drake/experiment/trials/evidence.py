@@ -18,6 +18,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.core.schema import Pose
 from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, TrialSheet
+from burg_drake.experiment.trials.turn import turn
 from burg_drake.scene.scene import Scene
 
 PHOTOS, PLACEMENTS = "photos", "placements"
@@ -118,14 +119,15 @@ def keep_evidence(
         InvalidInputError: the photo cannot be read, or nothing be written.
     """
     folder = Path(sheet_path).parent
-    stem = _free_stem(folder, number)
+    content = None if photo is None else read_bytes(photo, IMAGE_SIZE)
     copy = ""
-    if photo is not None:
-        content = read_bytes(photo, IMAGE_SIZE)
-        copy = f"{PHOTOS}/{stem}{Path(photo).suffix.lower()}"
-        atomic_write(folder / copy, content)
-    if check is not None:
-        save_placement(check, folder / PLACEMENTS / f"{stem}.yaml")
+    with turn(Path(sheet_path)):  # no other one takes the same name
+        stem = _free_stem(folder, number)
+        if photo is not None and content is not None:
+            copy = f"{PHOTOS}/{stem}{Path(photo).suffix.lower()}"
+            atomic_write(folder / copy, content)
+        if check is not None:
+            save_placement(check, folder / PLACEMENTS / f"{stem}.yaml")
     return copy
 
 

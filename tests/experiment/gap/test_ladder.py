@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,11 @@ import pytest
 from burg_drake.apps import gap as gap_verb
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.core.outcome import Outcome, RealOutcome, Stage
+from burg_drake.evaluation.executor import Job, LocalExecutor
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
+from burg_drake.evaluation.run_document import run_hash
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import gap_changes
@@ -29,6 +31,8 @@ from burg_drake.experiment.gap.report.tables import gap_json
 from burg_drake.experiment.gap.steps import Ladder, Step
 from burg_drake.experiment.gap.steps_reality import agreement_by_step
 from burg_drake.experiment.trials.sheet import RealTrial
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import ENGINES
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
 ASKED: dict[str, Any] = {"noise": NONE, "executor": LocalExecutor(1), "progress": False}
@@ -94,6 +98,54 @@ def test_other_steps_are_refused(run: Run, ladder: Ladder) -> None:
         measure_gap("tabletop_six", ladder.path, last="reach", **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
         measure_gap(run, ladder.path, last="reach", progress=False)
+
+
+class Killed(Exception):
+    """The end of a process."""
+
+
+class Ending:
+    """Answers one question and is killed."""
+
+    workers = 1
+
+    def judge(self, jobs: Iterable[Job]) -> Iterator[Any]:
+        for job in jobs:
+            yield job, job.candidates[0], Verdict(Outcome.NO_IK, Stage.CLEAR)
+            raise Killed
+
+
+def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) -> None:
+    """Killed within the second step; then comes the same run by another engine."""
+    with pytest.raises(Killed):
+        measure_gap(run, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    journal = tmp_path / "reach" / "journal.jsonl"
+    before = journal.read_bytes()
+    assert before.count(b"\n") == 1
+    document = replace(run.document, engine=ENGINES["standard"], hash="")
+    other = Run(run.path, replace(document, hash=run_hash(document)))
+    with pytest.raises(InvalidInputError, match="steps of something else"):
+        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    (tmp_path / "gap.yaml").unlink()  # which older versions wrote at the end
+    with pytest.raises(InvalidInputError, match=r"holds another run \(engine is"):
+        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+    assert journal.read_bytes() == before
+
+
+def test_a_gap_that_came_to_nothing_does_not_take_the_folder(run: Run, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="overlap"):
+        measure_gap(overlapping(run.scene()), tmp_path, last="hand", samples=0, **ASKED)
+    again = measure_gap(run, tmp_path, last="hand", samples=0, **ASKED)
+    assert again.document.source == run.document.hash
+
+
+def overlapping(scene: Scene) -> Scene:
+    """With the mug where the box is."""
+    there = scene.instance("box").X_SO
+    instances = [
+        replace(i, X_SO=there) if i.object == "mug" else i for i in scene.document.instances
+    ]
+    return replace(scene, document=replace(scene.document, instances=tuple(instances)))
 
 
 def test_options_of_a_scene_are_refused_with_a_run(

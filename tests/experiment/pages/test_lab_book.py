@@ -16,6 +16,7 @@ from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.outcome import RealOutcome
+from burg_drake.experiment.pages import lab_book
 from burg_drake.experiment.pages.lab_book import (
     EntryConflict,
     LabBook,
@@ -27,7 +28,7 @@ from burg_drake.experiment.pages.lab_book import (
 from burg_drake.experiment.pages.lab_camera import LabCamera
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import load_trials
+from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 
 TIME = "2026-05-05T10:02:11+02:00"
 
@@ -72,6 +73,27 @@ def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
     lab.enter(replace(mine, replaces=state_of(load_trials(trials).trial(1))))
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
+
+
+def test_what_another_program_enters_in_between_is_not_replaced(
+    lab: LabBook, trials: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes after the state was looked at: once a photo, which contradicts nothing."""
+    others = iter([{"photo": "photos/001.png"}, {"outcome": "dropped"}])
+
+    def seen(trial: RealTrial) -> str:
+        state = state_of(trial)
+        for other in others:
+            TrialBook(trials).record(trial.number, **other)
+            break
+        return state
+
+    mine = entry(lab, 1, "lifted")
+    monkeypatch.setattr(lab_book, "state_of", seen)
+    with pytest.raises(EntryConflict, match="changed meanwhile: it has dropped"):
+        lab.enter(mine)
+    trial = load_trials(trials).trial(1)
+    assert (trial.outcome, trial.photo) == (RealOutcome.DROPPED, "photos/001.png")
 
 
 def test_what_is_taken_back_is_as_before(lab: LabBook, trials: Path) -> None:
