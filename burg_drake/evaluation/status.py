@@ -82,10 +82,10 @@ class Watch:
             InvalidInputError: there is no run.
             DocumentError: its document does not fit the schema.
         """
+        self._date = _date_of(Path(path))
         self._result = result = open_results(path)
         places = result.places if isinstance(result, Campaign) else [Place("", result.path)]
         self._tails = tails_of(result.path, places)
-        self._date = 0
         self._history: list[tuple[float, int]] = []
 
     def look(self) -> Status:
@@ -149,11 +149,7 @@ class Watch:
     def _reopened(self) -> Run | Campaign:
         """The run as it is now; its document is read if it has another date."""
         path = self._result.path
-        name = RUN_FILE if isinstance(self._result, Run) else CAMPAIGN_FILE
-        try:
-            date = (path / name).stat().st_mtime_ns
-        except OSError:
-            return open_results(path)  # says what is missing
+        date = _date_of(path)
         if date == self._date:
             return replace(self._result)  # without what it remembers
         self._date = date
@@ -177,6 +173,12 @@ class Watch:
         if now - begun >= WINDOW / 4:
             return (judged - before) / (now - begun) or None
         return _rate_of(stretches[-1], judged) if stretches else None
+
+
+def _date_of(path: Path) -> tuple[int, ...]:
+    """Of the document of a run."""
+    files = (path / CAMPAIGN_FILE, path / RUN_FILE)
+    return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
 
 
 def _rate_of(stretch: Stretch, judged: int) -> float | None:
