@@ -44,7 +44,7 @@ def compare_runs(
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))
     pairs, left_out = pairs_of_runs(tables, found, success)
-    probability = predicted_probability(sides[0], pairs.id, robustness)
+    probability = predicted_probability(sides[0], pairs, robustness)
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY, probability)
     scenes = sides[0].scenes
