@@ -21,7 +21,7 @@ from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.robustness_shares import lifted_shares
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
-from burg_drake.experiment.comparison.matching import match_rows
+from burg_drake.experiment.comparison.matching import CONTENT, match_rows
 from burg_drake.experiment.comparison.pairs import NAMES
 from burg_drake.experiment.comparison.placement import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
@@ -206,7 +206,7 @@ def test_grasps_are_the_same_by_id_and_content(tmp_path: Path) -> None:
     b["x"][3] += 1e-3
     rows = np.array([5, 4, 3, 2, 1, 0])
     tables = [Table.of_columns(columns, NAMES) for columns in (a, b)]
-    found = match_rows(tables[0], tables[1].take(rows))
+    found = match_rows(tables[0], tables[1].take(rows, CONTENT))
     assert found.other_content == 1 and found.only_first == 6 and found.only_second == 0
     assert (a["id"][found.first] == b["id"][rows][found.second]).all() and len(found.first) == 5
 

@@ -13,7 +13,7 @@ from burg_drake.core.frames import Array
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import Columns
-from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.calibration import MARGINS, PROBABILITY
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
 from burg_drake.experiment.comparison.judgement import Judgement, Strata, judgement
@@ -134,7 +134,7 @@ def _pairs(
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    table = Table.of_columns(columns, NAMES).take(rows)
+    table = Table.of_columns(columns, NAMES).take(rows, MARGINS)
     return make_pairs(table, ended, actual, success)
 
 

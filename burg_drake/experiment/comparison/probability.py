@@ -54,6 +54,6 @@ def _along(pairs: Pairs, known: dict[tuple[str, str], float]) -> Array:
     values = np.full(len(pairs), np.nan)
     tested = {run for run, _ in known}
     rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
-    for row, id in zip(rows.tolist(), pairs.id[rows].tolist(), strict=True):
-        values[row] = known.get((pairs.run[row], id), np.nan)
+    for row in rows.tolist():
+        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
     return values
