@@ -10,11 +10,13 @@ from burg_drake.core.frames import Array
 from burg_drake.experiment.comparison.arrays import Flags, Rows, Values
 
 FINEST = 20_000
-"""Rows, about; of more the trials with neighbouring numbers share one. Numbers that more than one in
-so many trials have keep a row of their own, so that two in so many trials share one at most, and
-the area under the ROC curve changes by 2 / FINEST = 1e-4 at most: a pair of trials in one row
-changes by one half, and of the more frequent kind a row has 4 / FINEST at most. Measured on normal,
-skewed and rare outcomes it was AUROC_MEASURED."""
+"""Rows, about; of more the trials with neighbouring numbers share one.
+
+A number that more than one in so many trials have keeps its own row, so that two in so many share
+one at most. That changes the area under the ROC curve by 2 / FINEST = 1e-4 at most: it halves what
+a success and a failure in one row count, and a row has at most 4 / FINEST of the more frequent kind
+of them. `benchmarks/compare.py area` measures it.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
 
 
 def stored_keys(column: Any) -> NDArray[np.uint64]:
-    """As `text_keys`, of an Arrow column of texts without nulls, none of which becomes an object."""
+    """As `text_keys`, of an Arrow column of texts without nulls; none of them becomes an object."""
     found = [np.zeros(0, dtype=np.uint64), *(_chunk_keys(chunk) for chunk in column.chunks)]
     return np.concatenate(found)
 
@@ -85,6 +85,19 @@ class Ids:
         stored = not isinstance(self.column, np.ndarray)
         keys = stored_keys(self.column) if stored else text_keys(self.column)
         return keys if self.rows is None else keys[self.rows]
+
+    def same(self, other: Ids) -> bool:
+        """Whether both columns have the same texts in the same order; they may be found to differ
+        only because they are not kept alike."""
+        if self.rows is not None or other.rows is not None:
+            return False
+        if isinstance(self.column, np.ndarray) or isinstance(other.column, np.ndarray):
+            return (
+                np.array_equal(self.column, other.column)
+                if type(self.column) is type(other.column)
+                else False
+            )
+        return bool(self.column.equals(other.column))
 
     def take(self, rows: Values) -> Ids:
         """The column of some rows, as indices or truth values."""
@@ -136,6 +149,10 @@ class Factor:
     def take(self, rows: Values) -> Factor:
         """The column of some rows."""
         return Factor(self.names, self.index[rows])
+
+    def same(self, other: Factor) -> bool:
+        """Whether both columns have the same texts in the same order."""
+        return self.names == other.names and np.array_equal(self.index, other.index)
 
     def __getitem__(self, row: int) -> str:
         return self.names[self.index[row]]
