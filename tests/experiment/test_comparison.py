@@ -27,7 +27,7 @@ from burg_drake.experiment.comparison.placement import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
 from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.comparison.texts import Factor, text_keys
+from burg_drake.experiment.comparison.texts import Factor, Ids, text_keys
 from burg_drake.experiment.trials.plan import plan_trials
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
@@ -306,6 +306,22 @@ def test_texts_as_numbers() -> None:
     assert [coded[k] for k in range(3)] == ["box", "", "mug"]
     assert Factor.of_codes(np.array([1, 0]), ["mug", "box"]).names == ("box", "mug")
     assert Factor.of_codes(np.array([], dtype=int), []).names == ()
+
+
+def test_stored_texts_have_the_same_keys() -> None:
+    arrow = pytest.importorskip("pyarrow")
+    texts = ["mug-0123456789", "", "tête-à-tête", "日本", "mug", "a" * 40, "mug-0123456788"]
+    stored = arrow.chunked_array([arrow.array(["x", *texts[:3]])[1:], arrow.array(texts[3:])])
+    ids, array = Ids(stored), Ids(np.array(texts))
+    assert len(set(array.keys.tolist())) == len(texts)
+    assert ids.keys.tolist() == array.keys.tolist() == text_keys(np.array(texts)).tolist()
+    rows = np.array([5, 0, 3])
+    for column in (ids, array):
+        some = column.take(rows).take(np.array([True, False, True]))
+        assert [some[k] for k in range(len(some))] == ["a" * 40, "日本"]
+        assert some.keys.tolist() == column.keys[[5, 3]].tolist() and not some.same(some)
+        assert column.same(column) and not column.same(column.take(rows))
+    assert ids.same(Ids(arrow.chunked_array([texts]))) and not ids.same(Ids(stored[1:]))
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
+from burg_drake.evaluation import preparation
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.table_file import write_table
@@ -34,6 +35,7 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = {"grasps_per_object": 6, "blind": True, "progress": False, "executor": Inline()}
     station = load_station("panda_tabletop")
     known_judge.install(monkeypatch.setattr)
+    monkeypatch.setattr(preparation, "write_report", lambda run: None)  # nobody reads them here
     first = evaluate(paths, station, tmp_path / "first", **options)
     monkeypatch.setattr(known_judge, "expected", _other)
     second = evaluate(paths, station, tmp_path / "second", engine="screening", **options)

@@ -41,7 +41,8 @@ def compare_runs(
     sides = Judged.load(first), Judged.load(second)
     require_common_scene(*sides)
     with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
-        tables = tuple(pool.map(Judged.table, sides, (NAMES, REFERENCE_NAMES)))
+        one, other = pool.map(Judged.table, sides, (NAMES, REFERENCE_NAMES))
+    tables = one, other
     found = match_rows(*tables)
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))

@@ -9,6 +9,7 @@ import numpy as np
 from burg_drake.core.frames import Array
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.robustness_shares import lifted_shares, own_table
+from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.pairs import Pairs
 from burg_drake.experiment.comparison.side import Judged
 
@@ -31,22 +32,23 @@ def predicted_probability(
     """
     found = judged.found
     known: dict[tuple[str, str], float] = {}
+    places = _places(found, None if table is None else Path(table))
+    for runs, path in places:
+        known |= lifted_shares(
+            path, runs, None if isinstance(found, Campaign) else found.candidates.id
+        )
+    return _along(pairs, known) if places else None
+
+
+def _places(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
+    """Tables, with the runs that they may be of."""
+    folders = {found.document.hash: found.path}
     if isinstance(found, Campaign):
-        runs = {name: state.run for name, state in found.states.items() if state.run}
-        tables = {run: own_table(found.folder(name)) for name, run in runs.items()}
-        places = [({run}, path) for run, path in tables.items() if path is not None]
-        if table is not None:
-            places = [(set(tables), Path(table))]
-        for hashes, path in places:
-            known |= lifted_shares(path, hashes, None)
-    else:
-        path = own_table(found.path) if table is None else Path(table)
-        places = [] if path is None else [({found.document.hash}, path)]
-        for hashes, path in places:
-            known |= lifted_shares(path, hashes, found.candidates.id)
-    if not places:
-        return None
-    return _along(pairs, known)
+        folders = {state.run: found.folder(n) for n, state in found.states.items() if state.run}
+    if table is not None:
+        return [(set(folders), table)]
+    own = {run: own_table(folder) for run, folder in folders.items()}
+    return [({run}, path) for run, path in own.items() if path is not None]
 
 
 def _along(pairs: Pairs, known: dict[tuple[str, str], float]) -> Array:

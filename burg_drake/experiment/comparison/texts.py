@@ -25,7 +25,7 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
     keys = np.zeros(len(texts), dtype=np.uint64)
     if not texts.dtype.itemsize or not len(texts):
         return keys
-    letters = texts.view(np.uint32).reshape(len(texts), -1)
+    letters: Values = texts.view(np.uint32).reshape(len(texts), -1)
     if letters.max() >= 128:
         letters = np.char.encode(texts, "utf-8").view(np.uint8).reshape(len(texts), -1)
     words = np.zeros((len(letters), -(-letters.shape[1] // 8) * 8), dtype=np.uint8)
@@ -91,13 +91,10 @@ class Ids:
         only because they are not kept alike."""
         if self.rows is not None or other.rows is not None:
             return False
-        if isinstance(self.column, np.ndarray) or isinstance(other.column, np.ndarray):
-            return (
-                np.array_equal(self.column, other.column)
-                if type(self.column) is type(other.column)
-                else False
-            )
-        return bool(self.column.equals(other.column))
+        arrays = [isinstance(column, np.ndarray) for column in (self.column, other.column)]
+        if all(arrays):
+            return np.array_equal(self.column, other.column)
+        return not any(arrays) and bool(self.column.equals(other.column))
 
     def take(self, rows: Values) -> Ids:
         """The column of some rows, as indices or truth values."""
