@@ -103,6 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:
         _print_any_name()
+    # pyarrow's own allocator gives memory back again and again, which costs more than the reading
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     arguments = build_parser().parse_args(argv)
     try:
         return _run(arguments)
