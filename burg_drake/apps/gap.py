@@ -143,10 +143,12 @@ def run_gap(arguments: argparse.Namespace) -> int:
             f" {load_runs(arguments.source)[0].path}"
         )
     run = load_run(arguments.source) if of_run else None
+    if sheet is not None and run is not None:
+        tried_grasps(sheet, arguments.trials, run)  # refuses other grasps before any work
     with chosen_cluster(arguments) as cluster:
         ladder = _measure(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
-    tried = [] if sheet is None else tried_grasps(sheet, ladder.first.document.scene.content)
+    tried = [] if sheet is None else tried_grasps(sheet, arguments.trials, ladder.first)
     agreement = agreement_by_step(ladder, tried, success) if tried else ()
     found = gap_changes(ladder, success)
     line = shlex.join(["burg-drake", *sys.argv[1:]])
@@ -163,7 +165,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
         if agreement:
             reality_view(agreement).show()
         elif sheet is not None:
-            print(f"{arguments.trials} has no trials in this scene")
+            print(f"{arguments.trials} has no trials of these grasps in this scene")
         print(f"report  {ladder.path / REPORT_FILE}")
     return _failures(ladder)
 

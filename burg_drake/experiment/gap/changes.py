@@ -11,9 +11,8 @@ from itertools import pairwise
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.gap.rejudged import succeeded
 from burg_drake.experiment.gap.steps import Ladder, Step, StepName
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.experiment.trials.sheet import Success, succeeded
 
 
 @dataclass(frozen=True)
@@ -47,11 +46,14 @@ class Change:
         step: its name.
         moves: all grasps, changed or not; in displaced scenes each once a scene.
         success: what counts.
+        failed: number of grasps left out, whose simulation failed before or after the step, for
+            example because the memory ran out: that tells nothing of the gap.
     """
 
     step: StepName
     moves: tuple[Move, ...]
     success: Success
+    failed: int = 0
 
     @cached_property
     def flow(self) -> Counter[tuple[Outcome, Outcome]]:
@@ -91,11 +93,13 @@ def gap_changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
         ladder: all steps.
         success: what counts.
     """
-    steps = ladder.steps
-    return tuple(
-        Change(step.name, tuple(_moves(before.runs[0], step.runs, success)), success)
-        for before, step in pairwise(steps)
-    )
+    return tuple(_change(before.runs[0], step, success) for before, step in pairwise(ladder.steps))
+
+
+def _change(before: Run, step: Step, success: Success) -> Change:
+    moves = list(_moves(before, step.runs, success))
+    told = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
+    return Change(step.name, told, success, len(moves) - len(told))
 
 
 def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[Move]:
@@ -118,11 +122,14 @@ def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[Move
 
 
 def successes_by_object(step: Step, success: Success) -> dict[str, tuple[int, int]]:
-    """Successes and grasps of each object; in displaced scenes counted once a scene."""
+    """Successes and grasps of each object, without those whose simulation failed; in displaced
+    scenes counted once a scene."""
     found: dict[str, tuple[int, int]] = {}
     for run in step.runs:
         columns = run.results
         for name, outcome in zip(columns["object"], columns["outcome"], strict=True):
+            if outcome == Outcome.SIMULATION_FAILED:
+                continue
             good, all = found.get(str(name), (0, 0))
             found[str(name)] = good + succeeded(Outcome(outcome), success), all + 1
     return found

@@ -30,7 +30,7 @@ from burg_drake.experiment.gap.rejudged import Rejudged, Rejudging, why_skipped
 from burg_drake.experiment.gap.rejudged_files import write_rejudging
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
 from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
-from burg_drake.experiment.trials.sources import load_sources
+from burg_drake.experiment.trials.sources import grasp_contents, load_sources
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
@@ -70,7 +70,7 @@ def rejudge(
         path: their file, from whose folder the sheet's paths start.
         out: folder for the answers; made if need be.
         runs: by the sheet's keys, in place of its own; trials of keys that are missing, or whose
-            grasp is not in the run, are skipped.
+            grasp is not in the run, or another one there, are skipped.
         success: what counts; as the sheet says if None.
         executor: who judges; as many processes as there are processors if None.
         retry_failed: ask again what an earlier call could not simulate.
@@ -82,7 +82,7 @@ def rejudge(
     """
     runs = load_sources(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
-    skipped = {t.number: why for t in sheet.trials if (why := why_skipped(t, runs.get(t.run)))}
+    skipped = _skipped(sheet, runs)
     asked = _questions([t for t in sheet.trials if t.number not in skipped], runs)
     folder = writable_folder(out)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
@@ -101,6 +101,18 @@ def rejudge(
         path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
     )
     write_rejudging(found)
+    return found
+
+
+def _skipped(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
+    """Why trials cannot be judged again, by number."""
+    tried = [trial.grasp for trial in sheet.trials]
+    contents = {key: grasp_contents(run, tried) for key, run in runs.items()}
+    found = {}
+    for trial in sheet.trials:
+        content = contents.get(trial.run, {}).get(trial.grasp)
+        if why := why_skipped(trial, runs.get(trial.run), content):
+            found[trial.number] = why
     return found
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +16,8 @@ from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.origin import Origin
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.paired import Paired, paired_counts
-from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
+from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet, succeeded
+from burg_drake.experiment.trials.sources import grasp_contents
 from burg_drake.scene.scene import Scene
 
 Cause = Literal["agreed", "placement", "worsened", "physics"]
@@ -150,13 +151,14 @@ class Rejudging:
         return paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
 
 
-def succeeded(outcome: Outcome | RealOutcome, success: Success) -> bool:
-    """Whether an outcome counts as success."""
-    return outcome.held if success == "held" else outcome.value == Outcome.LIFTED.value
+def why_skipped(trial: RealTrial, run: Run | None, content: str | None) -> str:
+    """Why a trial cannot be judged again in a run; empty if it can.
 
-
-def why_skipped(trial: RealTrial, run: Run | None) -> str:
-    """Why a trial cannot be judged again in a run; empty if it can."""
+    Args:
+        trial: the trial.
+        run: stands for the trial's.
+        content: of the grasp that it has by this id; None if it has none.
+    """
     if trial.outcome is None:
         return "not carried out yet"
     if not trial.outcome.attempted:
@@ -165,13 +167,14 @@ def why_skipped(trial: RealTrial, run: Run | None) -> str:
         return "placement not measured"
     if run is None:
         return "of another scene"
-    if trial.grasp not in run.candidates.id:
+    if content is None:
         return "grasp not in the run"
-    return ""
+    return "" if content == trial.content else "another grasp of this id in the run"
 
 
 def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
-    """Which of some runs stands for each run of a sheet: itself, or else one of the same scene.
+    """Which of some runs stands for each run of a sheet: itself, or else one of the same scene,
+    that which has most of the grasps.
 
     Args:
         sheet: the trials.
@@ -180,7 +183,11 @@ def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
     found = {}
     for key, source in sheet.runs.items():
         same = [run for run in runs if run.document.scene.content == source.scene.content]
-        same.sort(key=lambda run: run.document.hash != source.hash)
         if same:
-            found[key] = same[0]
+            tried = {t.grasp: t.content for t in sheet.trials if t.run == key}
+            found[key] = max(same, key=partial(_likeness, hash=source.hash, tried=tried))
     return found
+
+
+def _likeness(run: Run, hash: str, tried: Mapping[str, str]) -> tuple[bool, int]:
+    return run.document.hash == hash, len(grasp_contents(run, tried).items() & tried.items())

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.agreement import Agreement, agreement, matrix_of
-from burg_drake.experiment.gap.rejudged import succeeded
 from burg_drake.experiment.gap.steps import Ladder, StepName
-from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet
+from burg_drake.experiment.trials.sheet import RealTrial, Success, TrialSheet, succeeded
+from burg_drake.experiment.trials.sources import grasp_contents
 
 
 @dataclass(frozen=True)
@@ -27,25 +30,45 @@ class StepAgreement:
     found: Agreement
 
 
-def tried_grasps(sheet: TrialSheet, scene: str) -> list[RealTrial]:
-    """The trials of a sheet in a scene of this content, carried out or not."""
-    return [trial for trial in sheet.trials if sheet.runs[trial.run].scene.content == scene]
+def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTrial]:
+    """The trials of a sheet about grasps of a run, carried out or not.
+
+    Args:
+        sheet: contents of the trials file.
+        path: the trials file, for messages.
+        run: theirs, or another one of the same scene; grasps are the same by id and content.
+
+    Raises:
+        InvalidInputError: it is theirs, and a grasp is not the one that was planned with.
+    """
+    scene, found = run.document.scene.content, []
+    contents = grasp_contents(run, (trial.grasp for trial in sheet.trials))
+    for trial in sheet.trials:
+        source, content = sheet.runs[trial.run], contents.get(trial.grasp)
+        if source.scene.content == scene and content == trial.content:
+            found.append(trial)
+        elif source.hash == run.document.hash:
+            has = "is gone" if content is None else f"has content {content}"
+            raise InvalidInputError(
+                f"{path}: trial {trial.number}: grasp {trial.grasp} of {run.path} {has}; it had"
+                f" {trial.content} when the trials were planned"
+            )
+    return found
 
 
 def agreement_by_step(
     ladder: Ladder, trials: Sequence[RealTrial], success: Success
 ) -> tuple[StepAgreement, ...]:
-    """Compares each step with the trials that tell anything of a grasp of the ladder.
+    """Compares each step with the trials that tell anything of its grasp.
 
     A grasp in displaced scenes is predicted to succeed if it does in more than half of them.
 
     Args:
         ladder: all steps.
-        trials: see `tried_grasps`.
+        trials: see `tried_grasps`. Each counts once, whatever it was chosen from.
         success: what counts.
     """
-    known = set(ladder.first.candidates.id)
-    real = [t for t in trials if t.outcome and t.outcome.attempted and t.grasp in known]
+    real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
     found = []
     for step in ladder.steps:
         runs = [*step.runs, *ladder.tried] if step.name == "placed" else list(step.runs)

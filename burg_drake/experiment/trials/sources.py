@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,16 @@ def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
     last bit, and of the instance that it is on."""
     pose = check_pose(X_OG, "X_OG")
     return content_hash(instance, pose, float(width))[:HASH_DIGITS]
+
+
+def grasp_contents(run: Run, ids: Iterable[str]) -> dict[str, str]:
+    """`grasp_content` of those of some grasps that a run has, by id."""
+    grasps, instances, wanted = run.candidates.grasps, run.candidates.instance, {*ids}
+    return {
+        id: grasp_content(str(instances[k]), grasps.X_OG[k], float(grasps.width[k]))
+        for k, id in enumerate(run.candidates.id)
+        if id in wanted
+    }
 
 
 def load_sources(

@@ -26,11 +26,13 @@ from burg_drake.evaluation.station_judge import StationJudge
 from burg_drake.experiment.gap.changes import gap_changes
 from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
-from burg_drake.experiment.gap.report.sections import push_section
+from burg_drake.experiment.gap.report.sections import change_section, push_section
+from burg_drake.experiment.gap.report.story import story
 from burg_drake.experiment.gap.report.tables import gap_json
 from burg_drake.experiment.gap.steps import Ladder, Step
-from burg_drake.experiment.gap.steps_reality import agreement_by_step
-from burg_drake.experiment.trials.sheet import RealTrial
+from burg_drake.experiment.gap.steps_reality import agreement_by_step, tried_grasps
+from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, TrialSheet
+from burg_drake.experiment.trials.sources import grasp_contents
 from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import ENGINES
 
@@ -208,24 +210,66 @@ def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
     assert (low, high) == pytest.approx((0.0945, 0.9055), abs=1e-4)
 
 
-def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: Ladder) -> None:
+    """The second one, which the first step lost, was ended from outside."""
     one, two, three = known.first.candidates.id
-    real = {one: RealOutcome.LIFTED, two: RealOutcome.SLIPPED, three: RealOutcome.LIFTED}
-    trials = [
+    reach = known.steps[1].runs[0]
+    table = {id: verdict.outcome for id, verdict in reach.verdicts.items()}
+    killed = stated(reach, table | {two: Outcome.SIMULATION_FAILED})
+    steps = (known.steps[0], replace(known.steps[1], runs=(killed,)))
+    (change,) = gap_changes(replace(known, steps=steps), "lifted")
+    assert (change.successes, len(change.lost), len(change.won), change.failed) == (1, 0, 1, 1)
+    assert [move.grasp for move in change.moves] == [one, three]
+    told = "With the arm: 1 could not be simulated here or in the step before, and counts as"
+    assert story(replace(known, steps=steps), (change,), "lifted")[-1].startswith(told)
+    assert told in change_section(change)
+    found = gap_json(replace(known, steps=known.steps[:1]), (change,), (), "lifted")
+    assert found["changes"][0]["not_simulated"] == 1
+
+
+def real_trials(run: Run, *outcomes: RealOutcome) -> list[RealTrial]:
+    """One of each grasp."""
+    contents = grasp_contents(run, run.candidates.id)
+    return [
         RealTrial(
             number=number,
             block=1,
             run="a",
-            grasp=grasp,
-            content="",
+            grasp=id,
+            content=contents[id],
             instance="box",
             object="box",
             simulated=Outcome.LIFTED,
             stratum="all",
             outcome=outcome,
         )
-        for number, (grasp, outcome) in enumerate(real.items(), 1)
+        for number, (id, outcome) in enumerate(zip(run.candidates.id, outcomes, strict=True), 1)
     ]
+
+
+def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
+    document = run.document
+    trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
+    changed = (trials[0], replace(trials[1], content="0123456789ab"))
+    source = SourceRun(
+        path=str(run.path),
+        hash="another",
+        scene=document.scene,
+        station=document.station,
+        mode="hand",
+        engine="screening",
+    )
+    selection = Selection(per_object=1, balance="none")
+    sheet = TrialSheet(runs={"a": source}, selection=selection, trials=changed)
+    assert tried_grasps(sheet, "trials.yaml", run) == trials[:1]
+    own = replace(sheet, runs={"a": replace(source, hash=document.hash)})
+    with pytest.raises(InvalidInputError, match=r"trial 2: grasp .* it had 0123456789ab when"):
+        tried_grasps(own, "trials.yaml", run)
+
+
+def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+    real = (RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED)
+    trials = real_trials(known.first, *real)
     later = replace(trials[0], number=4, outcome=None)
     found = agreement_by_step(known, [*trials, later], "lifted")
     assert [(a.step, *a.found.cells) for a in found] == [

@@ -18,6 +18,7 @@ from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose
+from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor, OnFailure
 from burg_drake.evaluation.journal import decode
 from burg_drake.evaluation.rerun import differences
@@ -25,7 +26,7 @@ from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.experiment.gap.measured import measured_scene, upright
 from burg_drake.experiment.gap.rejudge import rejudge
-from burg_drake.experiment.gap.rejudged import Rejudging
+from burg_drake.experiment.gap.rejudged import Rejudging, runs_for
 from burg_drake.experiment.gap.report.rejudged import rejudged_section, rejudged_words
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
@@ -254,6 +255,21 @@ def test_a_run_that_is_gone_or_another_one_is_refused(run: Run, sheet: TrialShee
     with pytest.raises(InvalidInputError, match="run 'a' is 0123, of scene 'tabletop_six'"):
         rejudge(other, "trials.yaml", run.path.parent / "never", progress=False)
     assert not (run.path.parent / "never").exists()
+
+
+def test_another_grasp_of_the_same_id_is_not_judged_again(
+    run: Run, sheet: TrialSheet, tmp_path: Path
+) -> None:
+    """And of two runs that may stand for it, the one that has the grasps does."""
+    trial = replace(sheet.trials[0], content="0123456789ab")
+    other = replace(sheet, runs={"a": replace(sheet.runs["a"], hash="0123")}, trials=(trial,))
+    found = rejudge(other, "t.yaml", tmp_path, runs={"a": run}, executor=Nobody(), progress=False)  # type: ignore[arg-type]
+    assert found.skipped == {1: "another grasp of this id in the run"}
+    less = Run(run.path, run.document)
+    of = run.candidates
+    less.__dict__["candidates"] = Candidates(of.grasps.select(np.array([2])), of.instance[2:])
+    meant = replace(other, trials=sheet.trials)
+    assert runs_for(meant, [less, run])["a"] is run and runs_for(meant, [run, less])["a"] is run
 
 
 def test_small_errors_of_measuring_are_put_right(run: Run, check: SceneCheck) -> None:

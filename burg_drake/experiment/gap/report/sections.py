@@ -17,7 +17,7 @@ from burg_drake.evaluation.trial import PUSHED
 from burg_drake.experiment.comparison.measures import Figure
 from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
 from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
-from burg_drake.experiment.gap.report.story import TITLES, replay_command, words
+from burg_drake.experiment.gap.report.story import TITLES, left_out, replay_command, words
 from burg_drake.experiment.gap.steps import Ladder
 from burg_drake.experiment.gap.steps_reality import StepAgreement
 from burg_drake.experiment.trials.sheet import Success
@@ -84,6 +84,8 @@ def change_section(change: Change) -> Html:
         share = f"{lost} of {whole} successes are lost ({percent(lost / whole)})"
         mark = interval_mark(lost / whole, low, high)
         parts.append(element("p", f"{share} ", mark))
+    if change.failed:
+        parts.append(element("p", left_out(change)))
     if change.lost or change.won:
         parts += [_flow_table(change), _objects_table(change), _listing(change)]
     return section(title, ABOUT[change.step], *parts)
@@ -216,7 +218,9 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     return section(
         "Beside the robot",
         "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
-        " means that success is predicted; in displaced scenes, in more than half of them.",
+        " means that success is predicted; in displaced scenes, in more than half of them. Figures"
+        " are of the tried grasps, not weighted by what they were chosen from, as those of"
+        " burg-drake compare are.",
         table(names, rows, numbers=(1, 2, 3, 4, 5)),
     )
 

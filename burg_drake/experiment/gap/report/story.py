@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from burg_drake.core.figures import percent
 from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.gap.changes import Change
-from burg_drake.experiment.gap.rejudged import succeeded
 from burg_drake.experiment.gap.steps import GapDocument, Ladder, StepName
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.experiment.trials.sheet import Success, succeeded
 
 TITLES: dict[StepName, str] = {
     "hand": "hand alone",
@@ -27,7 +26,18 @@ def story(ladder: Ladder, changes: Sequence[Change], success: Success) -> list[s
     outcomes = [verdict.outcome for verdict in hand.verdicts.values()]
     good = sum(succeeded(outcome, success) for outcome in outcomes)
     told = [f"Of {len(outcomes)} grasps the hand alone {VERBS[success]} {good}."]
-    return told + [_sentence(change, ladder.document) for change in changes]
+    told += [_sentence(change, ladder.document) for change in changes]
+    return told + [text for change in changes if (text := left_out(change))]
+
+
+def left_out(change: Change) -> str:
+    """What is said of grasps that a step leaves out; empty if there are none."""
+    if not change.failed:
+        return ""
+    return (
+        f"{TITLES[change.step].capitalize()}: {change.failed} could not be simulated here or in the"
+        f" step before, and {'counts' if change.failed == 1 else 'count'} as neither lost nor won."
+    )
 
 
 def _sentence(change: Change, document: GapDocument) -> str:

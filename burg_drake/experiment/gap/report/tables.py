@@ -26,7 +26,9 @@ FIGURES = ("precision", "recall", "accuracy")
 def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
     """What each step keeps and loses."""
     table = TextTable("Where grasps are lost", caption=_caption(ladder))
-    table.names("step").numbers("before", "lost", "won", "left", "lost %", "95 % CI")
+    table.names("step").numbers(
+        "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
+    )
     table.texts("turned into")
     for change in found:
         lost, whole = len(change.lost), change.successes
@@ -37,6 +39,7 @@ def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
             *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
             percent(lost / whole) if whole else "-",
             f"{100 * low:.0f}-{100 * high:.0f} %" if whole else "-",
+            str(change.failed),
             ", ".join(f"{name} {count}" for name, count in into.most_common()),
         )
     return table
@@ -54,7 +57,9 @@ def _caption(ladder: Ladder) -> str:
 
 def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     """What each step does to the agreement with the robot."""
-    table = TextTable("Beside the robot", caption="positive: success is predicted")
+    table = TextTable(
+        "Beside the robot", caption="of the tried grasps, not weighted; positive: success predicted"
+    )
     table.names("step").numbers("trials", "TP", "FP", "FN", "TN", *FIGURES)
     for one in agreement:
         found = one.found
@@ -98,7 +103,7 @@ def gap_json(
         ],
         "changes": [_change_json(change) for change in found],
         "pushed": None if pushed is None else asdict(pushed),
-        "reality": [{"step": one.step, **plain(one.found)} for one in agreement],
+        "reality": [{"step": one.step, "weighted": False, **plain(one.found)} for one in agreement],
     }
 
 
@@ -109,6 +114,7 @@ def _change_json(change: Change) -> dict[str, Any]:
         "successes": change.successes,
         "lost": len(change.lost),
         "won": len(change.won),
+        "not_simulated": change.failed,
         "share_lost": {"low": low, "high": high},
         "flow": [
             {"before": a.value, "after": b.value, "count": n}
