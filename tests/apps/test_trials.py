@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from datetime import datetime
 from pathlib import Path
 from typing import Any, get_args
@@ -47,6 +48,8 @@ def sheet(planned: Path) -> Path:
     """The trials file without entries."""
     for path in planned.glob("trials.*"):
         path.unlink()
+    for name in ("photos", "placements"):
+        shutil.rmtree(planned / name, ignore_errors=True)
     path = planned / "trials.yaml"
     path.write_text((planned / "plan.yaml").read_text())
     return path
