@@ -123,6 +123,27 @@ def run_record(arguments: argparse.Namespace) -> int:
     return 0 if check is None or found else 1
 
 
+def _record(
+    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
+) -> RealTrial:
+    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
+    is the one that the evidence is about, or none."""
+    from burg_drake.experiment.trials.book import TrialChanged
+
+    how = {"correct": arguments.correct, "again": arguments.again}
+    if arguments.number != "next":
+        return book.record(trial.number, **how, **entry)
+    if not (arguments.photo or arguments.placement):
+        return book.record("next", **how, **entry)
+    try:
+        return book.record(trial.number, expected=trial, **how, **entry)
+    except TrialChanged as error:
+        kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
+        raise InvalidInputError(
+            f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
+        ) from error
+
+
 def _number(text: str, sheet: TrialSheet) -> int | Literal["next"]:
     if text == "next":
         return "next"
@@ -143,27 +164,6 @@ def _time(text: str) -> str:
     except (ValueError, OverflowError) as error:
         raise argparse.ArgumentTypeError(
             f"{quoted(text)} is no time; give ISO 8601 such as 2026-05-04T16:30"
-        ) from error
-
-
-def _record(
-    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
-) -> RealTrial:
-    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
-    is the one that the evidence is about, or none."""
-    from burg_drake.experiment.trials.book import TrialChanged
-
-    how = {"correct": arguments.correct, "again": arguments.again}
-    if arguments.number != "next":
-        return book.record(trial.number, **how, **entry)
-    if not (arguments.photo or arguments.placement):
-        return book.record("next", **how, **entry)
-    try:
-        return book.record(trial.number, expected=trial, **how, **entry)
-    except TrialChanged as error:
-        kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
-        raise InvalidInputError(
-            f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
         ) from error
 
 
