@@ -114,7 +114,7 @@ def run_record(arguments: argparse.Namespace) -> int:
         print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
     if arguments.width_mm is not None:
-        _warn_of_width(arguments, sheet, trial)
+        _warn_of_width(arguments, sheet, recorded)
     if check is not None and not found:
         print(
             f"burg-drake: {arguments.photo}: {check.reason}; recorded without placement",

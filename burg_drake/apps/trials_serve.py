@@ -7,6 +7,7 @@ import argparse
 import contextlib
 import secrets
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
@@ -156,8 +157,6 @@ def _kept_secret(plan: str) -> str | None:
 
     It lies in the user's cache, for the user alone to read.
     """
-    import os
-
     from burg_drake.core.cache import cache_folder
 
     folder = cache_folder()
@@ -166,11 +165,31 @@ def _kept_secret(plan: str) -> str | None:
     path = folder / f"lab_{plan}.secret"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(file, "w", encoding="ascii") as stream:
-                stream.write(secrets.token_urlsafe(SECRET_BYTES))
-        text = path.read_text(encoding="ascii")
+        if not _secret_in(path):
+            _write_secret(path)
+        return _secret_in(path) or None
     except OSError:
         return None
-    return text if len(text) >= SECRET_BYTES else None
+
+
+def _secret_in(path: Path) -> str:
+    """What the file holds; empty if that is no secret, or there is none."""
+    try:
+        text = path.read_text(encoding="ascii")
+    except (FileNotFoundError, UnicodeDecodeError):
+        return ""
+    return text if len(text) >= SECRET_BYTES else ""
+
+
+def _write_secret(path: Path) -> None:
+    """Writes a new one beside it, for the user alone to read, and renames it: whole or not."""
+    import os
+    import tempfile
+
+    file, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(file, "w", encoding="ascii") as stream:
+            stream.write(secrets.token_urlsafe(SECRET_BYTES))
+        os.replace(name, path)
+    finally:
+        Path(name).unlink(missing_ok=True)

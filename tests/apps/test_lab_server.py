@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 
 from burg_drake.apps.lab_page.server import PAGES, LabServer
+from burg_drake.apps.trials_serve import _kept_secret as kept_secret
 from burg_drake.core.outcome import RealOutcome
 from burg_drake.experiment.pages.lab_book import LabBook
 from burg_drake.experiment.pages.picture_shelf import PictureShelf
@@ -160,6 +161,18 @@ def test_other_machines_need_the_token(trials: Path) -> None:
         assert request(port, "GET", "/states", Cookie=cookie[:-1])[0] == 403
     finally:
         server.close()
+
+
+def test_the_secret_is_kept_also_after_one_that_was_never_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BURG_DRAKE_CACHE", str(tmp_path))
+    (tmp_path / "lab_plan.secret").touch()  # by a process that was killed
+    secret = kept_secret("plan")
+    assert secret is not None and len(secret) >= 24 and kept_secret("plan") == secret
+    assert kept_secret("other") != secret
+    assert [path.stat().st_mode & 0o777 for path in tmp_path.glob("*.secret")] == [0o600] * 2
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def start(trials: Path, port: int) -> subprocess.Popen[str]:

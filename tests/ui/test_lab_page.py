@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
 from burg_drake.core.outcome import RealOutcome
 from burg_drake.experiment.trials.entries import journal_path, read_entries
-from burg_drake.experiment.trials.sheet import load_trials
+from burg_drake.experiment.trials.sheet import load_trials, save_trials
 from tests.apps.test_lab_server import free_port, kill, serve_again, start
 from tests.experiment.pages.conftest import made as made
 from tests.experiment.pages.conftest import trials as trials
@@ -25,12 +26,20 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     page.fill("#operator", "AB")
     page.fill("#note", "<b>wet</b> & cold")
     page.wait_for_timeout(700)  # clicks right after a trial comes up do not count
+    page.fill("#width", "abc")
+    page.click('[data-outcome="slipped"]')
+    expect(page.locator("#widthnote")).to_contain_text("Not a width in mm")
+    expect(page.locator("#width")).to_have_value("abc")
+    expect(number).to_have_text("1")
+    page.fill("#width", "500")
+    expect(page.locator("#widthnote")).to_have_text("The hand opens 80 mm; is 500 right?")
     page.click('[data-outcome="slipped"]')
     expect(number).to_have_text("2")
     expect(saved).to_have_text("All saved")
     kill(process)
     trial = load_trials(trials).trial(1)
     assert (trial.outcome, trial.note) == (RealOutcome.SLIPPED, "<b>wet</b> & cold")
+    assert trial.robot is not None and trial.robot.width_mm == 500.0
 
     page.wait_for_timeout(700)
     page.keyboard.press("1")  # lifted, with nobody to hear it
@@ -57,6 +66,33 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
         page.locator(".chips button").first.click()
         expect(page.locator("#entered")).to_contain_text("Entered: slipped, AB")
         expect(page.locator("#note")).to_have_value("<b>wet</b> & cold")
+    finally:
+        server.shelf.close()
+        server.close()
+
+
+def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> None:
+    """Somebody has removed another trial from the file; then it comes back."""
+    port = free_port()
+    server = serve_again(trials, port)
+    text, sheet = trials.read_text(), load_trials(trials)
+    troubles = page.locator("#troubles")
+    try:
+        page.goto(f"http://127.0.0.1:{port}/")
+        expect(page.locator("#number")).to_have_text("1")
+        save_trials(replace(sheet, trials=sheet.trials[:-1]), trials)
+        page.wait_for_timeout(700)
+        page.click('[data-outcome="slipped"]')
+        expect(page.locator("#saved")).to_contain_text("holds other trials by now")
+        expect(troubles).to_be_hidden()  # it may pass
+        expect(troubles).to_contain_text("Trial 1, slipped, is refused: ", timeout=15_000)
+        expect(troubles).to_contain_text("start the page again. It is sent again until")
+        troubles.get_by_role("button", name="Drop it").click()
+        expect(troubles).to_be_hidden()
+        trials.write_text(text)
+        expect(page.locator("#saved")).to_have_text("All saved")
+        assert load_trials(trials).trial(1).outcome is None
+        assert read_entries(journal_path(trials)) == []
     finally:
         server.shelf.close()
         server.close()

@@ -35,7 +35,11 @@ async function showCamera() {
     await seen();
     try {
       const answer = await fetch("camera");
-      if (answer.ok) { camera = await answer.json(); renderCamera(); }
+      if (answer.ok) {
+        camera = await answer.json();
+        if (asked) Object.assign(camera, { checking: true, measuring: asked });
+        renderCamera();
+      }
     } catch { /* the other loop tells */ }
     await sleep(view === "camera" || (camera && camera.checking) ? 400 : 1500);
   }
@@ -92,6 +96,7 @@ function placeRow(name, { status, within, mm, deg, reason }) {
 
 async function post(path, body) {
   if (path === "check" && camera) {
+    asked = body;
     Object.assign(camera, { checking: true, measuring: body });
     renderCamera();
   }
@@ -108,4 +113,5 @@ async function post(path, body) {
       renderCamera();
     }
   } catch { /* the status tells */ }
+  if (path === "check") asked = null;
 }

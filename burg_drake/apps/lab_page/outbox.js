@@ -3,6 +3,8 @@
 // Entries that the program has not acknowledged yet. They are in the browser's storage before
 // anything else happens, and are sent until the program says that they are on its disk.
 
+const STUCK = 4000;  // an entry may be dropped when it is refused for so long [ms]
+
 class Outbox {
   constructor(plan, changed) {
     this.prefix = `burg-drake entry ${plan} `;
@@ -21,7 +23,7 @@ class Outbox {
       for (let k = 0; k < localStorage.length; k++) {
         const key = localStorage.key(k);
         if (!key.startsWith(this.prefix)) continue;
-        try { items.push(JSON.parse(localStorage.getItem(key))); } catch { /* not ours */ }
+        try { items.push({ ...JSON.parse(localStorage.getItem(key)), refused: null }); } catch { /* not ours */ }
       }
     } catch { this.stored = false; }
     return items.sort((a, b) => (a.id < b.id ? -1 : 1));
@@ -60,6 +62,9 @@ class Outbox {
 
   get troubled() { return this.items.filter((item) => item.trouble); }
 
+  // Those that are refused again and again; they are still sent, as the reason may pass.
+  get stuck() { return this.items.filter(({ refused }) => refused && refused.at - refused.since >= STUCK); }
+
   discard(item) {
     for (const later of this.of(item.entry.number)) {
       if (later.id >= item.id) this.remove(later);
@@ -78,7 +83,13 @@ class Outbox {
 
   nextItem() {
     const blocked = new Set(this.troubled.map((item) => item.entry.number));
-    return this.items.find((item) => !blocked.has(item.entry.number));
+    const numbers = new Set();
+    const open = this.items.filter(({ entry: { number } }) => {  // the first of each trial
+      if (blocked.has(number) || numbers.has(number)) return false;
+      return numbers.add(number);
+    });
+    const at = ({ refused }) => (refused ? refused.at : 0);
+    return open.sort((a, b) => at(a) - at(b))[0];  // what was refused waits for the others
   }
 
   async send() {
@@ -117,6 +128,7 @@ class Outbox {
       this.changed(item, data.entry);
       return 0;
     }
+    if (!this.items.includes(item)) return 0;  // it was dropped meanwhile
     if (answer.status === 409 || answer.status === 400) {
       const state = data.entry ? data.entry.state : "";
       item.trouble = { text: data.error, state, label: data.entry ? data.entry.label : "" };
@@ -125,6 +137,8 @@ class Outbox {
       return 0;
     }
     this.problem = data.error;  // such as a file that somebody is editing: it may pass
-    return 2000;
+    const at = Date.now();
+    item.refused = { text: data.error, since: item.refused ? item.refused.since : at, at };
+    return this.nextItem().refused ? 2000 : 0;
   }
 }

@@ -19,6 +19,7 @@ let current = 0;
 let shownSince = 0;
 let view = "grasp";
 let camera = null;
+let asked = null;            // for a placement check, which waits for a picture
 let refused = "";            // why the last placement check was not begun
 let history = [];            // own entries that can be undone, the last one at the end
 
@@ -201,25 +202,6 @@ function renderSaved() {
 function say(kind, text) {
   $("saved").dataset.kind = kind;
   if ($("saved").textContent !== text) $("saved").textContent = text;
-}
-
-function renderTroubles() {
-  const troubled = outbox.troubled;
-  $("troubles").hidden = !troubled.length;
-  $("troubles").replaceChildren(...troubled.map((item) => {
-    const line = make("li"), { entry, trouble } = item;
-    const mine = entry.outcome ? labelOf(entry.outcome) : "taken back";
-    line.append(make("span", "", `Trial ${entry.number}, ${mine}, is not saved: ${trouble.text}. `));
-    const drop = make("button", "", trouble.state ? "Keep theirs" : "Drop it");
-    drop.addEventListener("click", () => outbox.discard(item));
-    line.append(drop);
-    if (trouble.state) {
-      const insist = make("button", "", `Replace by ${mine}`);
-      insist.addEventListener("click", () => outbox.insist(item));
-      line.append(insist);
-    }
-    return line;
-  }));
 }
 
 const pictureOf = (name) => `picture/${name}.jpg?plan=${plan.plan}`;

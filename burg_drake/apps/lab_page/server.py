@@ -56,7 +56,7 @@ POLL = 0.05
 """Between two looks of whether to stop serving [s]."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
-SCRIPTS = ("page.js", "outbox.js", "entering.js", "list.js", "camera.js")
+SCRIPTS = ("page.js", "outbox.js", "troubles.js", "entering.js", "list.js", "camera.js")
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),

@@ -7,6 +7,7 @@ import math
 import tempfile
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -23,6 +24,7 @@ from burg_drake.cameras.picture import Picture
 from burg_drake.cameras.placement_document import Placement, PlacementCheck
 from burg_drake.cameras.session import Session, Sight, pose_line
 from burg_drake.core.errors import BurgError, InvalidInputError
+from burg_drake.evaluation.judge import one_line
 from burg_drake.experiment.pages.lab_book import LabBook
 from burg_drake.experiment.trials.evidence import keep_evidence, object_places
 from burg_drake.scene.scene import Scene
@@ -214,6 +216,9 @@ class LabCamera:
                 told["kept"] = True
         except BurgError as error:
             told["problem"] = str(error)
+        except Exception as error:  # a thread that ends would leave an older answer on the page
+            told["problem"] = f"the check failed: {one_line(error)}"
+            traceback.print_exc()
         told["seconds"] = time.monotonic() - begun
         told["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
         self._checked = told

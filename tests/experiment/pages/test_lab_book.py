@@ -220,3 +220,18 @@ def test_an_outcome_that_comes_while_a_check_is_at_work(
     assert over.status()["drawn"] == 6
     over.watch(7)
     assert over.status()["drawn"] == 0
+
+
+def test_a_check_that_fails_says_why(over: LabCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    over.watch(5)
+    assert over.next_picture(0, 0, 30.0) is not None
+
+    def broken(*_: object) -> None:
+        raise cv2.error("no such matrix")
+
+    monkeypatch.setattr(Session, "check", broken)
+    over.check(5, keep=True)
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert (told["number"], told["kept"]) == (5, False)
+    assert told["problem"] == "the check failed: error: no such matrix"
