@@ -2,6 +2,7 @@
 
     python benchmarks/compare.py coverage [--repeats 400]
     python benchmarks/compare.py speed [RUN RUN] [--rows 1000000]
+    python benchmarks/compare.py area [--rows 1000000]
 
 `coverage` draws trials from populations whose figures are known, as `trials plan` chooses them (so
 many of each object from those that were predicted to be lifted, and from the others), and counts
@@ -12,6 +13,9 @@ of the trials are random, as reality is: the true figures are those of an endles
 
 `speed` times everything that follows on reading, on columns of so many rows, and the comparison of
 two runs on the disk; wall time, and CPU time in brackets.
+
+`area` measures by how much the area under the ROC curve changes where trials with neighbouring
+numbers share a row, as they do beyond `ordered.FINEST` different ones.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ import numpy as np
 
 from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.experiment.comparison import ordered
 from burg_drake.experiment.comparison.agreement import _all_measures, agreement
 from burg_drake.experiment.comparison.calibration import MARGINS
 from burg_drake.experiment.comparison.comparison import compare
@@ -52,6 +57,9 @@ def main() -> None:
     speedy.add_argument("runs", nargs="*", metavar="RUN")
     speedy.add_argument("--rows", type=int, default=1_000_000)
     speedy.set_defaults(run=speed)
+    joined = verbs.add_parser("area")
+    joined.add_argument("--rows", type=int, default=1_000_000)
+    joined.set_defaults(run=area)
     arguments = parser.parse_args()
     arguments.run(arguments)
 
@@ -178,6 +186,26 @@ def speed(arguments: argparse.Namespace) -> None:
         with _timed("runs on the disk"):
             c = compare(*arguments.runs)
         print(f"{c.coverage.compared} grasps compared")
+
+
+def area(arguments: argparse.Namespace) -> None:
+    """Prints the largest change of the area and of its interval, for normal and skewed numbers
+    that tell nothing to nearly all, and frequent to rare successes."""
+    rng = np.random.default_rng(0)
+    finest = ordered.FINEST
+    for rows in (finest + 1000, 5 * finest, arguments.rows):
+        worst = np.zeros(3)
+        for shift in (0.0, 0.5, 2.0, 5.0):
+            for share in (0.5, 0.05, 0.002):
+                good = rng.random(rows) < share
+                values = rng.normal(size=rows) + shift * good
+                for numbers in (values, np.minimum(np.exp(3 * values), 2.0)):
+                    found = []
+                    for ordered.FINEST in (finest, rows):
+                        f = ranking(Ordered.of(numbers, good))
+                        found.append(np.array([f.value, f.low, f.high], dtype=float))
+                    worst = np.maximum(worst, np.abs(found[0] - found[1]))
+        print(f"{rows} rows: area {worst[0]:.1e}, interval {worst[1:].max():.1e}")
 
 
 @contextmanager

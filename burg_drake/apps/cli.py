@@ -8,6 +8,7 @@ Exit codes: 0 all went well; 1 finished, with failures to report; 2 the input ca
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import os
 import select
@@ -40,6 +41,7 @@ from burg_drake.apps import (
     trials,
 )
 from burg_drake.apps.arguments import Parser, examples
+from burg_drake.apps.interrupts import terminated_as_interrupted
 from burg_drake.core.errors import BurgError, shown
 
 INPUT_ERROR = 2
@@ -101,6 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is None:
         _print_any_name()
+    # pyarrow's own allocator gives memory back again and again, which costs more than the reading
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     arguments = build_parser().parse_args(argv)
     try:
         return _run(arguments)
@@ -127,9 +131,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again."""
+    """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again; for verbs
+    that go on later SIGTERM, which batch systems send, is one, too."""
+    goes_on = hasattr(arguments, "after_interrupt")
     try:
-        code = int(arguments.run(arguments))
+        with terminated_as_interrupted() if goes_on else contextlib.nullcontext():
+            code = int(arguments.run(arguments))
         sys.stdout.flush()
         return code
     except Exception as error:

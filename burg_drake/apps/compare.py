@@ -35,7 +35,7 @@ def add_to(verbs: Any) -> None:
         run_compare,
         "compare simulated grasps with trials on the robot, or with another simulation",
         "burg-drake compare runs/first trials.yaml --html compare.html",
-        "burg-drake compare runs/first trials.yaml --json > compare.json",
+        "burg-drake compare runs/first trials.yaml --json",
         "burg-drake compare runs/first trials.yaml --rejudge --html compare.html",
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.arguments import (
-    DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
     ENGINE_NAMES,
     SCENE_NAMES,
@@ -19,10 +18,11 @@ from burg_drake.apps.arguments import (
 )
 from burg_drake.apps.cluster_option import add_cluster, chosen_cluster
 from burg_drake.apps.evaluate_many import evaluate_many
+from burg_drake.apps.evaluation_settings import asked_settings
 from burg_drake.apps.given_grasps import add_given, read_given, require_file
 from burg_drake.apps.motion_options import add_motion, chosen_motion, require_standoff_of_arm
 from burg_drake.apps.retries import add_retry_failed, how_to_retry
-from burg_drake.apps.sampling_options import add_sampling, grasps_per_object, require_sampled
+from burg_drake.apps.sampling_options import add_sampling, require_sampled
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.run_store import Run
@@ -105,6 +105,12 @@ def add_to(verbs: Any) -> None:
     )
     add_motion(parser)
     add_retry_failed(parser, "grasps")
+    parser.add_argument(
+        "--scene-reports",
+        action=argparse.BooleanOptionalAction,
+        help="write a report for each of several scenes, too; if not said, where there are at most"
+        " a hundred. burg-drake report RUN/scenes/NAME makes one later",
+    )
     add_quiet(parser)
     parser.set_defaults(after_interrupt="; the same command goes on from here")
 
@@ -144,21 +150,11 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             scene,
             station,
             arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-            grasps_per_object=grasps_per_object(arguments),
-            approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-            blind=arguments.blind,
-            only=arguments.only,
             grasps=given.by_instance if given else None,
-            engine=arguments.engine,
-            seed=arguments.seed,
-            workers=arguments.workers,
             executor=executor,
-            shard=arguments.shard,
-            table=arguments.table,
             mode=mode,
             motion=motion,
-            retry_failed=arguments.retry_failed,
-            progress=not arguments.quiet,
+            **asked_settings(arguments),
         )
     print_summary(run)
     if run.document.shard:

@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import DEFAULT_APPROACH_ANGLE
+from burg_drake.apps.evaluation_settings import asked_settings
 from burg_drake.apps.given_grasps import read_given
 from burg_drake.apps.motion_options import chosen_motion, require_standoff_of_arm
 from burg_drake.apps.retries import how_to_retry
-from burg_drake.apps.sampling_options import grasps_per_object
 from burg_drake.core.errors import InvalidInputError, listing
 
 if TYPE_CHECKING:
@@ -54,21 +53,12 @@ def evaluate_many(
         list(references),
         station,
         arguments.output,
-        grasps_per_object=grasps_per_object(arguments),
-        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-        blind=arguments.blind,
-        only=arguments.only,
         grasps=_given(arguments, station),
-        engine=arguments.engine,
-        seed=arguments.seed,
-        workers=arguments.workers,
         executor=executor,
-        shard=arguments.shard,
-        table=arguments.table,
         mode=mode,
         motion=motion,
-        retry_failed=arguments.retry_failed,
-        progress=not arguments.quiet,
+        scene_reports=arguments.scene_reports,
+        **asked_settings(arguments),
     )
     print_campaign(campaign)
     if motion != GraspMotion():
@@ -81,6 +71,7 @@ def print_campaign(campaign: Campaign) -> None:
     from rich.console import Console
 
     from burg_drake.evaluation.part_store import PARTS_FOLDER
+    from burg_drake.evaluation.run_store import REPORT_FILE
     from burg_drake.evaluation.summary import summarize
     from burg_drake.evaluation.summary_tables import summary_view
 
@@ -89,7 +80,11 @@ def print_campaign(campaign: Campaign) -> None:
     _scene_table(summary).show()
     if campaign.document.shard:
         print(f"shard   {campaign.document.shard}; burg-drake merge unites all of them")
-    print(f"runs    {campaign.path}/scenes/NAME, each with a table and a report")
+    scenes = f"{campaign.path}/scenes/NAME"
+    if any(campaign.folder(name).joinpath(REPORT_FILE).exists() for name in campaign.names):
+        print(f"runs    {scenes}, each with a table and a report")
+    else:
+        print(f"runs    {scenes}, each with a table; burg-drake report {scenes} makes a report")
     print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
     if campaign.report_path.exists():
         print(f"report  {campaign.report_path}")
@@ -166,6 +161,7 @@ class _FileOfScenes:
 
     def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
         from burg_drake.core.errors import UnknownNameError
+        from burg_drake.evaluation.candidate_files import NoSceneIdsError
 
         chosen = argparse.Namespace(**{**vars(self.arguments), "run": None})
         chosen.scene_id = scene.name
@@ -173,10 +169,8 @@ class _FileOfScenes:
             return read_given(chosen, scene, self.station).by_instance
         except UnknownNameError:
             return {}
-        except InvalidInputError as error:
-            if "no scene ids" in str(error):
-                raise InvalidInputError(
-                    f"{self.arguments.grasps} has grasps that are measured in the frame of one"
-                    " scene or camera, and does not say of which; evaluate that scene alone"
-                ) from error
-            raise
+        except NoSceneIdsError as error:
+            raise InvalidInputError(
+                f"{self.arguments.grasps} has grasps that are measured in the frame of one scene or"
+                " camera, and does not say of which; evaluate that scene alone"
+            ) from error

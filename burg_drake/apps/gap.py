@@ -125,6 +125,8 @@ def _add_displaced(parser: Parser) -> None:
 def run_gap(arguments: argparse.Namespace) -> int:
     """Judges step by step and reports; 1 if some grasps could not be simulated."""
     from burg_drake.core.files import atomic_write
+    from burg_drake.evaluation.campaign import is_campaign
+    from burg_drake.evaluation.results import load_runs
     from burg_drake.evaluation.run_store import RUN_FILE, load_run
     from burg_drake.experiment.gap.changes import gap_changes
     from burg_drake.experiment.gap.report.page import REPORT_FILE, write_gap_report
@@ -135,6 +137,11 @@ def run_gap(arguments: argparse.Namespace) -> int:
 
     sheet = None if arguments.trials is None else load_trials(arguments.trials)
     of_run = (Path(arguments.source) / RUN_FILE).is_file()
+    if is_campaign(arguments.source):
+        raise InvalidInputError(
+            f"{arguments.source} is a run over many scenes; give the run of one of them, such as"
+            f" {load_runs(arguments.source)[0].path}"
+        )
     run = load_run(arguments.source) if of_run else None
     if sheet is not None and run is not None:
         tried_grasps(sheet, arguments.trials, run)  # refuses other grasps before any work

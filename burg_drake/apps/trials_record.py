@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
+from datetime import date, datetime
 from typing import TYPE_CHECKING, Any, Literal
 
 from burg_drake.apps.arguments import (
@@ -11,11 +13,10 @@ from burg_drake.apps.arguments import (
     add_verb,
     not_negative,
     positive,
-    positive_int,
     print_scale,
 )
 from burg_drake.apps.trials_arguments import add_moved, add_sheet
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, quoted
 
 if TYPE_CHECKING:
     from burg_drake.cameras.placement_document import PlacementCheck
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 OF_PHOTO = ("intrinsics", "depth", "depth_unit", "scene")
 """Options that are about a photo."""
+LONGEST_NUMBER = 9
+WORDS = ("note", "operator")
 
 
 def add_to(group: Any) -> None:
@@ -44,11 +47,16 @@ def add_to(group: Any) -> None:
         "entry is recorded then.",
     )
     add_sheet(parser)
-    parser.add_argument("number", metavar="NUMBER", type=_number, help="of the trial, or next")
+    parser.add_argument("number", metavar="NUMBER", help="of the trial, or next")
     parser.add_argument("--outcome", metavar="OUTCOME", help="such as lifted, slipped, no_ik")
     for name, what in (("note", "what was noticed"), ("operator", "who did it")):
         parser.add_argument(f"--{name}", metavar="TEXT", help=what)
-    parser.add_argument("--time", metavar="TIME", help="when, ISO 8601 (default: now)")
+    parser.add_argument(
+        "--time",
+        metavar="TIME",
+        type=_time,
+        help="when, ISO 8601; a day alone is kept as such (default: now)",
+    )
     robot = parser.add_argument_group("what the robot reported at the end")
     robot.add_argument("--width-mm", metavar="MM", type=not_negative, help="between the pads")
     robot.add_argument("--effort-n", metavar="N", type=not_negative, help="gripping force")
@@ -90,7 +98,7 @@ def run_record(arguments: argparse.Namespace) -> int:
         real_outcome(arguments.outcome)
     book = TrialBook(arguments.trials)
     sheet = book.sheet()
-    trial = book.trial(arguments.number)
+    trial = book.trial(_number(arguments.number, sheet))
     entry = _entry(arguments)
     book.require_open(trial, entry, correct=arguments.correct, again=arguments.again)
     check = _check(arguments, sheet, trial)
@@ -105,6 +113,8 @@ def run_record(arguments: argparse.Namespace) -> int:
     if arguments.photo and not (arguments.intrinsics or arguments.placement):
         print("no placement was measured: --intrinsics FILE of the camera is missing")
     _print_recorded(recorded, book.sheet(), check if found else None)
+    if arguments.width_mm is not None:
+        _warn_of_width(arguments, sheet, trial)
     if check is not None and not found:
         print(
             f"burg-drake: {arguments.photo}: {check.reason}; recorded without placement",
@@ -134,8 +144,27 @@ def _record(
         ) from error
 
 
-def _number(text: str) -> int | Literal["next"]:
-    return "next" if text == "next" else positive_int(text)
+def _number(text: str, sheet: TrialSheet) -> int | Literal["next"]:
+    if text == "next":
+        return "next"
+    if text.isascii() and text.isdecimal() and len(text) < LONGEST_NUMBER:
+        return int(text)
+    numbers = [trial.number for trial in sheet.trials]
+    span = f", {min(numbers)} to {max(numbers)}," if numbers else ""
+    raise InvalidInputError(f"{quoted(text)}: give the number of a trial{span} or next")
+
+
+def _time(text: str) -> str:
+    """A moment, with the zone of this place if there is none, or a day."""
+    try:
+        with contextlib.suppress(ValueError):
+            return date.fromisoformat(text).isoformat()
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.astimezone()).isoformat()
+    except (ValueError, OverflowError) as error:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is no time; give ISO 8601 such as 2026-05-04T16:30"
+        ) from error
 
 
 def _require_sense(arguments: argparse.Namespace) -> None:
@@ -160,6 +189,8 @@ def _entry(arguments: argparse.Namespace) -> dict[str, Any]:
     robot = {name: getattr(arguments, name) for name in ("width_mm", "effort_n")}
     known = {name: value for name, value in robot.items() if value is not None}
     given = {name: value for name, value in entry.items() if value is not None}
+    if not arguments.correct:  # which may replace them by nothing
+        given = {k: v for k, v in given.items() if k not in WORDS or v.strip()}
     return given | ({"robot": known} if known else {})
 
 
@@ -195,6 +226,22 @@ def _check(
         depth_unit=arguments.depth_unit,
         scale=print_scale(arguments),
     )
+
+
+def _warn_of_width(arguments: argparse.Namespace, sheet: TrialSheet, trial: RealTrial) -> None:
+    """Says that a width is beyond what the hand opens, where the run can tell."""
+    from burg_drake.core.errors import BurgError
+    from burg_drake.experiment.trials.sources import load_run_of
+
+    with contextlib.suppress(BurgError):
+        run = load_run_of(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
+        hand = run.station().hand
+        if arguments.width_mm > 1e3 * hand.opening[1]:
+            print(
+                f"burg-drake: --width-mm {arguments.width_mm:g} is recorded, but hand"
+                f" {hand.name!r} opens {1e3 * hand.opening[1]:g} mm",
+                file=sys.stderr,
+            )
 
 
 def _print_recorded(trial: RealTrial, sheet: TrialSheet, check: PlacementCheck | None) -> None:

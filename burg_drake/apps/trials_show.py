@@ -33,7 +33,8 @@ def add_to(group: Any) -> None:
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help="with what was simulated; without, who carries out the trials does not know it",
+        help="with what was simulated, and until trials have begun with the notes of the choice;"
+        " without, who carries out the trials does not know it",
     )
 
 
@@ -47,8 +48,9 @@ def run_show(arguments: argparse.Namespace) -> int:
         print(f"run {key}: {run.hash}, scene {run.scene.name}, mode {run.mode}, in {run.path}")
     if arguments.all:
         _print_trials(sheet.trials, arguments.show_simulated)
-    _print_progress(sheet)
-    for note in sheet.notes:
+    _print_progress(sheet, arguments.show_simulated)
+    begun = any(trial.carried_out for trial in sheet.trials)
+    for note in () if begun or not arguments.show_simulated else sheet.notes:
         print(f"note: {note}")
     if sheet.next is not None:
         print(f"next is {sheet.next.number}: {sheet.next.grasp}")
@@ -57,13 +59,14 @@ def run_show(arguments: argparse.Namespace) -> int:
     return 1 if any(found.values for found in lacking) else 0
 
 
-def _print_progress(sheet: TrialSheet) -> None:
+def _print_progress(sheet: TrialSheet, simulated: bool) -> None:
     """How many trials of each object are done, and how they ended."""
     from burg_drake.core.text_table import TextTable
     from burg_drake.experiment.trials.sheet import succeeded
 
     table = TextTable().names("object")
-    table.numbers("trials", "done", "tried", "success\nin simulation", "success\non the robot")
+    table.numbers("trials", "done", "tried")
+    table.numbers(*(["success\nin simulation"] if simulated else []), "success\non the robot")
     success = sheet.selection.success
 
     def row(name: str, trials: Sequence[RealTrial], *, bold: bool = False) -> None:
@@ -72,7 +75,7 @@ def _print_progress(sheet: TrialSheet) -> None:
             len(trials),
             len(outcomes),
             sum(outcome.attempted for outcome in outcomes),
-            sum(succeeded(trial.simulated, success) for trial in trials),
+            *([sum(succeeded(t.simulated, success) for t in trials)] if simulated else []),
             sum(succeeded(outcome, success) for outcome in outcomes),
         )
         table.row(name, *map(str, counts), bold=bold)

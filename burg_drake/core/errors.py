@@ -10,7 +10,7 @@ import reprlib
 from collections.abc import Iterable, Sequence
 
 MANY = 24
-FEW = 8
+FEW = 9
 """More names than `MANY` are too many for a message; it then has the first `FEW`."""
 
 
@@ -87,13 +87,18 @@ _QUOTES.maxlevel = 2
 _QUOTES.maxstring = _QUOTES.maxother = _QUOTES.maxlong = SHOWN
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
     """Ends an error message about an unknown `name`: the nearest valid one and all that there are.
+
+    Args:
+        name: as given.
+        known: the valid ones.
+        ordered: they are in an order that tells, the likely ones first, and keep it.
 
     Returns:
         For example `did you mean 'mug'? Known: bowl, mug`, or `known: bowl, mug`.
     """
-    names = sorted(known)
+    names = list(known) if ordered else sorted(known)
     meant = did_you_mean(name, names)
     return f"{meant} Known: {listing(names)}" if meant else f"known: {listing(names)}"
 

@@ -111,13 +111,23 @@ UNTRIED = ("", Outcome.REACHABLE.value)
 
 class RealOutcome(StrEnum):
     """How a trial on the robot ended: the simulator's vocabulary, as far as a person or a robot can
-    see it, and what only reality has."""
+    see it, and what only reality has.
+
+    Those that an operator tells apart at a glance come first: messages begin with them.
+    """
 
     LIFTED = "lifted"
     LIFTED_DISTURBED = "lifted_disturbed"
     SLIPPED = "slipped"
     DROPPED = "dropped"
     CLOSED_EMPTY = "closed_empty"
+    HAND_COLLISION_APPROACH = "hand_collision_approach"
+    PROTECTIVE_STOP = "protective_stop"
+    """The robot stopped itself on its way: an execution that failed."""
+    NOT_ATTEMPTED = "not_attempted"
+    """Nobody tried; tells nothing of the grasp."""
+    PERCEPTION_FAILED = "perception_failed"
+    """The scene was not seen well enough to try; tells nothing of the grasp."""
     ONE_FINGER = "one_finger"
     NO_CONTACT = "no_contact"
     BLOCKED = "blocked"
@@ -125,7 +135,6 @@ class RealOutcome(StrEnum):
     COLLISION_TABLE = "collision_table"
     COLLISION_CLUTTER = "collision_clutter"
     COLLISION_BACKGROUND = "collision_background"
-    HAND_COLLISION_APPROACH = "hand_collision_approach"
     HAND_COLLISION_RETREAT = "hand_collision_retreat"
     HAND_COLLISION_LIFT = "hand_collision_lift"
     NO_IK = "no_ik"
@@ -135,12 +144,6 @@ class RealOutcome(StrEnum):
     RETREAT_LINE = "retreat_line"
     LIFT_LINE = "lift_line"
     NO_PATH = "no_path"
-    PROTECTIVE_STOP = "protective_stop"
-    """The robot stopped itself on its way: an execution that failed."""
-    NOT_ATTEMPTED = "not_attempted"
-    """Nobody tried; tells nothing of the grasp."""
-    PERCEPTION_FAILED = "perception_failed"
-    """The scene was not seen well enough to try; tells nothing of the grasp."""
 
     @property
     def attempted(self) -> bool:

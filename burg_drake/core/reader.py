@@ -75,7 +75,8 @@ class Reader:
         if dataclasses.is_dataclass(kind):
             return self.read_dataclass(node, typing.cast(type, kind), where)
         if isinstance(kind, type) and issubclass(kind, enum.Enum):
-            return self.choice(node, where, {str(m.value): m for m in kind})
+            members = {str(m.value): m for m in kind}
+            return self.choice(node, where, members, ordered=True)
         return self.read_scalar(node, kind, where)
 
     def read_optional(self, node: yaml.Node, kind: Any, where: str) -> Any:
@@ -86,12 +87,13 @@ class Reader:
             raise TypeError(f"schema type {kind} is not supported")
         return self.read(node, options[0], where)
 
-    def choice(self, node: yaml.Node, where: str, options: dict[str, Any]) -> Any:
+    def choice(
+        self, node: yaml.Node, where: str, options: dict[str, Any], *, ordered: bool = False
+    ) -> Any:
         if not isinstance(node, yaml.ScalarNode) or node.value not in options:
             given = node.value if isinstance(node, yaml.ScalarNode) else "a structure"
-            raise self.fail(
-                node, where, f"{quoted(given)} is not valid; {nearest(str(given), options)}"
-            )
+            known = nearest(str(given), options, ordered=ordered)
+            raise self.fail(node, where, f"{quoted(given)} is not valid; {known}")
         return options[node.value]
 
     def read_sequence(self, node: yaml.Node, kind: Any, origin: Any, where: str) -> Any:

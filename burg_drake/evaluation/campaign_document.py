@@ -22,6 +22,9 @@ from burg_drake.evaluation.run_document import (
 from burg_drake.evaluation.shard import Shard, as_shard
 from burg_drake.station.engine import Engine
 
+FEW_SCENES = 100
+"""Of more scenes than these only who asks for it gets a report of each."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SceneEntry:
@@ -97,6 +100,11 @@ class CampaignDocument:
         shard = as_shard(self.shard or None)
         divides = shard is not None and shard.divides_scenes(len(self.scenes))
         return None if divides else shard
+
+    @property
+    def has_few_scenes(self) -> bool:
+        """Whether each scene has a report of its own, if nothing else is asked for."""
+        return len(self.scenes) <= FEW_SCENES
 
     @property
     def instances(self) -> list[str]:

@@ -22,6 +22,8 @@ from burg_drake.evaluation.trial import PUSHED
 
 OUTCOMES = tuple(Outcome)
 ALL_STAGES = tuple(Stage)
+TOLD = 5
+"""Scenes of which it is told what is missing, and why."""
 
 
 def summarize_campaign(campaign: Campaign) -> Summary:
@@ -102,4 +104,8 @@ def _notes(campaign: Campaign) -> tuple[str, ...]:
         notes.append(f"no grasps to judge in {len(empty)} scenes: {listing(empty)}")
     if failed := list(campaign.failed):
         notes.append(f"{len(failed)} scenes could not be judged: {listing(failed)}")
+    short = [n for n in campaign.names if n in states and states[n].missing]
+    notes += [f"scene {name}: {states[name].missing}" for name in short[:TOLD]]
+    if len(short) > TOLD:
+        notes.append(f"{len(short) - TOLD} more scenes have fewer grasps than asked for")
     return tuple(notes)

@@ -28,6 +28,10 @@ NO_OBJECT = -1
 """Object id of grasps of which it is not known."""
 
 
+class NoSceneIdsError(InvalidInputError):
+    """A file does not say which scene its grasps are of."""
+
+
 @dataclass(frozen=True)
 class GivenGrasps:
     """What was read of a file.
@@ -138,7 +142,7 @@ def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
     """The grasps of one scene of the file."""
     if SCENE_ID not in grasps.columns:
         if scene_id is not None:
-            raise InvalidInputError(f"{path} has no scene ids; leave out --scene-id")
+            raise NoSceneIdsError(f"{path} has no scene ids; leave out --scene-id")
         return grasps
     ids = grasps.columns[SCENE_ID].astype(str)
     known = sorted(set(ids.tolist()))

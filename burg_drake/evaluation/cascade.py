@@ -21,6 +21,7 @@ from burg_drake.core.processes import default_workers
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.evaluation.complete import require_judged
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.journal import Journal
 from burg_drake.evaluation.mode import Mode, mode_for
@@ -68,6 +69,7 @@ def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts
     mode: Mode | None = ...,
     motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
+    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Run: ...
 
@@ -92,6 +94,7 @@ def evaluate(
     mode: Mode | None = ...,
     motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
+    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Campaign: ...
 
@@ -115,6 +118,7 @@ def evaluate(
     mode: Mode | None = None,
     motion: GraspMotion | None = None,
     retry_failed: bool = False,
+    scene_reports: bool | None = None,
     progress: bool | Listener = True,
 ) -> Run | Campaign:
     """Judges grasps and writes a run, or a run over many scenes.
@@ -155,6 +159,8 @@ def evaluate(
             the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
         motion: how the hand goes to a grasp and away from it; as the station says if None.
         retry_failed: try all grasps again that an earlier call could not simulate.
+        scene_reports: whether each of several scenes gets a report of its own; None if they are at
+            most a hundred, as one takes some tenths of a second. `write_report` makes it later.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
@@ -167,7 +173,8 @@ def evaluate(
             the board, unwritable folder, or a folder that holds another run or is being written.
         UnknownNameError: a reference to something that does not exist.
         MissingDependencyError: Parquet, or several scenes, without pyarrow.
-        SimulationError: the simulation of the scene cannot be built.
+        SimulationError: the simulation of the scene cannot be built, or an executor ends before
+            all is judged.
     """
     if grasps is None and grasps_per_object < 1:
         raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
@@ -190,6 +197,7 @@ def evaluate(
         table=table,
         shard=as_shard(shard),
         retry_failed=retry_failed,
+        scene_reports=scene_reports,
     )
     require_writer(table)
     if isinstance(scene, (Scene, str, Path)):
@@ -225,6 +233,7 @@ def _evaluate_one(
         left = open_grasps(run, retry_failed=request.retry_failed)
         if left:
             run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
+            require_judged(run)
         run = finish_run(run, request.table)
         keep_parts(run)
         return run
@@ -238,7 +247,7 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
     stretches = run.document.stretches
-    stretch = begun_now(executor.workers)
+    stretch = begun_now(executor.workers, len(run.verdicts))
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
     begun = time.monotonic()
     judged = 0

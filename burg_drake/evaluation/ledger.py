@@ -38,6 +38,7 @@ class SceneState:
         failed, interrupted: grasps that could not be simulated, and those of them whose worker was
             ended from outside.
         why: it failed.
+        missing: what is said of instances with fewer grasps than asked; see `run_notes.shortfalls`.
     """
 
     scene: str
@@ -50,9 +51,10 @@ class SceneState:
     failed: int = 0
     interrupted: int = 0
     why: str = ""
+    missing: str = ""
 
 
-KINDS = {"scene": str, "state": str, "run": str, "why": str, "sampling": float}
+KINDS = dict.fromkeys(("scene", "state", "run", "why", "missing"), str) | {"sampling": float}
 """Types of fields; the others are whole numbers."""
 
 

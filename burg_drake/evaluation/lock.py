@@ -1,10 +1,15 @@
-"""Who writes a folder: one process at a time, told by a lock that the system drops when it ends."""
+"""Who writes a folder: one process at a time, told by a lock that the system drops when it ends.
+
+Several can share it to read what must not change meanwhile.
+"""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
@@ -38,6 +43,39 @@ def is_locked(path: Path) -> bool:
         return True
     finally:
         os.close(file)
+
+
+@contextmanager
+def unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
+    """Keeps others from writing the folder that a file stands for; they may read it.
+
+    Args:
+        path: the file. Where there is none nothing is locked.
+        make: make it if need be and possible.
+
+    Raises:
+        InvalidInputError: another process is writing it.
+    """
+    try:
+        file = _open_to_share(path, os.O_CREAT if make else 0)
+    except OSError:
+        yield
+        return
+    try:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError as error:
+            raise being_written(path.parent) from error
+        yield
+    finally:
+        os.close(file)
+
+
+def _open_to_share(path: Path, make: int) -> int:
+    try:
+        return os.open(path, os.O_RDONLY | os.O_NONBLOCK | make, 0o666)
+    except OSError:  # in a folder that cannot be written, for example
+        return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
 
 
 def being_written(folder: Path) -> InvalidInputError:

@@ -22,6 +22,7 @@ from burg_drake.core.outcome import Outcome
 from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.campaign import (
     LOCK_FILE,
+    SCENES_FOLDER,
     Campaign,
     is_campaign,
     load_campaign,
@@ -33,6 +34,7 @@ from burg_drake.evaluation.campaign_document import (
     campaign_hash,
     require_same_campaign,
 )
+from burg_drake.evaluation.complete import require_scenes_judged
 from burg_drake.evaluation.executor import Executor, Job, JobFailed
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.ledger import Ledger, SceneState
@@ -93,6 +95,7 @@ def evaluate_scenes(
         call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
         judged = call.run()
         renew_report(judged)
+        require_scenes_judged(judged)
         return judged
 
 
@@ -136,6 +139,8 @@ class _Call:
         # a scene whose grasps are shared out knows its share
         self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
         self.judged = 0
+        asked = self.request.scene_reports
+        self.reports = self.campaign.document.has_few_scenes if asked is None else asked
 
     def run(self) -> Campaign:
         """Judges what is left."""
@@ -145,6 +150,7 @@ class _Call:
             tuple(self.campaign.places),
             self.campaign.document.instances,
             self.request.table,
+            self.reports,
         )
         with ExitStack() as stack:
             crew = stack.enter_context(
@@ -159,9 +165,10 @@ class _Call:
         document = self.campaign.document
         self.expected = self.campaign.expected_by_scene
         there = sum(n for name, n in self.expected.items() if name not in left)
-        event = Progress(STARTING, there, sum(self.expected.values()), outcomes=self._found())
+        found = self._found()
+        event = Progress(STARTING, there, sum(self.expected.values()), outcomes=found)
         self.pace = Pace(self.reporter.show, event, "judging")
-        stretch = begun_now(self.executor.workers)
+        stretch = begun_now(self.executor.workers, found.total())
         stretches = document.stretches
         save_campaign(
             replace(self.campaign, document=replace(document, stretches=(*stretches, stretch)))
@@ -252,7 +259,7 @@ class _Call:
 
     def _found(self) -> Counter[Outcome]:
         """Grasps that were judged before, by outcome."""
-        if not self.ledger.states:
+        if not (self.folder / SCENES_FOLDER).exists():
             return Counter()
         codes, texts = self.campaign.rows(["outcome"]).codes("outcome")
         counts = np.bincount(codes, minlength=len(texts)).tolist()
@@ -273,4 +280,5 @@ class _Call:
             return False
         if self.request.retry_failed and state.failed:
             return False
-        return is_finished(self.campaign.folder(name), state.size, self.request.table)
+        folder = self.campaign.folder(name)
+        return is_finished(folder, state.size, self.request.table, report=self.reports)

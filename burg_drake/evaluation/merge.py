@@ -1,7 +1,8 @@
 """Unites runs of the same: shards, or copies that were interrupted.
 
-What comes of it has the rows of a run that nobody divided, to the bit. It is written beside the
-place where it is to be, and gets there when it is whole.
+What comes of it has the rows of a run that nobody divided, to the bit. Its journals are written
+beside the place where it is to be, and get there when they are whole; what is made from them
+follows, and if that is killed, the same call finishes it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import re
 import secrets
 import shutil
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,11 +21,17 @@ from burg_drake.core.files import writable_folder
 from burg_drake.core.references import portable_reference
 from burg_drake.core.resources import PACKAGE_URI, resolve
 from burg_drake.core.schema import load_document, save_document
-from burg_drake.evaluation.campaign import LOCK_FILE, Campaign
+from burg_drake.evaluation.campaign import Campaign, is_campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
-from burg_drake.evaluation.lock import being_written, is_locked
+from burg_drake.evaluation.lock import unchanged
+from burg_drake.evaluation.merge_finish import (
+    Left,
+    finish,
+    lock_file,
+    note_unfinished,
+    unfinished,
+)
 from burg_drake.evaluation.merge_journals import Choice, choose, chosen_lines
-from burg_drake.evaluation.preparation import finish_run
 from burg_drake.evaluation.results import open_results
 from burg_drake.evaluation.run_document import Stretch, differences, identity
 from burg_drake.evaluation.run_store import (
@@ -32,7 +39,6 @@ from burg_drake.evaluation.run_store import (
     SCENE_FILE,
     STATION_FILE,
     Run,
-    load_run,
     portable_station,
     save_run,
 )
@@ -92,18 +98,27 @@ def unite(paths: Sequence[str | Path], out: str | Path) -> Merged:
 
     Args:
         paths: folders of runs, all of one scene or all of many.
-        out: folder for the united run; it does not exist, or is empty.
+        out: folder for the united run; it does not exist, or is empty, or the same call was killed
+            when it had put the run there.
 
     Raises:
         InvalidInputError: a folder holds no run or is being written, the runs are not of the same,
             two disagree about a grasp, or `out` cannot be written.
         MissingDependencyError: runs over many scenes without pyarrow.
     """
-    folders = _distinct(paths)
+    folders, folder = _distinct(paths), Path(out)
+    left = unfinished(folder, folders)
+    if left is None:
+        with ExitStack() as stack:
+            for path in folders:
+                stack.enter_context(unchanged(lock_file(path), make=is_campaign(path)))
+            left = _unite(folders, folder)
+    return Merged(finish(folder, folders), left.missing, left.scenes, left.shards)
+
+
+def _unite(folders: Sequence[Path], folder: Path) -> Left:
+    """Puts a united run where it is to be, but for what is made from its journals."""
     results = [open_results(path) for path in folders]
-    for path in folders:
-        if any(is_locked(path / name) for name in (JOURNAL_FILE, LOCK_FILE)):
-            raise being_written(path)
     kinds = {type(result) for result in results}
     if len(kinds) > 1:
         one = next(r.path for r in results if isinstance(r, Run))
@@ -111,19 +126,20 @@ def unite(paths: Sequence[str | Path], out: str | Path) -> Merged:
         raise InvalidInputError(
             f"{one} is a run of one scene, {many} one of many; only runs of the same can be united"
         )
-    folder = Path(out)
     beside = _place_beside(folder)
     try:
         campaigns = [result for result in results if isinstance(result, Campaign)]
         if campaigns:
             from burg_drake.evaluation.merge_campaigns import merge_campaigns
 
-            return merge_campaigns(campaigns, beside, folder)
-        runs = [result for result in results if isinstance(result, Run)]
-        choice = write_united(runs, beside, folder)
+            left = merge_campaigns(campaigns, beside, folder)
+        else:
+            runs = [result for result in results if isinstance(result, Run)]
+            choice = write_united(runs, beside, folder)
+            left = Left(choice.missing, (), missing_shards(runs))
+        note_unfinished(beside, folders, left)
         move(beside, folder)
-        run = load_run(folder)
-        return Merged(finish_run(run, run.document.table), choice.missing, (), missing_shards(runs))
+        return left
     finally:
         shutil.rmtree(beside, ignore_errors=True)
 

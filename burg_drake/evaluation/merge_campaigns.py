@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,33 +13,43 @@ from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.campaign import (
     SCENES_FOLDER,
     Campaign,
-    load_campaign,
     save_campaign,
 )
 from burg_drake.evaluation.campaign_document import campaign_differences
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.ledger import LEDGER_FILE, SceneState, ledger_text
+from burg_drake.evaluation.lock import unchanged
 from burg_drake.evaluation.merge import (
-    Merged,
     all_stretches,
     common_shard,
     copy_documents,
     missing_shards,
-    move,
     write_united,
 )
+from burg_drake.evaluation.merge_finish import Left
 from burg_drake.evaluation.merge_journals import choose
 from burg_drake.evaluation.part_file import require_arrow
 from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex
-from burg_drake.evaluation.part_writer import PartWriter
-from burg_drake.evaluation.preparation import finish_run
-from burg_drake.evaluation.report import write_campaign_report
-from burg_drake.evaluation.run_store import RUN_FILE, Run, load_run
+from burg_drake.evaluation.run_notes import shortfalls
+from burg_drake.evaluation.run_store import REPORT_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.shard import share
 
 
-def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -> Merged:
-    """Unites runs over many scenes; see `merge.unite`."""
+def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -> Left:
+    """Writes a united run over many scenes, but for what is made from its journals.
+
+    Args:
+        campaigns: the runs.
+        beside: an empty folder to write it to.
+        folder: where it is to be, which references have to fit.
+
+    Returns:
+        What no run has.
+
+    Raises:
+        InvalidInputError: the runs are not of the same, or disagree.
+        MissingDependencyError: pyarrow is not installed.
+    """
     require_arrow("a run over many scenes")
     first = campaigns[0]
     for other in campaigns[1:]:
@@ -60,16 +71,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -
     merge.copy_parts()
     atomic_write(beside / LEDGER_FILE, ledger_text(merge.states))
     save_campaign(united)
-    move(beside, folder)
-    united = load_campaign(folder)
-    for name in merge.anew:
-        run = united.run(name)
-        finish_run(run, run.document.table)
-    writer = PartWriter(folder, united.places, document.instances)
-    writer.catch_up()
-    writer.close()
-    write_campaign_report(united)
-    return Merged(united, merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
+    return Left(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 
 
 class _Merge:
@@ -78,7 +80,6 @@ class _Merge:
     Attributes:
         states: of the scenes.
         copied: by number of the run: scenes that were copied from it as they are.
-        anew: scenes that several runs have judged.
         missing: grasps without a verdict.
         not_begun: scenes that no run has begun.
     """
@@ -89,7 +90,6 @@ class _Merge:
         self._shard = "" if shard is None else str(shard)
         self.states: list[SceneState] = []
         self.copied: dict[int, set[str]] = {k: set() for k in range(len(campaigns))}
-        self.anew: list[str] = []
         self.missing = 0
         self.not_begun: list[str] = []
 
@@ -103,6 +103,12 @@ class _Merge:
             else:
                 self.not_begun.append(name)
             return
+        with ExitStack() as stack:
+            for k in begun:
+                stack.enter_context(unchanged(self._campaigns[k].folder(name) / JOURNAL_FILE))
+            self._take(name, begun)
+
+    def _take(self, name: str, begun: Sequence[int]) -> None:
         target = self._united.folder(name)
         final = self._folder / SCENES_FOLDER / name
         runs = [load_run(self._campaigns[k].folder(name)) for k in begun]
@@ -111,7 +117,6 @@ class _Merge:
             return
         target.mkdir()
         choice = write_united(runs, target, final, self._shard)
-        self.anew.append(name)
         self._note(name, runs[0], choice.missing, choice.failed, choice.interrupted)
 
     def copy_parts(self) -> None:
@@ -127,7 +132,8 @@ class _Merge:
                     shutil.copy2(part.path, parts / f"part-{number:06d}-{digest}.parquet")
 
     def _copy(self, k: int, name: str, run: Run, target: Path, final: Path) -> None:
-        shutil.copytree(run.path, target, ignore=shutil.ignore_patterns(".*"))
+        # the report tells commands about the run where it was
+        shutil.copytree(run.path, target, ignore=shutil.ignore_patterns(".*", REPORT_FILE))
         copy_documents(run, target, final)
         self.copied[k].add(name)
         state = self._campaigns[k].states.get(name)
@@ -154,5 +160,6 @@ class _Merge:
             size=0 if missing else size,
             failed=failed,
             interrupted=interrupted,
+            missing="; ".join(shortfalls(run)),
         )
         self.states.append(state)

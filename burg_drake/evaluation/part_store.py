@@ -8,7 +8,7 @@ same rows.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -202,17 +202,44 @@ def _read(
         if table is None:
             return part
         tables[path] = table
-    runs = []
+    runs: list[Any] = []
     for piece, tail in zip(pieces, tails, strict=True):
+        if tail is None and len(piece) == 1:
+            runs.append(piece[0])
+            continue
         slices = [tables[part.path].slice(row, rows) for part, row, rows in piece]
         if tail is not None:
             slices.append(_with_columns(tail, wanted))
         runs.append(united(slices) if len(slices) > 1 else slices[0] if slices else None)
-    counts = np.array([0 if table is None else table.num_rows for table in runs], dtype=np.int64)
-    there = [table for table in runs if table is not None and table.num_rows]
+    counts = np.array([_size(run) for run in runs], dtype=np.int64)
+    there = [table for table in _joined(runs, tables) if table.num_rows]
     empty = arrow.table({name: empty_column(name, 0) for name in wanted})
     whole = arrow.concat_tables(there, promote_options="permissive") if there else empty
-    return Rows(whole.combine_chunks().select(list(names)), counts)
+    return Rows(whole.select(list(names)), counts)
+
+
+def _size(run: Any) -> int:
+    """Rows of a run: of a piece of a part, of a table, or none."""
+    return 0 if run is None else run[2] if isinstance(run, tuple) else run.num_rows
+
+
+def _joined(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterator[Any]:
+    """Tables of runs one after the other; pieces that follow on each other in a part as one."""
+    k = 0
+    while k < len(runs):
+        if isinstance(runs[k], tuple):
+            part, begin, rows = runs[k]
+            while (
+                k + 1 < len(runs)
+                and runs[k + 1] is not None
+                and isinstance(runs[k + 1], tuple)
+                and runs[k + 1][:2] == (part, begin + rows)
+            ):
+                k, rows = k + 1, rows + runs[k + 1][2]
+            yield tables[part.path].slice(begin, rows)
+        elif runs[k] is not None:
+            yield runs[k]
+        k += 1
 
 
 def _tail(place: Place, begin: int) -> Any | None:

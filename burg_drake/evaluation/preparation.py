@@ -116,15 +116,23 @@ def open_grasps(run: Run, *, retry_failed: bool) -> list[Candidate]:
     return [c for c in run.candidates if c.id in mine and c.id not in known]
 
 
-def finish_run(run: Run, table: TableFormat) -> Run:
-    """Writes table and report, unless they are there already."""
+def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
+    """Writes table and report, unless they are there already; where no report is wanted, one that
+    is out of date is removed."""
     if run.document.table != table:
         run = save_run(Run(run.path, replace(run.document, table=table)))
     journal = run.path / JOURNAL_FILE
-    for path, write in ((run.table_path, _write_table), (run.report_path, write_report)):
-        if not path.exists() or path.stat().st_mtime_ns < journal.stat().st_mtime_ns:
-            write(run)
+    if not _is_new(run.table_path, journal):
+        _write_table(run)
+    if not _is_new(run.report_path, journal):
+        run.report_path.unlink(missing_ok=True)
+        if report:
+            write_report(run)
     return run
+
+
+def _is_new(path: Path, journal: Path) -> bool:
+    return path.exists() and path.stat().st_mtime_ns >= journal.stat().st_mtime_ns
 
 
 def _write_table(run: Run) -> None:

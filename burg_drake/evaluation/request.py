@@ -51,6 +51,7 @@ class Request:
         table: format of the results file.
         shard: the share that is judged here; None is all.
         retry_failed: whether grasps that could not be simulated are tried again.
+        scene_reports: whether each of many scenes gets a report of its own; None if they are few.
     """
 
     station: Station
@@ -66,6 +67,7 @@ class Request:
     table: TableFormat = "csv"
     shard: Shard | None = None
     retry_failed: bool = False
+    scene_reports: bool | None = None
 
     def given(self, scene: Scene) -> ByInstance | None:
         """The user's grasps on the instances of a scene; None where they are sampled.

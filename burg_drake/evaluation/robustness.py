@@ -117,7 +117,7 @@ def assess_robustness(
         _answer(run, probes, factory, journal, known, workers, reporter)
     answers = read_journal(journal_path)
     found = tuple(_gather(grasp, answers, factory, context) for grasp in chosen)
-    write_table(table, robustness_columns(found, settings, run.document.engine))
+    write_table(table, robustness_columns(found, settings, run.document.engine, run.document.hash))
     failures = {
         p.id: answers[p.id].reason
         for p in probes

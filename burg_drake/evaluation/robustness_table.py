@@ -12,6 +12,7 @@
     n_OUTCOME                 how many of them ended so
     failed                    tests that could not be simulated
     engine, seed, settings    how it was tested
+    run                       short hash of the run that the grasps are of
 
 What was never asked for is an empty cell. Answers that earlier calls got with the same settings
 stay in the table, further perturbed repeats among them.
@@ -111,7 +112,7 @@ def _unlimited(value: float) -> float:
 
 
 def robustness_columns(
-    grasps: Sequence[GraspRobustness], settings: RobustnessSettings, engine: Engine
+    grasps: Sequence[GraspRobustness], settings: RobustnessSettings, engine: Engine, run: str
 ) -> Columns:
     """The table."""
     columns: Columns = {
@@ -138,6 +139,7 @@ def robustness_columns(
     columns["engine"] = np.array([engine_label(engine)] * len(grasps), dtype=np.str_)
     columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)
     columns["settings"] = np.array([_settings_text(settings)] * len(grasps), dtype=np.str_)
+    columns["run"] = np.array([run] * len(grasps), dtype=np.str_)
     return columns
 
 

@@ -93,12 +93,14 @@ class Stretch:
     Attributes:
         started: date and time, ISO 8601 with time zone.
         workers: number of worker processes.
+        before: grasps that had a verdict when it began; unknown in runs of earlier versions.
         judged: grasps judged in it; unknown if it was killed.
         seconds: wall time it took; unknown if it was killed.
     """
 
     started: str
     workers: int
+    before: int | None = None
     judged: int | None = None
     seconds: float | None = None
 
@@ -140,9 +142,10 @@ class RunDocument:
     stretches: tuple[Stretch, ...] = ()
 
 
-def begun_now(workers: int) -> Stretch:
-    """A stretch of work that begins now."""
-    return Stretch(started=datetime.now(UTC).isoformat(timespec="seconds"), workers=workers)
+def begun_now(workers: int, before: int) -> Stretch:
+    """A stretch of work that begins now, when so many grasps have a verdict."""
+    started = datetime.now(UTC).isoformat(timespec="seconds")
+    return Stretch(started=started, workers=workers, before=before)
 
 
 def software_versions() -> dict[str, str]:

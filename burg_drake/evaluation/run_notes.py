@@ -35,7 +35,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
     """A sentence for each instance with fewer grasps than asked, or for those that no grasps were
     given for, and for each object of which nothing could be executed, once all of its grasps are
     judged."""
-    return (*_shortfalls(run), *_unexecuted(run))
+    return (*_ungiven(run), *shortfalls(run), *_unexecuted(run))
 
 
 def ungiven_note(objects: Iterable[str], given: Iterable[str]) -> str:
@@ -44,16 +44,23 @@ def ungiven_note(objects: Iterable[str], given: Iterable[str]) -> str:
     return f"no grasps to judge for {listing(missing)}" if missing else ""
 
 
-def _shortfalls(run: Run) -> list[str]:
-    grasps = run.document.grasps
-    asked = grasps.per_object
+def shortfalls(run: Run) -> list[str]:
+    """A sentence for each instance with fewer grasps than were to be sampled."""
+    asked = run.document.grasps.per_object
     if asked is None:
-        note = ungiven_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
-        return [note] if note else []
+        return []
     found = Counter(run.candidates.instance.tolist())
     parts = run.candidates.grasps.provenance.get("parts", {})
     notes = (shortfall(name, asked, part, found[name]) for name, part in parts.items())
     return [note for note in notes if note]
+
+
+def _ungiven(run: Run) -> list[str]:
+    grasps = run.document.grasps
+    if grasps.per_object is not None:
+        return []
+    note = ungiven_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
+    return [note] if note else []
 
 
 def _unexecuted(run: Run) -> list[str]:

@@ -104,7 +104,7 @@ class Run:
             self.candidates,
             self.verdicts,
             origin_of(self.document),
-            instances=self._instances,
+            instances=self.instances,
             joints=self._joints,
         )
 
@@ -127,7 +127,7 @@ class Run:
         part.__dict__.update(
             candidates=self.candidates,
             verdicts=verdicts,
-            _instances=self._instances,
+            _instances=self.instances,
             _joints=self._joints,
         )
         return part
@@ -229,10 +229,10 @@ class Run:
         return station
 
     @cached_property
-    def _instances(self) -> list[str]:
+    def instances(self) -> tuple[str, ...]:
         """Names of the free objects of the scene that was judged."""
         document = load_document(self.path / SCENE_FILE, SceneDocument)
-        return [instance.name or instance.object for instance in document.instances]
+        return tuple(instance.name or instance.object for instance in document.instances)
 
     @cached_property
     def _joints(self) -> int:

@@ -16,8 +16,9 @@ thirtieth of the time of the trials."""
 
 
 def preparers(workers: int) -> int:
-    """How many processes prepare scenes; none does it in this process."""
-    return -(-workers // WORKERS_EACH)
+    """How many processes prepare scenes; 0 would do it in this process. A cluster may have no
+    workers yet."""
+    return max(1, -(-workers // WORKERS_EACH))
 
 
 class SceneCrew:

@@ -17,6 +17,7 @@ from burg_drake.evaluation.part_writer import PART_ROWS
 from burg_drake.evaluation.preparation import open_grasps
 from burg_drake.evaluation.request import Request
 from burg_drake.evaluation.run_document import Stretch, begun_now
+from burg_drake.evaluation.run_notes import shortfalls
 from burg_drake.evaluation.run_store import REPORT_FILE, Run, load_run, save_run
 
 
@@ -43,6 +44,7 @@ class SceneJudging:
         again = {grasp.id for grasp in self.left}
         self.mine = len(self._run.mine)
         self.known = self.mine - len(self.left)
+        self._before = len(self._run.verdicts)
         # verdicts are not kept: a thousand runs have a million
         self._failed = {
             id: v.interrupted
@@ -52,6 +54,7 @@ class SceneJudging:
         self._judged = 0
         self._workers = workers
         self._count = len(self._run.candidates)
+        self._missing = "; ".join(shortfalls(self._run))
         self._run = Run(folder, self._run.document)
 
     @property
@@ -61,7 +64,7 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Writes into the run's document that it is worked on."""
-        self._stretch = begun_now(self._workers)
+        self._stretch = begun_now(self._workers, self._before)
         self._begun = time.monotonic()
         self._save(self._stretch)
 
@@ -103,6 +106,7 @@ class SceneJudging:
             size=journal.stat().st_size if state == "done" else 0,
             failed=len(self._failed) if state == "done" else 0,
             interrupted=sum(self._failed.values()) if state == "done" else 0,
+            missing=self._missing,
         )
 
     def _save(self, stretch: Stretch) -> None:
@@ -111,11 +115,12 @@ class SceneJudging:
         save_run(replace(self._run, document=replace(document, stretches=stretches)))
 
 
-def is_finished(folder: Path, size: int, table: str) -> bool:
-    """Whether a run's journal has this size, and its table and report are not older."""
+def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
+    """Whether a run's journal has this size, and its table is not older, nor its report."""
+    names = [f"results.{table}", *([REPORT_FILE] if report else [])]
     try:
         journal = (folder / JOURNAL_FILE).stat()
-        others = [(folder / name).stat() for name in (f"results.{table}", REPORT_FILE)]
+        others = [(folder / name).stat() for name in names]
     except OSError:
         return False
     newer = all(other.st_mtime_ns >= journal.st_mtime_ns for other in others)

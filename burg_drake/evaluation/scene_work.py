@@ -94,12 +94,14 @@ class Keeping:
         places: the runs of its scenes.
         instances: names of the free objects of all of them.
         table: format of the tables.
+        reports: whether each scene gets a report.
     """
 
     folder: Path
     places: tuple[Place, ...]
     instances: Sequence[str]
     table: TableFormat
+    reports: bool
 
 
 class Finisher:
@@ -123,7 +125,7 @@ class Finisher:
             return
         run = load_run(self._folders[work.name])
         if work.judged:
-            run = finish_run(run, self._keeping.table)
+            run = finish_run(run, self._keeping.table, report=self._keeping.reports)
         self.writer.take(work.name, run)
 
     @property

@@ -2,7 +2,10 @@
 
 Parts of a table are made from journals, which only ever grow. A segment says how far a part stands,
 with hashes of what it has seen: a journal that was replaced, cut or edited is noticed, and then the
-journal counts.
+journal counts. As long as a journal has the date and size that it had when its last segment was
+made, its last bytes are compared; otherwise, as after an edit, a copy, or when it has grown, all
+bytes of all its segments are. So who edits a journal while a process writes it, or gives it its old
+date back, does so unnoticed.
 """
 
 from __future__ import annotations
@@ -17,8 +20,7 @@ from typing import BinaryIO
 from burg_drake.core.files import open_regular
 
 TAIL = 4096
-"""Bytes at the end of a segment that are compared each time; all of them if the file was touched
-since, or copied."""
+"""Bytes at the end of a segment that are compared each time."""
 CHUNK = 1 << 20
 
 
@@ -53,32 +55,35 @@ def segment_of(scene: str, journal: Path, begin: int, end: int, rows: int) -> Se
     return Segment(scene, begin, end, rows, whole, last, modified)
 
 
-def holds(segment: Segment, journal: Path) -> bool:
-    """Whether a journal still has the bytes that a segment is made of."""
-    try:
-        with open_regular(journal) as stream:
-            status = os.fstat(stream.fileno())
-            if status.st_size < segment.end:
-                return False
-            if _hash(stream, max(segment.begin, segment.end - TAIL), segment.end) != segment.last:
-                return False
-            untouched = status.st_mtime_ns == segment.modified or status.st_size > segment.end
-            return untouched or _hash(stream, segment.begin, segment.end) == segment.whole
-    except (ValueError, OSError):
-        return False
-
-
 def chain(segments: Sequence[Segment], journal: Path) -> list[Segment]:
     """Segments that follow on each other from the beginning of a journal, as far as they hold."""
+    try:
+        with open_regular(journal) as stream:
+            return _chain(segments, stream)
+    except (ValueError, OSError):
+        return []
+
+
+def _chain(segments: Sequence[Segment], stream: BinaryIO) -> list[Segment]:
+    status = os.fstat(stream.fileno())
+    size, modified = status.st_size, status.st_mtime_ns
+    untouched = any(s.end == size and s.modified == modified for s in segments)
     found: list[Segment] = []
     place = 0
     while True:
-        following = [s for s in segments if s.begin == place and s.end > place]
-        following = [s for s in following if holds(s, journal)]
+        following = [s for s in segments if s.begin == place and place < s.end <= size]
+        following = [s for s in following if _holds(s, stream, untouched=untouched)]
         if not following:
             return found
         found.append(max(following, key=lambda s: s.end))
         place = found[-1].end
+
+
+def _holds(segment: Segment, stream: BinaryIO, *, untouched: bool) -> bool:
+    """Whether a journal still has the bytes that a segment is made of."""
+    if untouched:
+        return _hash(stream, max(segment.begin, segment.end - TAIL), segment.end) == segment.last
+    return _hash(stream, segment.begin, segment.end) == segment.whole
 
 
 def whole_lines(journal: Path) -> int:

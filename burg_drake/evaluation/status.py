@@ -1,34 +1,28 @@
 """How far a run is, seen from another process while it works, or afterwards.
 
-The first look counts the lines of the journals that the store does not have yet; each later look
-reads what has come since.
+The first look reads what the journals have beyond the parts of the table; each later look reads
+what has come since.
 """
 
 from __future__ import annotations
 
-import os
-import re
 import time
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core.files import open_regular
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.campaign import LOCK_FILE, Campaign
+from burg_drake.evaluation.campaign import CAMPAIGN_FILE, LOCK_FILE, Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
-from burg_drake.evaluation.ledger import Ledger
+from burg_drake.evaluation.journal_tail import JournalTail, tails_of
 from burg_drake.evaluation.lock import is_locked
+from burg_drake.evaluation.part_store import Place
 from burg_drake.evaluation.results import open_results
-from burg_drake.evaluation.run_document import RunDocument, Stretch
+from burg_drake.evaluation.run_document import Stretch
+from burg_drake.evaluation.run_store import RUN_FILE, Run
 from burg_drake.evaluation.shard import share
 
-LINE = re.compile(rb'^\{"id":"((?:[^"\\]|\\.)*)","outcome":"([a-z_]+)"[^\n]*\}\n', re.MULTILINE)
-"""A line of a journal, as `journal.encode` writes it."""
-FAILED = Outcome.SIMULATION_FAILED.value.encode()
-CHUNK = 1 << 22
 WINDOW = 60.0
 """The rate is that of so long [s], once a status has been followed for that long."""
 
@@ -78,53 +72,6 @@ class Status:
         return {**vars(self), "outcomes": dict(self.outcomes), "complete": self.complete}
 
 
-@dataclass
-class _Tail:
-    """What is known of a journal, up to a byte."""
-
-    path: Path
-    place: int = 0
-    lines: int = 0
-    outcomes: Counter[bytes] = field(default_factory=Counter)
-    failed: set[bytes] = field(default_factory=set)
-    modified: float = 0.0
-
-    def refresh(self) -> None:
-        """Reads what has come since."""
-        try:
-            status = os.stat(self.path)
-        except OSError:
-            return
-        if status.st_size < self.place:  # it was begun again
-            self.place, self.lines, self.outcomes, self.failed = 0, 0, Counter(), set()
-        if status.st_size == self.place:
-            return
-        self.modified = status.st_mtime
-        with open_regular(self.path) as stream:
-            stream.seek(self.place)
-            while data := stream.read(CHUNK):
-                whole = data.rfind(b"\n") + 1
-                if not whole:
-                    return
-                self._count(data[:whole])
-                self.place += whole
-                stream.seek(self.place)
-
-    def _count(self, data: bytes) -> None:
-        found = LINE.findall(data)
-        self.lines += len(found)
-        self.outcomes.update(outcome for _, outcome in found)
-        if not self.failed and self.outcomes[FAILED] == 0:
-            return
-        for id, outcome in found:
-            if id in self.failed:  # judged again
-                self.failed.discard(id)
-                self.outcomes[FAILED] -= 1
-                self.lines -= 1
-            if outcome == FAILED:
-                self.failed.add(id)
-
-
 class Watch:
     """Looks at a run again and again."""
 
@@ -135,19 +82,19 @@ class Watch:
             InvalidInputError: there is no run.
             DocumentError: its document does not fit the schema.
         """
-        self._result = open_results(path)
-        self._tails: dict[str, _Tail] = {}
-        self._ledger = Ledger(self._result.path)
+        self._date = _date_of(Path(path))
+        self._result = result = open_results(path)
+        places = result.places if isinstance(result, Campaign) else [Place("", result.path)]
+        self._tails = tails_of(result.path, places)
         self._history: list[tuple[float, int]] = []
 
     def look(self) -> Status:
         """How far it is now."""
-        if isinstance(self._result, Campaign):
-            return self._campaign(self._result)
-        run = open_results(self._result.path)
-        assert isinstance(run.document, RunDocument)
-        document = run.document
-        tail = self._tail("", run.path)
+        self._result = result = self._reopened()
+        if isinstance(result, Campaign):
+            return self._campaign(result)
+        run, document = result, result.document
+        tail = self._tail("")
         total = len(share(range(document.grasps.count), document.shard))
         judged = min(tail.lines, total)
         working = is_locked(run.path / JOURNAL_FILE)
@@ -168,21 +115,18 @@ class Watch:
         )
 
     def _campaign(self, campaign: Campaign) -> Status:
-        self._ledger.refresh()
-        states = self._ledger.states
-        campaign.__dict__["states"] = states
+        states = campaign.states
         begun = [n for n in campaign.names if n in states and states[n].state in ("open", "done")]
         outcomes: Counter[bytes] = Counter()
         judged, last = 0, 0.0
         for name in begun:
-            tail = self._tail(name, campaign.folder(name))
+            tail = self._tail(name)
             outcomes.update(tail.outcomes)
             judged += tail.lines
             last = max(last, tail.modified)
         working = is_locked(campaign.path / LOCK_FILE)
         total = max(judged, campaign.expected)
-        now = open_results(campaign.path)
-        rate = self._rate(judged, now.document.stretches, working)
+        rate = self._rate(judged, campaign.document.stretches, working)
         mine = set(campaign.names)
         ended = [s for n, s in states.items() if n in mine and s.state in ("done", "empty")]
         return Status(
@@ -202,8 +146,17 @@ class Watch:
             under_way=tuple(n for n in begun if states[n].state == "open"),
         )
 
-    def _tail(self, name: str, folder: Path) -> _Tail:
-        tail = self._tails.setdefault(name, _Tail(folder / JOURNAL_FILE))
+    def _reopened(self) -> Run | Campaign:
+        """The run as it is now; its document is read if it has another date."""
+        path = self._result.path
+        date = _date_of(path)
+        if date == self._date:
+            return replace(self._result)  # without what it remembers
+        self._date = date
+        return open_results(path)
+
+    def _tail(self, name: str) -> JournalTail:
+        tail = self._tails[name]
         tail.refresh()
         return tail
 
@@ -219,13 +172,24 @@ class Watch:
         begun, before = self._history[0]
         if now - begun >= WINDOW / 4:
             return (judged - before) / (now - begun) or None
-        if not stretches or stretches[-1].judged is not None:
-            return None
-        earlier = sum(stretch.judged or 0 for stretch in stretches[:-1])
-        seconds = (
-            datetime.now(UTC) - datetime.fromisoformat(stretches[-1].started)
-        ).total_seconds()
-        return (judged - earlier) / seconds if seconds > 0 and judged > earlier else None
+        return _rate_of(stretches[-1], judged) if stretches else None
+
+
+def _date_of(path: Path) -> tuple[int, ...]:
+    """Of the document of a run."""
+    files = (path / CAMPAIGN_FILE, path / RUN_FILE)
+    return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
+
+
+def _rate_of(stretch: Stretch, judged: int) -> float | None:
+    """Grasps a second of a stretch that is under way; None if it does not say how many were judged
+    when it began."""
+    if stretch.judged is not None or stretch.before is None:
+        return None
+    begun = datetime.fromisoformat(stretch.started)
+    seconds = (datetime.now(UTC) - begun).total_seconds()
+    done = judged - stretch.before
+    return done / seconds if seconds > 0 and done > 0 else None
 
 
 def read_status(path: str | Path) -> Status:

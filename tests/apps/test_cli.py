@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
+import signal
 import subprocess
 import sys
 
@@ -24,7 +26,7 @@ from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.evaluation.mode import MODES
 from burg_drake.station.engine import ENGINES
 
-GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"])
+GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"], ["trials"])
 HELP = (
     [],
     *GROUPS,
@@ -38,6 +40,8 @@ HELP = (
     *(["hand", v] for v in ("list", "check")),
     *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
     *([v] for v in ("printout", "ar", "setup", "ros")),
+    *([v] for v in ("compare", "gap", "merge", "status")),
+    *(["trials", v] for v in ("plan", "sheet", "export", "serve", "record", "show", "restore")),
 )
 
 
@@ -53,12 +57,13 @@ def test_help(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_examples_of_the_help_can_be_parsed(capsys: pytest.CaptureFixture[str]) -> None:
+    parser = cli.build_parser()
     for verb in HELP:
         with pytest.raises(SystemExit):
-            cli.main([*verb, "--help"])
+            parser.parse_args([*verb, "--help"])
         for line in capsys.readouterr().out.splitlines():
             if line.startswith("  burg-drake "):
-                cli.build_parser().parse_args(line.split()[1:])
+                parser.parse_args(shlex.split(line)[1:])
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -70,6 +75,7 @@ def test_help_imports_nothing_heavy() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     modules = json.loads(done.stdout.split("MODULES ")[1])
     heavy = ("pydrake", "trimesh", "scipy", "numpy", "rich", "cv2", "coacd", "embreex", "yaml")
+    heavy += ("pandas", "pyarrow", "distributed", "dask")
     assert [name for name in heavy if name in modules] == []
 
 
@@ -203,6 +209,19 @@ def test_further_interrupts_change_nothing() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "burg-drake: interrupted\n")
+
+
+def test_what_goes_on_later_ends_on_sigterm_as_on_ctrl_c(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(arguments: object) -> int:
+        signal.raise_signal(signal.SIGTERM)
+        return 0
+
+    monkeypatch.setattr(evaluate, "run_evaluate", run)
+    assert cli.main(["evaluate", "tabletop_six"]) == 130
+    assert "interrupted; the same command goes on from here" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 
 def test_debug_shows_where_an_error_came_from(monkeypatch: pytest.MonkeyPatch) -> None:

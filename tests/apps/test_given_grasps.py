@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+from burg_drake.apps import evaluate, evaluate_many
 from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.table_file import read_table
 from burg_drake.scene.scene import load_scene
+from burg_drake.station.station import load_station
 
 Capture = pytest.CaptureFixture[str]
 
@@ -94,6 +98,22 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
     judged(tmp_path, "--grasps", str(path), "--mode", "hand")
     note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
     assert capsys.readouterr().out.startswith(note)
+
+
+def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
+    path = tmp_path / "grasps.npz"
+    GraspSet.create(X_OG, object="box").save(path)
+    parser = argparse.ArgumentParser()
+    evaluate.add_to(parser.add_subparsers())
+    station = load_station("panda_tabletop")
+    scene = load_scene("tabletop_six")
+    arguments = parser.parse_args(["evaluate", scene.name, "--grasps", str(path)])
+    with pytest.raises(InvalidInputError) as error:
+        evaluate_many._FileOfScenes(arguments, station)(scene)
+    assert "and does not say of which; evaluate that scene alone" in str(error.value)
+    arguments.grasps = str(tmp_path / "no scene ids.npz")  # another error is not taken for it
+    with pytest.raises(InvalidInputError, match=r"no scene ids\.npz does not exist"):
+        evaluate_many._FileOfScenes(arguments, station)(scene)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+from datetime import datetime
 from pathlib import Path
 from typing import Any, get_args
 
@@ -47,8 +48,8 @@ def sheet(planned: Path) -> Path:
     """The trials file without entries."""
     for path in planned.glob("trials.*"):
         path.unlink()
-    for folder in ("photos", "placements"):
-        shutil.rmtree(planned / folder, ignore_errors=True)
+    for name in ("photos", "placements"):
+        shutil.rmtree(planned / name, ignore_errors=True)
     path = planned / "trials.yaml"
     path.write_text((planned / "plan.yaml").read_text())
     return path
@@ -88,21 +89,53 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
         (("2",), "nothing to record"),
         (("7", "--outcome", "lifted"), "there is no trial 7; they have 1 to 4"),
         (("2", "--outcome", "lifted", "--intrinsics", "K"), "--intrinsics is about a photo"),
-        (("2", "--note", "x", "--time", "noon"), "time is 'noon'"),
+        (("abc", "--outcome", "lifted"), "'abc': give the number of a trial, 1 to 4, or next"),
+        (("2", "--note", "  "), "nothing to record"),
+        (("2", "--outcome", "xyzzy"), "known: lifted, lifted_disturbed, slipped, dropped, closed"),
         (("2", "--photo", "none.png"), "cannot read none.png"),
     ):
         assert trials("record", sheet, *words) == 2
         assert message in capsys.readouterr().err
+    with pytest.raises(SystemExit):  # before anything else is looked at
+        trials("record", "none.yaml", "abc", "--time", "noon")
+    assert "'noon' is no time; give ISO 8601 such as" in capsys.readouterr().err
     assert trial(sheet, 2).outcome is None
     assert trials("record", sheet, "1", "--outcome", "dropped", "--correct") == 0
     assert (trial(sheet, 1).outcome, trial(sheet, 1).note) == ("dropped", "wet")
     capsys.readouterr()
     assert trials("show", sheet, "--all") == 0
     printed = capsys.readouterr().out
-    assert "next is 2" in printed and "wet" in printed and "simulated" not in printed
+    assert "next is 2" in printed and "wet" in printed and "simulat" not in printed
+    assert not any(word in printed for word in ("failure", "success\nin", "note:"))
     assert printed.split("all  ")[1].split()[:3] == ["4", "1", "1"]
     assert trials("show", sheet, "--all", "--show-simulated") == 0
-    assert "simulated" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "simulated" in printed and "in simulation" in printed
+    assert "note:" not in printed  # trials have begun
+
+
+def test_notes_are_shown_before_trials_have_begun(sheet: Path, capsys: Capture) -> None:
+    assert trials("show", sheet, "--show-simulated") == 0
+    assert "note: mug of run two: 0 of 1 with failure" in capsys.readouterr().out
+    assert trials("show", sheet) == 0
+    printed = capsys.readouterr().out
+    assert "note:" not in printed and "simulation" not in printed and "mug" in printed
+
+
+def test_times_notes_and_widths_as_people_give_them(sheet: Path, capsys: Capture) -> None:
+    words = ("1", "--outcome", "lifted", "--note", "  wet ", "--time", "2026-05-05")
+    assert trials("record", sheet, *words, "--width-mm", "500") == 0
+    assert "opens 80 mm" in capsys.readouterr().err
+    done = trial(sheet, 1)
+    assert (done.note, done.time) == ("wet", "2026-05-05")
+    assert done.robot is not None and done.robot.width_mm == 500.0
+    words = ("2", "--outcome", "lifted", "--note", " ", "--time", "2026-05-05T10:12")
+    assert trials("record", sheet, *words, "--width-mm", "79") == 0
+    assert not capsys.readouterr().err and not trial(sheet, 2).note
+    local = datetime.fromisoformat("2026-05-05T10:12").astimezone()
+    assert datetime.fromisoformat(trial(sheet, 2).time) == local
+    assert trials("record", sheet, "1", "--note", "", "--correct") == 0
+    assert not trial(sheet, 1).note
 
 
 def test_next_is_what_is_open_when_it_is_recorded(

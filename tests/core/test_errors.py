@@ -35,14 +35,15 @@ def test_nearest_suggests_and_lists():
     known = ["mug", "bowl", "marble"]
     assert errors.nearest("mog", known) == "did you mean 'mug'? Known: bowl, marble, mug"
     assert errors.nearest("spaceship", known) == "known: bowl, marble, mug"
+    assert errors.nearest("spaceship", known, ordered=True) == "known: mug, bowl, marble"
     assert errors.nearest("mug", []) == "known: (none)"
 
 
 def test_of_many_names_the_first_few_are_listed():
     many = [f"mug_{k:02}" for k in range(25)]
     assert errors.listing(many[:24]).endswith("mug_22, mug_23")
-    first = "mug_00, mug_01, mug_02, mug_03, mug_04, mug_05, mug_06, mug_07"
-    assert errors.nearest("bowl", many) == f"known: {first} and 17 others"
+    first = "mug_00, mug_01, mug_02, mug_03, mug_04, mug_05, mug_06, mug_07, mug_08"
+    assert errors.nearest("bowl", many) == f"known: {first} and 16 others"
 
 
 def test_a_field_error_keeps_its_place_on_the_way_back_from_a_worker_process():

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station, load_station
 
@@ -34,3 +35,38 @@ def known_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     import known_judge
 
     known_judge.install(monkeypatch.setattr)
+
+
+@pytest.fixture(scope="session")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Files of three scenes; nobody changes them."""
+    from known_many import write_scenes
+
+    return write_scenes(tmp_path_factory.mktemp("many"))
+
+
+@pytest.fixture(scope="session")
+def whole(scenes: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """A complete run over the three scenes, without pages; who changes it takes a copy."""
+    import known_judge
+    from known_many import empty_pages, run_all
+
+    with pytest.MonkeyPatch.context() as patch:
+        known_judge.install(patch.setattr)
+        empty_pages(patch.setattr)
+        out = tmp_path_factory.mktemp("whole") / "all"
+        return run_all(scenes, load_station("panda_tabletop"), out)
+
+
+@pytest.fixture
+def pages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports have nothing in them, unless a test asks for `reports`."""
+    from known_many import empty_pages
+
+    if "reports" not in request.fixturenames:
+        empty_pages(monkeypatch.setattr)
+
+
+@pytest.fixture
+def reports() -> None:
+    """Reports are those that a user gets."""

@@ -9,6 +9,7 @@ import hashlib
 import os
 import resource
 import signal
+import subprocess
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -99,10 +100,11 @@ class CrashingJudge(KnownJudge):
     """Ends its process on some grasps, in the stage `executed`.
 
     Attributes:
-        how: by grasp id: `segfault`, `exit`, `error`, `hang`, `spin`, `memory`, which asks for more
-            than it may have, `parent`, which ends the parent process, or `once`, which crashes only
-            as long as the file `log` does not exist; `screen` and `screen_error` are `segfault` and
-            `error` in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
+        how: by grasp id: `segfault`, `killed`, which another process does as the system does when
+            memory runs out, `exit`, `error`, `hang`, `spin`, `memory`, which asks for more than it
+            may have, `parent`, which ends the parent process, or `once`, which crashes only as long
+            as the file `log` does not exist; `screen` and `screen_error` are `segfault` and `error`
+            in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -111,6 +113,9 @@ class CrashingJudge(KnownJudge):
         match dict(self.how).get(grasp.id):
             case "segfault":
                 os.kill(os.getpid(), signal.SIGSEGV)
+            case "killed":
+                subprocess.run(["kill", "-KILL", str(os.getpid())], check=False)
+                time.sleep(3600.0)
             case "exit":
                 raise SystemExit("a condition of Drake failed")
             case "error":

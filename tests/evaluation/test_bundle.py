@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
 import shutil
@@ -121,3 +122,21 @@ def test_the_zip_is_plain() -> None:
     assert [info.filename for info in infos] == sorted(info.filename for info in infos)
     assert {info.date_time for info in infos} == {(1980, 1, 1, 0, 0, 0)}
     assert {info.external_attr >> 16 for info in infos} == {0o644}
+
+
+def test_what_is_in_the_place_of_a_bundle_is_mended_or_told_of(tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("a/one.txt", "1")
+        archive.writestr("two.txt", "2")
+    data = buffer.getvalue()
+    name = hashlib.sha256(data).hexdigest()
+    folder = unpack(data, tmp_path, name)
+    (folder / "a/one.txt").unlink()
+    (folder / "two.txt").write_text("3")
+    assert unpack(data, tmp_path, name) == folder
+    assert [(folder / f).read_text() for f in ("a/one.txt", "two.txt")] == ["1", "2"]
+    shutil.rmtree(folder)
+    folder.write_text("a file")
+    with pytest.raises(InvalidInputError, match="cannot unpack the scene into"):
+        unpack(data, tmp_path, name)

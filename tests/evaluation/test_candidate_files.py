@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, inverse, make_pose
 from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.evaluation.candidate_files import NoSceneIdsError, read_grasps
 from burg_drake.evaluation.candidate_sampling import sample_candidates
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.placement import in_frame
@@ -199,7 +199,7 @@ def test_options_that_do_not_apply(scene: Scene, tmp_path: Path) -> None:
         read_grasps(scene, path, objects={"": "cube"}, X_SF=X_SC)
     with pytest.raises(InvalidInputError, match="of their objects, to which neither a pose"):
         read_grasps(scene, path, objects={"": "cube"}, object_ids={0: "left"})
-    with pytest.raises(InvalidInputError, match="no scene ids; leave out --scene-id"):
+    with pytest.raises(NoSceneIdsError, match="no scene ids; leave out --scene-id"):
         read_grasps(scene, path, objects={"": "cube"}, scene_id="one")
     with pytest.raises(UnknownNameError, match="no free object 'cub'; did you mean 'cube'"):
         read_grasps(scene, path, objects={"": "cub"})

@@ -4,82 +4,38 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from inline_executor import Inline
 from known_judge import expected, refuse
+from known_many import OPTIONS, run_all, same
+from page_reading import read_page
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps import GraspSet
 from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
 from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.report import campaign_page
 from burg_drake.evaluation.results import load_runs, read_results
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.summary import summarize
-from burg_drake.evaluation.table import TEXT, Columns
-from burg_drake.scene.scene import Scene, load_scene, save_scene
+from burg_drake.evaluation.table import TEXT
+from burg_drake.scene.scene import Scene, load_scene
 from burg_drake.scene.scene_files import scene_references
 from burg_drake.station.station import Station
 
 pytest.importorskip("pyarrow")
-OPTIONS = {"grasps_per_object": 5, "blind": True, "progress": False}
-
-
-@pytest.fixture
-def scenes(scene: Scene, tmp_path: Path, request: pytest.FixtureRequest) -> list[Path]:
-    """Three scenes of the same library: one moved, one without the bar. Unless a test asks for
-    `reports`, pages take no time."""
-    if "reports" not in request.fixturenames:
-        patch = request.getfixturevalue("monkeypatch")
-        patch.setattr("burg_drake.evaluation.preparation.write_report", write_nothing)
-        patch.setattr("burg_drake.evaluation.many_scenes.renew_report", lambda campaign: None)
-        patch.setattr("burg_drake.evaluation.merge_campaigns.write_campaign_report", write_nothing)
-    document = scene.document
-    moved = replace(document.instances[0], X_SO=Pose((0.12, 0.2, 0.025)))
-    folder = tmp_path / "scenes"
-    folder.mkdir()
-    for name, instances in (
-        ("cubes", document.instances[:2]),
-        ("moved", (moved, *document.instances[1:])),
-        ("three", document.instances),
-    ):
-        changed = replace(document, name=name, library="../shapes", instances=instances)
-        save_scene(changed, folder / f"{name}.yaml")
-    return sorted(folder.iterdir())
-
-
-def write_nothing(run: Run | Campaign) -> None:
-    run.report_path.write_text("")
-
-
-@pytest.fixture
-def reports() -> None:
-    """Reports are written."""
-
-
-def run_all(scenes: list[Path], station: Station, out: Path, **options) -> Campaign:
-    executor = options.pop("executor", None) or Inline()
-    return evaluate(scenes, station, out, executor=executor, **{**OPTIONS, **options})
-
-
-def same(a: Columns, b: Columns) -> bool:
-    """Whether tables agree bit for bit in everything but time."""
-    names = [name for name in a if not name.startswith("cpu_")]
-    assert names == [name for name in b if not name.startswith("cpu_")]
-    return all(np.array_equal(a[n], b[n], equal_nan=n not in TEXT) for n in names)
+pytestmark = pytest.mark.usefixtures("pages")
 
 
 def test_each_scene_is_as_on_its_own(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, reports: None
+    scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    campaign = run_all(scenes, station, tmp_path / "all")
-    assert "3 scenes" in campaign.report_path.read_text()
+    campaign = load_campaign(whole.path)
     assert campaign.names == ["cubes", "moved", "three"] and campaign.complete
     alone: list[Run] = [
         evaluate(path, station, tmp_path / path.stem, executor=Inline(1), **OPTIONS)
@@ -88,12 +44,12 @@ def test_each_scene_is_as_on_its_own(
     for run, own in zip(load_runs(campaign.path), alone, strict=True):
         assert same(run.results, own.results)
         assert {p.name for p in run.path.iterdir()} == {p.name for p in own.path.iterdir()}
-    whole = campaign.results
+    table = campaign.results
     for name in ("id", "outcome", "slip", "run", "seed", "X_OG", "given_none"):
         parts = [run.results.get(name, np.full(len(run.results["id"]), np.nan)) for run in alone]
         found = read_results(campaign.path, [name])[name]
         assert np.array_equal(found, np.concatenate(parts), equal_nan=name not in TEXT)
-    assert np.isnan(whole["moved_bar"][:10]).all()
+    assert np.isnan(table["moved_bar"][:10]).all()
     summary, own = summarize(campaign), [summarize(run) for run in alone]
     assert [group.judged for group in summary.scenes] == [10, 15, 15]
     assert summary.total.outcomes == sum((s.total.outcomes for s in own), start=Counter())
@@ -102,11 +58,9 @@ def test_each_scene_is_as_on_its_own(
         assert group.judged == sum(g.judged for s in own for g in s.objects if g.name == name)
 
 
-def test_any_program_reads_the_parts(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
-) -> None:
+def test_any_program_reads_the_parts(whole: Campaign) -> None:
     pandas = pytest.importorskip("pandas")
-    campaign = run_all(scenes, station, tmp_path / "all")
+    campaign = load_campaign(whole.path)
     theirs = pandas.read_parquet(campaign.path / "parts")
     ours = campaign.frame()
     assert len(theirs) == len(ours) == 40
@@ -121,9 +75,8 @@ def test_any_program_reads_the_parts(
 
 
 def test_an_interrupted_call_goes_on(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+    scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    whole = run_all(scenes, station, tmp_path / "whole")
     executor = Inline(seed=2, stop=17)
     with pytest.raises(KeyboardInterrupt):
         run_all(scenes, station, tmp_path / "again", executor=executor)
@@ -142,9 +95,9 @@ def test_an_interrupted_call_goes_on(
 
 
 def test_without_what_can_be_deleted_it_is_the_same(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+    scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    campaign = run_all(scenes, station, tmp_path / "all")
+    campaign = load_campaign(shutil.copytree(whole.path, tmp_path / "all"))
     before = campaign.results
     shutil.rmtree(campaign.path / "parts")
     assert same(before, load_campaign(campaign.path).results)
@@ -155,15 +108,12 @@ def test_without_what_can_be_deleted_it_is_the_same(
 
 
 def test_what_is_not_the_same_is_refused(
-    scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
+    scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    out = tmp_path / "all"
-    run_all(scenes, station, out)
-    text = scenes[1].read_text()
-    scenes[1].write_text(text.replace("0.12", "0.13"))
+    out = shutil.copytree(whole.path, tmp_path / "all")
+    changed = rewritten(scenes[1], tmp_path, "0.12", "0.13")
     with pytest.raises(InvalidInputError, match=r"another run \(scenes: changed moved\); choose"):
-        run_all(scenes, station, out)
-    scenes[1].write_text(text)
+        run_all([scenes[0], changed, scenes[2]], station, out)
     with pytest.raises(InvalidInputError, match=r"\(scenes: only there three\)"):
         run_all(scenes[:2], station, out)
     with pytest.raises(InvalidInputError, match=r"\(seed is 0 there, 1 here\)"):
@@ -175,7 +125,7 @@ def test_what_is_not_the_same_is_refused(
     with pytest.raises(InvalidInputError, match=r"cubes\.yaml is given twice; give it once"):
         run_all([scenes[0], scenes[0]], station, tmp_path / "twice")
     with pytest.raises(InvalidInputError, match=r"three\.yaml are the same scene; give it once"):
-        run_all([scene, *scenes], station, tmp_path / "twice")
+        run_all([rewritten(scenes[2], tmp_path, "", ""), *scenes], station, tmp_path / "twice")
     with pytest.raises(InvalidInputError, match=r"2 of 3 scenes cannot be read: .*gone.*other"):
         run_all([scenes[0], "gone.yaml", "other.yaml"], station, tmp_path / "new")
     assert not (tmp_path / "new").exists()
@@ -208,16 +158,58 @@ def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
     assert mended.complete and not mended.failed and executor.judged == 25
 
 
+def test_of_many_scenes_only_who_asks_gets_reports(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
+) -> None:
+    def reports() -> list[bool]:
+        return [run.report_path.exists() for run in campaign.runs]
+
+    monkeypatch.setattr("burg_drake.evaluation.campaign_document.FEW_SCENES", 2)
+    campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
+    assert campaign.complete and reports() == [False] * 3
+    assert all(run.table_path.exists() for run in campaign.runs)
+    dates = {run.table_path: run.table_path.stat().st_mtime_ns for run in campaign.runs}
+    prepared: list[str] = []
+    monkeypatch.setattr(
+        "burg_drake.evaluation.scene_work.open_run", lambda folder, *_: prepared.append(folder.name)
+    )
+    run_all(scenes, station, tmp_path / "all", grasps_per_object=1)  # has nothing to do
+    assert not prepared and all(p.stat().st_mtime_ns == date for p, date in dates.items())
+    monkeypatch.undo()
+    page = read_page(campaign_page(campaign))
+    assert f"burg-drake report {tmp_path}/all/scenes/" in page.text
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_reports_of_scenes_as_asked(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, asked: bool
+) -> None:
+    campaign = run_all(scenes[:2], station, tmp_path / "all", scene_reports=not asked, only=["bar"])
+    again = run_all(scenes[:2], station, campaign.path, scene_reports=asked, only=["bar"])
+    assert again.run("moved").report_path.exists()  # one that is not out of date stays
+    journal = again.run("moved").path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes()[:-1])
+    run_all(scenes[:2], station, campaign.path, scene_reports=asked, only=["bar"])
+    assert again.run("moved").report_path.exists() == asked
+
+
+def rewritten(scene: Path, folder: Path, old: str, new: str) -> Path:
+    """A scene with another text, in another folder."""
+    library = str(scene.parent.parent / "shapes")
+    text = scene.read_text().replace(old, new).replace("../shapes", library)
+    (folder / scene.name).write_text(text)
+    return folder / scene.name
+
+
 def test_names_and_places(
     scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    other = tmp_path / "cubes.yaml"
-    other.write_text(scenes[0].read_text().replace("0.1", "0.11").replace("../shapes", "shapes"))
+    other = rewritten(scenes[0], tmp_path, "0.1", "0.11")
     campaign = run_all([*scenes, other], station, tmp_path / "all", grasps_per_object=1)
     assert campaign.names == ["cubes", "moved", "three", "cubes_2"]
     assert campaign.run("cubes_2").scene().path.parent == campaign.path / "scenes/cubes_2"
-    assert scene_references([str(tmp_path / "scenes")]) == [str(path) for path in scenes]
-    assert scene_references([str(tmp_path / "scenes/*e*.yaml")]) == [str(path) for path in scenes]
+    assert scene_references([str(scenes[0].parent)]) == [str(path) for path in scenes]
+    assert scene_references([f"{scenes[0].parent}/*e*.yaml"]) == [str(path) for path in scenes]
     with pytest.raises(InvalidInputError, match="is a folder without scenes"):
         scene_references([str(tmp_path / "all/scenes")])
 
@@ -242,3 +234,21 @@ def test_given_grasps_go_where_their_objects_are(
     only = run_all(scenes, station, tmp_path / "only", only=["bar"])
     assert set(only.columns(["object"])["object"].tolist()) == {"bar"}
     assert load_scene(scenes[0]).content == only.document.scenes[0].content
+
+
+def test_fewer_grasps_than_asked_are_explained(
+    scenes: list[Path],
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def shortfall(name: str, asked: int, part: object, found: int) -> str:
+        return f"{name}: {found} of 6" if name == "bar" else ""
+
+    monkeypatch.setattr("burg_drake.evaluation.run_notes.shortfall", shortfall)
+    campaign = run_all(scenes, station, tmp_path / "all")
+    assert summarize(load_campaign(campaign.path)).notes == (
+        "scene moved: bar: 5 of 6",
+        "scene three: bar: 5 of 6",
+    )

@@ -8,20 +8,23 @@ from pathlib import Path
 
 import pytest
 from inline_executor import Inline
-from test_many_scenes import OPTIONS, run_all, same, scenes
+from known_many import OPTIONS, run_all, same
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.files import UNFINISHED
 from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation import merge
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.journal import JOURNAL_FILE, decode, encode
 from burg_drake.evaluation.merge import unite
+from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.run_store import Run, load_run
 from burg_drake.evaluation.shard import Shard
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
-__all__ = ["scenes"]
+pytestmark = pytest.mark.usefixtures("pages")
 
 
 def run_one(scene: Scene, station: Station, out: Path, **options) -> Run:
@@ -58,8 +61,8 @@ def test_shards_of_one_scene(
     for k, shard in enumerate(shards):
         assert shard.complete and shard.document.hash == whole.document.hash
         assert shard.results["id"].tolist() == whole.candidates.id[k::3]
-        assert f"This is shard {k + 1} of 3" in shard.report_path.read_text()
         assert f"shard {k + 1}/3:" in (shard.path / "results.csv-metadata.json").read_text()
+    assert "This is shard 3 of 3" in report_page(shards[2])
     merged = unite([shard.path for shard in reversed(shards)], tmp_path / "merged")
     assert merged.notes == () and isinstance(merged.result, Run)
     assert same(whole.results, merged.result.results) and merged.result.complete
@@ -77,11 +80,15 @@ def test_shards_of_one_scene(
     assert executor.judged == 5 and same(whole.results, rest.results)
 
 
-@pytest.mark.parametrize("count", [2, 5])  # scenes as wholes, and grasps of each
+@pytest.mark.parametrize("count", [2, 4])  # scenes as wholes, and grasps of each
 def test_shards_of_many_scenes(
-    count: int, scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+    count: int,
+    scenes: list[Path],
+    whole: Campaign,
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
 ) -> None:
-    whole = run_all(scenes, station, tmp_path / "whole")
     folders = []
     for k in range(1, count + 1):
         shard = run_all(scenes, station, tmp_path / f"s{k}", shard=f"{k}/{count}")
@@ -104,9 +111,8 @@ def test_shards_of_many_scenes(
 
 
 def test_interrupted_copies(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None
+    scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    whole = run_all(scenes, station, tmp_path / "whole")
     for name, seed, stop in (("a", 1, 22), ("b", 2, 31)):
         with pytest.raises(KeyboardInterrupt):
             run_all(scenes, station, tmp_path / name, executor=Inline(seed, stop))
@@ -172,3 +178,87 @@ def test_a_merge_that_was_killed_leaves_nothing(
     (left / JOURNAL_FILE).write_bytes(b"half")
     unite([run.path], tmp_path / "b")
     assert not left.exists() and same(load_run(tmp_path / "b").results, run.results)
+
+
+def test_the_same_merge_finishes_what_was_killed(
+    scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    few = {"grasps_per_object": 1}
+    halves = [
+        run_one(scene, station, tmp_path / f"{k}", **few, shard=f"{k}/3").path for k in (1, 2)
+    ]
+    shards = [
+        run_all(scenes, station, tmp_path / f"many{k}", **few, shard=f"{k}/3").path for k in (1, 2)
+    ]
+    for paths, where in ((halves, "finish_run"), (shards, "PartWriter")):
+        whole = unite(paths, tmp_path / f"whole_{where}")
+        out = tmp_path / where
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(f"burg_drake.evaluation.merge_finish.{where}", interrupt)
+            unite(paths, out)
+        assert not (out / "report.html").exists()
+        (note,) = out.glob(".merge.*")
+        assert UNFINISHED.fullmatch(note.name)  # `evaluate` removes it
+        with pytest.raises(InvalidInputError, match="is there already; choose another -o"):
+            unite(paths[:1], out)
+        merged = unite(reversed(paths), out)
+        assert same(merged.result.results, whole.result.results)
+        assert merged.notes == tuple(n.replace(f"whole_{where}", where) for n in whole.notes)
+        files = [
+            sorted(str(p.relative_to(r)) for p in r.rglob("*")) for r in (out, whole.result.path)
+        ]
+        assert files[0] == files[1] and "report.html" in files[0]
+
+
+def interrupt(*_, **__) -> None:
+    raise KeyboardInterrupt
+
+
+def test_what_is_united_cannot_be_written_meanwhile(
+    scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    one = run_one(scene, station, tmp_path / "one", grasps_per_object=1)
+    many = run_all(scenes, station, tmp_path / "many", grasps_per_object=1)
+    (many.path / ".lock").unlink()  # as in a copy
+    tried = []
+
+    def look(*arguments, **options):
+        tried.append(arguments)
+        with pytest.raises(InvalidInputError, match="is being written by another process"):
+            run_one(scene, station, tmp_path / "one", grasps_per_object=1)
+        return choose(*arguments, **options)
+
+    def look_at_many(*arguments, **options):
+        tried.append(arguments)
+        for call, given, out in (
+            (run_all, scenes, many.path),
+            (run_one, scenes[0], many.path / "scenes" / "cubes"),
+        ):
+            with pytest.raises(InvalidInputError, match="is being written by another process"):
+                call(given, station, out, grasps_per_object=1)
+        return copytree(*arguments, **options)
+
+    choose, copytree = merge.choose, shutil.copytree
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(merge, "choose", look)
+        unite([one.path], tmp_path / "a")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            shutil,
+            "copytree",
+            lambda a, b, **o: look_at_many(a, b, **o) if a.name == "cubes" else copytree(a, b, **o),
+        )
+        unite([many.path], tmp_path / "b")
+    assert len(tried) == 2
+    run_one(scene, station, one.path, grasps_per_object=1)
+    run_all(scenes, station, many.path, grasps_per_object=1)
+
+
+def test_reports_of_scenes_do_not_name_the_old_folder(
+    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, reports: None
+) -> None:
+    old = run_all(scenes[:1], station, tmp_path / "old", grasps_per_object=1)
+    unite([old.path], tmp_path / "new")
+    for path in (tmp_path / "new").rglob("report.html"):
+        assert f"{tmp_path}/new" in path.read_text() and f"{tmp_path}/old" not in path.read_text()
+    assert len(list((tmp_path / "new").rglob("report.html"))) == 2

@@ -51,12 +51,12 @@ def test_rows_and_candidates_go_by_id(run: Run) -> None:
 
 
 def test_an_id_that_is_like_no_other_gets_no_suggestion(run: Run) -> None:
-    first = ", ".join(run.candidates.id[:8])
+    first = ", ".join(run.candidates.id[:9])
     for id in ("nope-1", f"{run.candidates.instance[0]}-xxx"):
         with pytest.raises(UnknownNameError) as caught:
             run.row(id)
         assert str(caught.value) == (
-            f"{run.path} has no judged grasp {id!r}; known: {first} and 22 others (all ids are in"
+            f"{run.path} has no judged grasp {id!r}; known: {first} and 21 others (all ids are in"
             " results.csv)"
         )
 

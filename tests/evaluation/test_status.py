@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from inline_executor import Inline
-from test_many_scenes import OPTIONS, run_all, same, scenes
+from known_many import OPTIONS, run_all, same
 
 from burg_drake.apps.cli import main
-from burg_drake.evaluation.campaign import load_campaign
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation import part_writer
+from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import JOURNAL_FILE
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, decode, encode
+from burg_drake.evaluation.journal_tail import tails_of
+from burg_drake.evaluation.part_writer import PartWriter
+from burg_drake.evaluation.run_store import Run, save_run
 from burg_drake.evaluation.status import Watch, read_status
 from burg_drake.scene.scene import Scene
 from burg_drake.station.station import Station
 
-__all__ = ["scenes"]
+pytestmark = pytest.mark.usefixtures("pages")
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -61,8 +69,55 @@ def test_of_a_run(scene: Scene, station: Station, tmp_path: Path, known_judge: N
     assert again.outcomes["simulation_failed"] == 0 and again.judged == 14
 
 
+def test_the_rate_is_that_of_the_stretch_under_way(
+    scene: Scene, station: Station, tmp_path: Path, known_judge: None
+) -> None:
+    out = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(scene, station, out, executor=Inline(stop=9), **OPTIONS)
+    run = evaluate(scene, station, out, executor=Inline(), **OPTIONS)
+    killed, last = run.document.stretches
+    assert (killed.before, killed.judged, last.before, last.judged) == (0, 9, 9, 6)
+    started = (datetime.now(UTC) - timedelta(seconds=10)).isoformat()
+    for before, rate in ((9, 0.6), (None, None)):
+        now = replace(last, started=started, before=before, judged=None, seconds=None)
+        stretches = (replace(killed, judged=None, seconds=None), now)  # by kill -9
+        save_run(Run(out, replace(run.document, stretches=stretches)))
+        with Journal(out / JOURNAL_FILE):
+            assert read_status(out).rate == (None if rate is None else pytest.approx(rate, rel=0.1))
+
+
+def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(part_writer, "PART_ROWS", 12)
+    campaign = load_campaign(shutil.copytree(whole.path, tmp_path / "all"))
+    for journal in campaign.path.glob("scenes/[mt]*/journal.jsonl"):
+        first, *rest = journal.read_bytes().splitlines(keepends=True)
+        id, verdict = decode(first)
+        failed = encode(id, replace(verdict, outcome=Outcome.SIMULATION_FAILED))
+        journal.write_bytes(b"".join([failed, *rest]))
+        if journal.parent.name == "three":  # and judged again after it went to a part
+            PartWriter(campaign.path, campaign.places, ()).catch_up()
+            journal.write_bytes(journal.read_bytes() + first)
+    writer = PartWriter(campaign.path, campaign.places, ())
+    writer.catch_up(["cubes", "moved"])
+    writer.flush()
+    tails = tails_of(campaign.path, campaign.places)
+    for name in ("cubes", "moved"):
+        assert tails[name].place == (campaign.folder(name) / JOURNAL_FILE).stat().st_size
+    told = read_status(campaign.path)
+    assert told.outcomes == Counter(campaign.columns(["outcome"])["outcome"].tolist())
+    assert told.judged == 40 and told.outcomes["simulation_failed"] == 1
+    shutil.rmtree(campaign.path / "parts")
+    assert read_status(campaign.path) == told
+
+
 def test_of_a_campaign_that_is_killed(
-    scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, capsys
+    scenes: list[Path],
+    whole: Campaign,
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    capsys,
 ) -> None:
     out = tmp_path / "killed"
     names = [str(path) for path in scenes]
@@ -86,7 +141,6 @@ def test_of_a_campaign_that_is_killed(
     assert not there.working and there.judged >= status.judged and not there.complete
     assert len(load_campaign(out).columns(["id"])["id"]) == there.judged
     again = run_all(scenes, station, out)
-    whole = run_all(scenes, station, tmp_path / "whole")
     assert same(whole.results, again.results)
     capsys.readouterr()
     assert main(["status", str(out), "--json", "--follow"]) == 0

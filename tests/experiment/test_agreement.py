@@ -138,7 +138,7 @@ def test_prior_is_half_a_trial_a_cell() -> None:
 
 
 @given(Cells)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_undefined_figures_have_a_reason_and_others_lie_within_their_intervals(
     cells: tuple[int, int, int, int],
 ) -> None:
@@ -158,7 +158,7 @@ def check(found: Agreement) -> None:
 
 
 @given(st.lists(Cells, min_size=1, max_size=5), st.integers(0, 5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_strata_without_trials_and_of_one_kind(
     counts: list[tuple[int, int, int, int]], seed: int
 ) -> None:

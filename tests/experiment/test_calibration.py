@@ -123,6 +123,14 @@ def test_very_many_trials_share_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     assert calibration("clearance", tied, good).trials == 5000
 
 
+def test_rows_that_are_shared_hardly_change_the_area(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ordered, "FINEST", 1000)
+    values = np.r_[np.arange(20_000.0), np.full(20_000, 2e4)]  # as where a margin is cut off
+    for good in (np.arange(40_000) % 20_000 >= 19_995, np.arange(40_000) == 19_999):
+        area = ranking(Ordered.of(values, good)).value
+        assert area == pytest.approx(roc_auc_score(good, values), abs=2 / 1000)
+
+
 @given(
     st.lists(st.tuples(st.sampled_from([np.nan, -1.0, 0.0, 1.0, np.inf]), st.booleans())),
     st.booleans(),

@@ -18,21 +18,24 @@ from burg_drake.apps.compare import DEFAULT_LIMIT_MM
 from burg_drake.apps.compare import SUCCESSES as OFFERED
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.robustness_shares import lifted_shares
 from burg_drake.evaluation.run_store import Run
 from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
-from burg_drake.experiment.comparison.matching import match_rows
+from burg_drake.experiment.comparison.matching import CONTENT, match_rows
 from burg_drake.experiment.comparison.pairs import NAMES
 from burg_drake.experiment.comparison.placement import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
 from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.comparison.texts import Factor, text_keys
+from burg_drake.experiment.comparison.texts import Factor, Ids, text_keys
+from burg_drake.experiment.trials.plan import plan_trials
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
     Selection,
     Stratum,
     TrialSheet,
+    load_trials,
     save_trials,
 )
 from burg_drake.experiment.trials.sources import grasp_content, source_of
@@ -91,7 +94,7 @@ def make_sheet(run: Run, folder: Path, real: tuple[str, ...] = REAL, **fields: o
                 outcome=RealOutcome(real[k % len(real)]),
                 note="<b>slipped</b> & fell" if k == 1 else "",
                 photo="photos/a b.png" if k == 1 else "",
-                placement={name: place} if k % 3 else {},
+                placement=dict.fromkeys(("box", "mug"), place) if k % 3 else {},
             )
         )
     sheet = TrialSheet(
@@ -139,6 +142,49 @@ def test_a_run_against_trials(tmp_path: Path) -> None:
     assert compare(first, tmp_path / "trials.yaml", success="held").judgement.selected.tp == 4
 
 
+def test_placement_is_good_only_where_every_object_of_the_scene_was_measured(
+    tmp_path: Path,
+) -> None:
+    first, _ = make_runs(tmp_path)
+    path = make_sheet(first, tmp_path)
+    sheet = load_trials(path)
+    near = ObjectPlace(status="measured", offset_mm=(0.5, 0.0))
+    far = ObjectPlace(status="measured", offset_mm=(9.0, 0.0))
+    places: list[dict[str, ObjectPlace]] = [{"mug": near, "box": near}, {"mug": near}]
+    places += [{"box": near}, {"box": far}, {}]
+    trials = [
+        dataclasses.replace(t, placement=places[k % 5], outcome=RealOutcome.LIFTED)
+        for k, t in enumerate(sheet.trials[:5])  # all of them target one object
+    ]
+    save_trials(dataclasses.replace(sheet, trials=tuple(trials)), path)
+    p = compare(first, path).judgement.placement
+    assert p is not None and len({t.instance for t in trials}) == 1
+    assert (p.within.trials, p.beyond.trials, p.unmeasured.trials) == (1, 1, 3)
+
+
+def test_trials_that_neither_run_has_count_once(tmp_path: Path) -> None:
+    first, _ = make_runs(tmp_path)
+    path = make_sheet(first, tmp_path)
+    scene = known_runs.make_scene(tmp_path)
+    runs = []
+    for name, judged in (
+        ("less", (True, True, False, False)),
+        ("least", (True, False, True, False)),
+    ):
+        told = [known_runs.ended("lifted") if there else None for there in (*judged, True, True)]
+        runs.append(
+            known_runs.make_run(tmp_path / name, scene, dict.fromkeys(known_runs.OBJECTS, told))
+        )
+    found = compare(*runs, path)
+    assert found.coverage.left_out == {
+        "grasp is not judged in the second run": 2,
+        "grasp is not judged in the first run": 2,
+        "grasp is not judged in either run": 2,
+        "not_attempted": 2,
+    }
+    assert found.coverage.compared + sum(found.coverage.left_out.values()) == 12
+
+
 def test_two_simulators_against_the_same_trials(tmp_path: Path) -> None:
     first, second = make_runs(tmp_path)
     found = compare(first, second, make_sheet(first, tmp_path))
@@ -160,7 +206,7 @@ def test_grasps_are_the_same_by_id_and_content(tmp_path: Path) -> None:
     b["x"][3] += 1e-3
     rows = np.array([5, 4, 3, 2, 1, 0])
     tables = [Table.of_columns(columns, NAMES) for columns in (a, b)]
-    found = match_rows(tables[0], tables[1].take(rows))
+    found = match_rows(tables[0], tables[1].take(rows, CONTENT))
     assert found.other_content == 1 and found.only_first == 6 and found.only_second == 0
     assert (a["id"][found.first] == b["id"][rows][found.second]).all() and len(found.first) == 5
 
@@ -228,6 +274,24 @@ def test_predicted_probability_comes_from_a_table_of_robustness(tmp_path: Path) 
         compare(first, second, robustness=tmp_path / "bad.csv")
 
 
+def test_a_table_of_robustness_of_another_run_is_refused(tmp_path: Path) -> None:
+    first, second = make_runs(tmp_path)
+    id, hashes = first.results["id"][0], [run.document.hash for run in (first, second)]
+    tables = {
+        "own": f"id,success,run\n{id},0.5,{first.document.hash}\n",
+        "other": f"id,success,run\n{id},0.5,0123456789ab\n",
+        "unknown": "id,success\nmug-0000000000,0.5\n",
+    }
+    for name, text in tables.items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    assert lifted_shares(tmp_path / "own.csv", hashes, None) == {(hashes[0], id): 0.5}
+    for refused in ("other", "unknown"):
+        with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
+            compare(first, second, robustness=tmp_path / f"{refused}.csv")
+        with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
+            plan_trials(first, balance="probability", robustness=tmp_path / f"{refused}.csv")
+
+
 def test_texts_as_numbers() -> None:
     texts = np.array(["mug", "", "tête-à-tête", "日本", "mug", "mu"])
     factor = Factor.of(texts)
@@ -244,11 +308,28 @@ def test_texts_as_numbers() -> None:
     assert Factor.of_codes(np.array([], dtype=int), []).names == ()
 
 
+def test_stored_texts_have_the_same_keys() -> None:
+    arrow = pytest.importorskip("pyarrow")
+    texts = ["mug-0123456789", "", "tête-à-tête", "日本", "mug", "a" * 40, "mug-0123456788"]
+    stored = arrow.chunked_array([arrow.array(["x", *texts[:3]])[1:], arrow.array(texts[3:])])
+    ids, array = Ids(stored), Ids(np.array(texts))
+    assert len(set(array.keys.tolist())) == len(texts)
+    assert ids.keys.tolist() == array.keys.tolist() == text_keys(np.array(texts)).tolist()
+    rows = np.array([5, 0, 3])
+    for column in (ids, array):
+        some = column.take(rows).take(np.array([True, False, True]))
+        assert [some[k] for k in range(len(some))] == ["a" * 40, "日本"]
+        assert some.keys.tolist() == column.keys[[5, 3]].tolist() and not some.same(some)
+        assert column.same(column) and not column.same(column.take(rows))
+    assert ids.same(Ids(arrow.chunked_array([texts]))) and not ids.same(Ids(stored[1:]))
+
+
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first, second = make_runs(tmp_path)
     sheet, page = make_sheet(first, tmp_path), tmp_path / "out" / "compare.html"
     assert main(["compare", str(first.path), str(sheet), "--html", str(page)]) == 0
-    assert "In 10 trials on the robot" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "In 10 trials on the robot" in out and "By object, selected trials" in out
     line = re.sub(r"<[^>]+>", "", page.read_text().split("How to repeat it")[1])
     assert f"burg-drake compare {first.path} {sheet} --html {page}" in line
     assert main(["compare", str(first.path), str(second.path), str(sheet), "--json"]) == 0
@@ -303,4 +384,8 @@ def test_page(tmp_path: Path) -> None:
     assert "&lt;b&gt;slipped&lt;/b&gt; &amp; fell" in text and "<b>slipped</b>" not in text
     assert "first simulator" in text and "McNemar" in text and "http" not in text
     assert text.count('class="plot"') >= 4
-    Page(comparison_page(compare(first, second)))
+    for title in ("By object", "What became of each verdict"):
+        assert f"<h2>{title}, selected trials (first simulator)</h2>" in text
+    text = comparison_page(compare(first, second))
+    Page(text)
+    assert "<h2>By object</h2>" in text and "elected trials" not in text.split("<h2>Fig")[1]

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome
 from burg_drake.core.schema import Pose
+from burg_drake.evaluation import preparation
+from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.table_file import write_table
 from burg_drake.experiment.comparison.comparison import compare
 from burg_drake.scene.scene import save_scene
 from burg_drake.station.station import load_station
@@ -30,6 +35,7 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = {"grasps_per_object": 6, "blind": True, "progress": False, "executor": Inline()}
     station = load_station("panda_tabletop")
     known_judge.install(monkeypatch.setattr)
+    monkeypatch.setattr(preparation, "write_report", lambda run: None)  # nobody reads them here
     first = evaluate(paths, station, tmp_path / "first", **options)
     monkeypatch.setattr(known_judge, "expected", _other)
     second = evaluate(paths, station, tmp_path / "second", engine="screening", **options)
@@ -43,12 +49,30 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         alone = [getattr(p.judgement.selected, cell) for p in parts]
         assert getattr(whole.judgement.selected, cell) == sum(alone)
     assert whole.judgement.selected.fp > 0 and whole.judgement.selected.tp > 0
+    _shares_belong_to_their_scene(first, second, tmp_path)
     one = compare(first, second.run("there"))
     assert one.judgement.selected == parts[1].judgement.selected
     assert one.coverage.only_first == 18
     assert {text.split()[0] for text in whole.settings} == {"engine"}
     replays = {line for d in whole.judgement.disagreements for line in d.replays}
     assert all(str(tmp_path) in line for line in replays)
+
+
+def _shares_belong_to_their_scene(first: Campaign, second: Campaign, folder: Path) -> None:
+    """The runs have grasps of the same ids, as the objects are the same."""
+    ids = first.run("here").candidates.id
+    assert ids == first.run("there").candidates.id
+    shares = np.linspace(0.1, 0.4, len(ids))
+    columns = {"id": np.array(ids), "success": shares}
+    write_table(folder / "old.csv", columns)
+    run = np.full(len(ids), first.run("there").document.hash)
+    for path in (folder / "new.csv", first.folder("there") / "robustness.parquet"):
+        write_table(path, columns | {"run": run})
+    with pytest.raises(InvalidInputError, match="has no column run"):
+        compare(first, second, robustness=folder / "old.csv")
+    for table in (folder / "new.csv", None):
+        found = {c.name: c for c in compare(first, second, robustness=table).judgement.calibration}
+        assert found["probability"].trials == len(ids) == found["probability"].without
 
 
 _first = known_judge.expected

@@ -70,9 +70,29 @@ def test_success_and_failure_are_balanced_as_far_as_there_are_enough(hand: Run) 
     assert "mug of run two: 6 of 8 with failure; others make up for it" in more.notes
     assert grasps(sheet) < grasps(more)
     most = plan_trials(hand, per_object=30)
-    assert any("box of run two" in note and "20 of 30 in all" in note for note in most.notes)
+    assert any("box (" in note and "20 of 30 in all" in note for note in most.notes)
     held = plan_trials(hand, per_object=16, success="held")
     assert {s.population for s in held.strata.values() if s.object == "mug"} == {15, 3}
+
+
+def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
+    tmp_path: Path,
+) -> None:
+    lifted = [ended("lifted")] * 4
+    run = make_run(tmp_path / "run", make_scene(tmp_path), {"mug": lifted, "box": lifted})
+    assert plan_trials(run, per_object=4).notes == (
+        "box, mug of run two: 0 of 2 with failure; others make up for it",
+        "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
+        " predicted",
+    )
+    verdicts = {"mug": [*lifted, ended("slipped")], "box": lifted}
+    uneven = make_run(tmp_path / "uneven", make_scene(tmp_path), verdicts)
+    assert plan_trials(uneven, per_object=4).notes[0] == (
+        "box (0 of 2), mug (1 of 2) of run two: too few with failure; others make up for it"
+    )
+    verdicts = {"mug": lifted, "box": [ended("slipped")]}
+    mixed = make_run(tmp_path / "mixed", make_scene(tmp_path), verdicts)
+    assert not any("almost nothing" in note for note in plan_trials(mixed, per_object=4).notes)
 
 
 def test_strata_by_outcome_and_without_any(hand: Run) -> None:

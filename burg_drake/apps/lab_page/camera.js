@@ -42,22 +42,33 @@ async function showCamera() {
 }
 
 function renderCamera() {
-  const { check, checking } = camera;
+  if (!camera) return;
+  renderSaved();
+  const { check, checking, measuring } = camera;
   if (view === "camera") {
     $("line").hidden = false;
-    $("line").textContent = camera.fault || camera.line;
+    const drawn = camera.drawn && camera.drawn !== current ? `; offsets of trial ${camera.drawn}` : "";
+    $("line").textContent = (camera.fault || camera.line) + drawn;
   }
   $("check").disabled = checking || !camera.scene;
-  $("check").textContent = checking ? "Measuring …" : "Check placement";
+  $("check").textContent = !checking ? "Check placement"
+    : measuring && measuring.number !== current ? `Measuring for trial ${measuring.number} …` : "Measuring …";
   const mine = check && check.number === current;
-  $("checked").textContent = !mine ? keptText()
-    : check.problem || (check.kept ? "Kept with this trial." : "Not kept; press the button to keep it.");
+  $("checked").textContent = refused || (!mine ? [otherText(check), keptText()].filter(Boolean).join(" ") : check.problem || (check.kept ? "Kept with this trial." : "Not kept; press the button to keep it."));
   const rows = mine ? Object.entries(check.objects) : Object.entries((entries.get(current) || {}).placement || {});
-  $("objects").replaceChildren(...rows.map(([name, placed]) => placeRow(name, placed)));
+  $("objects").replaceChildren(...rows.flatMap(([name, placed]) => placeRow(name, placed)));
   const slow = check && check.seconds > QUICK;
   if ($("always").checked && !checking && !slow && camera.valid && view === "camera") {
     post("check", { number: current, keep: false });
   }
+}
+
+// Of a check that was begun while another trial was shown.
+function otherText(check) {
+  if (!check) return "";
+  if (check.kept) return `Measurement kept with trial ${check.number}.`;
+  const { problem, number } = check;
+  return !problem || problem.includes(`trial ${number} `) ? problem : `Trial ${number}: ${problem}.`;
 }
 
 function keptText() {
@@ -65,16 +76,25 @@ function keptText() {
   return entry && entry.photo ? `Kept with this trial: ${entry.photo}` : "";
 }
 
-function placeRow(name, { status, within, mm, deg }) {
+function placeRow(name, { status, within, mm, deg, reason }) {
   const row = make("tr"), text = status === "not_seen" || mm === null ? "not seen" : `${mm.toFixed(1)} mm`;
   const kind = status !== "measured" ? "unsure" : within === undefined ? "" : within ? "within" : "off";
   const mark = { within: "✓ ", off: "✗ ", unsure: "? " }[kind] || "";
   row.append(make("th", "", name), make("td", kind, mark + text));
   row.append(make("td", kind, deg === null ? "" : `${(Math.round(10 * deg) / 10 || 0).toFixed(1)}°`));
-  return row;
+  if (!reason) return [row];
+  row.title = reason;
+  const why = make("tr", "why"), cell = make("td", kind, reason);
+  cell.colSpan = 3;
+  why.append(cell);
+  return [row, why];
 }
 
 async function post(path, body) {
+  if (path === "check" && camera) {
+    Object.assign(camera, { checking: true, measuring: body });
+    renderCamera();
+  }
   try {
     const answer = await fetch(path, {
       method: "POST",
@@ -82,6 +102,10 @@ async function post(path, body) {
       body: JSON.stringify(body),
     });
     const data = await answer.json();
-    if (data.error) $("checked").textContent = data.error;
+    if (path === "check") {
+      refused = data.error || "";
+      if (refused && camera) camera.checking = false;
+      renderCamera();
+    }
   } catch { /* the status tells */ }
 }

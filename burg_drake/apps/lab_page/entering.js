@@ -4,19 +4,43 @@
 
 function enter(outcome) {
   if (!current || performance.now() - shownSince < SETTLE) return;  // a second tap of the same
+  if (!requireWidth()) return;
   const number = current;
   put(number, fields(outcome));
   show(firstOpen(number));
 }
 
+// The width as it was typed [mm]; null if nothing was, NaN if it is no number that can be one.
+function typedWidth() {
+  const text = $("width").value.trim().replace(/\s*mm$/, "").replace(",", ".");
+  if (!text) return null;
+  return /^\d*\.?\d+$|^\d+\.$/.test(text) && Number(text) <= WIDEST ? Number(text) : Number.NaN;
+}
+
+function renderWidth() {
+  const width = typedWidth(), { opening } = trialOf(current), bad = Number.isNaN(width);
+  $("width").setAttribute("aria-invalid", bad);
+  $("widthnote").hidden = !bad && !(width > opening);
+  $("widthnote").classList.toggle("bad", bad);
+  $("widthnote").textContent = bad ? "Not a width in mm; nothing is entered until it is mended or empty."
+    : `The hand opens ${opening} mm; is ${width} right?`;
+}
+
+function requireWidth() {
+  if (!Number.isNaN(typedWidth())) return true;
+  renderWidth();
+  $("width").focus();
+  return false;
+}
+
 function fields(outcome) {
-  const width = Number.parseFloat($("width").value.replace(",", "."));
+  const width = typedWidth();
   return {
     outcome,
     time: now(),
     operator: $("operator").value.trim(),
     note: $("note").value.trim(),
-    width_mm: Number.isFinite(width) && width >= 0 ? width : null,
+    width_mm: Number.isNaN(width) ? null : width,
   };
 }
 

@@ -6,6 +6,7 @@ const seen = () => (document.hidden
   ? new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }))
   : Promise.resolve());
 const SETTLE = 600;  // after a trial comes up, clicks on outcomes are ignored for so long [ms]
+const WIDEST = 10000;  // of widths [mm]
 const QUICK = 5;     // checks that take longer are not made one after the other [s]
 
 let plan = null;
@@ -18,6 +19,7 @@ let current = 0;
 let shownSince = 0;
 let view = "grasp";
 let camera = null;
+let refused = "";            // why the last placement check was not begun
 let history = [];            // own entries that can be undone, the last one at the end
 
 // --- Beginning
@@ -129,7 +131,8 @@ function show(number) {
   $("fresh").hidden = !fresh;
   $("fresh").textContent = fresh ? `New scene: set up ${trial.scene} as the picture shows it.` : "";
   if (fresh || view !== "camera") view = fresh ? "above" : "grasp";
-  if (plan.camera && (!before || before.block !== trial.block)) post("watch", { number });
+  refused = "";
+  if (plan.camera) post("watch", { number });
   render();
   const next = plan.trials.find((one) => one.number > number);
   if (next) new Image().src = pictureOf(`grasp/${next.number}`);  // it is kept for later
@@ -189,6 +192,9 @@ function renderSaved() {
   else if (waiting && outbox.problem) say("bad", `Not saved yet: ${outbox.problem}`);
   else if (waiting) say("wait", "Saving …");
   else if (outbox.troubled.length) say("bad", "Not all is saved");
+  else if (camera && camera.measuring && camera.measuring.keep) {
+    say("wait", `Measuring for trial ${camera.measuring.number} …`);
+  }
   else say("good", "All saved");
 }
 
@@ -210,7 +216,11 @@ function renderTrial() {
   if (view !== "camera") {
     const name = view === "grasp" ? `grasp/${trial.number}` : `${view}/${trial.block}`;
     const address = pictureOf(name);
-    if ($("picture").getAttribute("src") !== address) $("picture").src = address;
+    if ($("picture").getAttribute("src") !== address) {
+      $("picture").src = address;
+      $("making").hidden = false;
+      $("picture").style.visibility = "hidden";
+    }
     $("picture").alt = view === "grasp"
       ? `the hand at the grasp of trial ${trial.number}, on ${instance}`
       : `${trial.scene}, ${view === "above" ? "from above" : "from the front"}`;
@@ -229,6 +239,7 @@ function renderTrial() {
 }
 
 function renderEntry() {
+  renderWidth();
   const entry = entryOf(current);
   const done = Boolean(entry.outcome);
   const parts = [entry.label, entry.operator, clock(entry.time)].filter(Boolean);
@@ -259,10 +270,15 @@ $("picture").addEventListener("error", async () => {  // such as while there is 
   await sleep(2000);
   if (view !== "camera" && $("picture").getAttribute("src") === address) $("picture").src = address;
 });
+$("picture").addEventListener("load", () => {
+  $("making").hidden = true;
+  $("picture").style.visibility = "";
+});
 $("previous").addEventListener("click", () => step(-1));
 $("next").addEventListener("click", () => step(1));
 $("undo").addEventListener("click", undo);
 $("keep").addEventListener("click", () => {
+  if (!requireWidth()) return;
   const { outcome, time, operator } = entryOf(current);
   put(current, { ...fields(outcome), time, operator });
 });

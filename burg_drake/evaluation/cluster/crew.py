@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import asyncio
+import concurrent.futures
+import contextlib
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from burg_drake.core.errors import ClusterError
+from burg_drake.core.errors import BurgError, ClusterError
+from burg_drake.evaluation.cluster.document import require_safe
 from burg_drake.evaluation.cluster.sent_job import DEPTH, SentChunk, SentJob
 from burg_drake.evaluation.cluster.versions import require_same, software
 
 ANSWER = 20.0
 """A scheduler that does not answer for so long is lost [s]."""
+LOST = (
+    OSError,  # with Dask's CommClosedError
+    TimeoutError,
+    asyncio.TimeoutError,
+    concurrent.futures.CancelledError,
+    asyncio.CancelledError,
+)
+"""What is raised when the other side is gone."""
 
 
 @dataclass(eq=False)
@@ -58,19 +70,21 @@ class Crew:
         return sum(hand.threads for hand in self.hands.values())
 
     def look(self) -> list[Hand]:
-        """Takes on new workers whose versions are ours.
+        """Takes on new workers whose versions are ours and whose addresses are safe.
 
         Returns:
             Those that are gone.
 
         Raises:
-            ClusterError: the scheduler is lost, or a worker has other versions.
+            ClusterError: the scheduler is lost, or a worker has other versions or is not safe.
         """
         there = threads_by_address(self._client)
         lost = [hand for address, hand in self.hands.items() if address not in there]
         for hand in lost:
             del self.hands[hand.address]
         new = [address for address in there if address not in self.hands]
+        for address in new:
+            require_safe(address, "worker ")
         for address in admitted(self._client, new):
             self.hands[address] = Hand(address, there[address])
         return lost
@@ -84,10 +98,27 @@ def threads_by_address(client: Any) -> dict[str, int]:
     """
     if client.status != "running":  # a scheduler that is started again knows nothing of us
         raise lost_scheduler(client)
-    try:
+    with asking(client):
         found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=ANSWER)
         return found
-    except OSError as error:
+
+
+@contextlib.contextmanager
+def asking(client: Any) -> Iterator[None]:
+    """Around what asks the scheduler: its loss is said in one line.
+
+    Raises:
+        ClusterError: it is lost.
+    """
+    try:
+        yield
+    except LOST as error:
+        raise lost_scheduler(client) from error
+    except BurgError:
+        raise
+    except Exception as error:  # Dask has no class of its own for a client that was closed
+        if client.status == "running":
+            raise
         raise lost_scheduler(client) from error
 
 
@@ -109,10 +140,8 @@ def admitted(client: Any, addresses: Iterable[str]) -> list[str]:
     addresses = list(addresses)
     if not addresses:
         return []
-    try:
+    with asking(client):
         told = client.run(software, workers=addresses, on_error="return")
-    except OSError as error:
-        raise lost_scheduler(client) from error
     gone = {a for a, answer in told.items() if isinstance(answer, OSError)}  # died meanwhile
     require_same({a: answer for a, answer in told.items() if a not in gone})
     return [a for a in addresses if a in told and a not in gone]

@@ -10,6 +10,7 @@ from typing import Any
 from burg_drake.core.errors import ClusterError, MissingDependencyError
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
+from burg_drake.evaluation.cluster.unreached import why_unreached
 from burg_drake.evaluation.job import Job, OnFailure
 from burg_drake.evaluation.judge import Verdict
 from burg_drake.evaluation.limits import Limits
@@ -43,9 +44,11 @@ class DaskExecutor:
         Raises:
             ClusterError: the connection is not encrypted and goes beyond this machine.
         """
-        address = client.scheduler.address if client.scheduler is not None else ""
-        if not address.startswith("inproc://"):
-            require_safe(address)
+        from burg_drake.evaluation.cluster.crew import asking
+
+        require_safe(client.scheduler.address if client.scheduler is not None else "")
+        with asking(client):  # it may listen elsewhere, too, than where it was reached
+            require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or Limits()
         self._tend = tend
@@ -121,15 +124,9 @@ def _client(distributed: Any, where: Any, security: Any) -> Any:
         return distributed.Client(where, timeout=REACH, security=security, set_as_default=False)
     except (OSError, TimeoutError, ValueError, RuntimeError, TypeError) as error:
         raise ClusterError(
-            f"no scheduler of Dask is reached at {where} within {REACH:.0f} s: {_reason(error)}"
+            f"no scheduler of Dask is reached at {where} within {REACH:.0f} s:"
+            f" {why_unreached(where, error)}"
         ) from error
-
-
-def _reason(error: BaseException) -> str:
-    """The innermost cause, in one line."""
-    while error.__cause__ is not None:
-        error = error.__cause__
-    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _leave(client: Any) -> None:
@@ -172,10 +169,13 @@ def _of_files(distributed: Any, files: TlsFiles) -> Any:
 @contextlib.contextmanager
 def _without_its_log() -> Iterator[None]:
     """What Dask would say of lost connections is said by our errors, in one line."""
-    log = logging.getLogger("distributed")
-    level = log.level
-    log.setLevel(logging.CRITICAL)
+    # Dask's configuration gives the second one a level of its own
+    logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)

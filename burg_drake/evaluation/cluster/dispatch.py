@@ -10,7 +10,7 @@ from __future__ import annotations
 import queue
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from typing import Any
 
@@ -18,9 +18,12 @@ from distributed import KilledWorker
 
 from burg_drake.core.errors import BurgError, ClusterError, SimulationError
 from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.cluster.crew import Crew, Hand, lost_scheduler
-from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, deliver, judge_chunk
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.crew import LOST, Crew, Hand, asking, lost_scheduler
+from burg_drake.evaluation.cluster.delivery import ATTEMPTS, deliver_bundle
+from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
 from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
+from burg_drake.evaluation.cluster.waiting import Waiting
 from burg_drake.evaluation.job import Job, JobFailed, OnFailure
 from burg_drake.evaluation.judge import Verdict, one_line
 from burg_drake.evaluation.limits import Limits
@@ -30,8 +33,6 @@ LOOK = 1.0
 """Between two looks for new and lost workers [s]."""
 FETCH = 3.0
 """A result that is there is waited for so long at a time; its worker may be lost by now [s]."""
-PATIENCE = 600.0
-"""So long the run waits without any worker: a batch system may have none free [s]."""
 
 
 class Dispatch:
@@ -55,26 +56,42 @@ class Dispatch:
         self._sent: dict[Any, tuple[SentChunk, Hand]] = {}
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
+        self._exhausted = False
         self._seen = -LOOK
-        self._without = time.monotonic()
+        self._waiting = Waiting(client)
 
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None
     ) -> Generator[Answer, None, None]:
         """See `executor.Executor.judge`."""
         self._coming, self._on_failure = iter(jobs), on_failure
-        self.crew.look()  # before anything is registered where other versions would not know it
-        self.client.register_plugin(Supervisor(self._name), name=self._name)
+        self.begin()
         try:
             while True:
                 if time.monotonic() > self._seen + LOOK:
                     yield from self.look()
                 self.hand_out()
                 if not self._sent and not any(job.left for job in self.jobs):
-                    return
+                    if self.take_up() is not None:
+                        continue
+                    if self._exhausted:
+                        return
                 yield from self.collect()
         finally:
             self.end()
+
+    def begin(self) -> None:
+        """Has the workers, and those that join later, supervise children of this run. A worker that
+        dies meanwhile is no reason to stop."""
+        for attempt in range(1, ATTEMPTS + 1):
+            self.crew.look()  # before anything is registered where others would not know it
+            try:
+                self.client.register_plugin(Supervisor(self._name), name=self._name)
+                return
+            except LOST as error:
+                if self.client.status != "running" or attempt == ATTEMPTS:
+                    raise lost_scheduler(self.client) from error
+                time.sleep(LOOK)
 
     def look(self) -> Iterator[Answer]:
         """Sees who is there."""
@@ -83,12 +100,9 @@ class Dispatch:
             yield from self.lose(hand)
         self._seen = time.monotonic()
         if self.crew.hands:
-            self._without = self._seen
-        elif self._seen > self._without + PATIENCE:
-            raise ClusterError(
-                f"the scheduler at {self.client.scheduler.address} has had no worker for"
-                f" {PATIENCE / 60:.0f} minutes"
-            )
+            self._waiting.end()
+        else:
+            self._waiting.go_on()
 
     def hand_out(self) -> None:
         """Gives every worker what it has room for; those with the least come first."""
@@ -108,9 +122,18 @@ class Dispatch:
         """What a worker is to work on: its job, or the next one, or one that others are at."""
         if hand.job is not None and hand.job.left:
             return hand.job
+        job = self.take_up()
+        if job is not None:
+            return job
+        self.jobs = [job for job in self.jobs if job.left or job.sent]
+        open_jobs = [job for job in self.jobs if job.left]
+        return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
+
+    def take_up(self) -> SentJob | None:
+        """The next job, if one is ready."""
         for job in self._coming:
             if job is None:  # none is ready yet
-                break
+                return None
             if job.candidates:
                 try:
                     self.jobs.append(SentJob(job))
@@ -118,22 +141,22 @@ class Dispatch:
                     self._tell(JobFailed(job, error))
                     continue
                 return self.jobs[-1]
-        self.jobs = [job for job in self.jobs if job.left or job.sent]
-        open_jobs = [job for job in self.jobs if job.left]
-        return max(open_jobs, key=lambda job: job.left / (1 + job.sent), default=None)
+        self._exhausted = True
+        return None
 
     def send(self, chunk: SentChunk, hand: Hand) -> None:
         """Sends a chunk to a worker."""
         packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
-        future = self.client.submit(
-            judge_chunk,
-            packed,
-            key=f"grasps-{uuid.uuid4().hex}",
-            pure=False,
-            retries=0,
-            workers=[hand.address],
-            allow_other_workers=False,
-        )
+        with asking(self.client):
+            future = self.client.submit(
+                judge_chunk,
+                packed,
+                key=f"grasps-{uuid.uuid4().hex}",
+                pure=False,
+                retries=0,
+                workers=[hand.address],
+                allow_other_workers=False,
+            )
         chunk.future = future
         chunk.job.sent += 1
         hand.chunks.append(chunk)
@@ -181,7 +204,8 @@ class Dispatch:
             elif not chunk.job.failed:
                 yield from self.take(chunk, answers)
         for job, addresses in missing.values():
-            self.deliver(job, addresses)
+            there = [a for a in dict.fromkeys(addresses) if a in self.crew.hands]
+            deliver_bundle(self.client, job, there)
 
     def take(self, chunk: SentChunk, answers: Answers) -> Iterator[Answer]:
         """Passes the verdicts of a chunk on."""
@@ -201,17 +225,8 @@ class Dispatch:
                 )
         if answers.error is not None:
             self.fail(job, answers.error)
-
-    def deliver(self, job: SentJob, addresses: list[str]) -> None:
-        """Sends the bundle of a job to workers that lack it."""
-        assert job.bundle is not None
-        there = [address for address in dict.fromkeys(addresses) if address in self.crew.hands]
-        told = self.client.run(
-            deliver, job.bundle.data, job.bundle.name, workers=there, on_error="return"
-        )
-        for address, error in told.items():
-            if isinstance(error, BurgError):
-                raise ClusterError(f"worker {address}: {error}")
+        open_ones = [grasp for k, grasp in enumerate(chunk.grasps) if k not in judged]
+        yield from self.doubt(chunk, open_ones, "gave no answer about it")
 
     def lose(self, hand: Hand) -> Iterator[Answer]:
         """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
@@ -224,11 +239,21 @@ class Dispatch:
             else:
                 chunk.take_back()
 
-    def doubt(self, chunk: SentChunk) -> Iterator[Answer]:
-        """Deals with a chunk at which a worker was lost."""
-        grasp = chunk.suspect()
-        if grasp is not None:
-            reason = f"{LOSSES} workers of the cluster were lost at it, one after the other"
+    def doubt(
+        self,
+        chunk: SentChunk,
+        grasps: Sequence[Candidate] | None = None,
+        what: str = "were lost at it",
+    ) -> Iterator[Answer]:
+        """Deals with grasps at which a worker was lost, or which it has not answered.
+
+        Args:
+            chunk: that it had.
+            grasps: those of the chunk; all if None.
+            what: the last worker did, for people.
+        """
+        for grasp in chunk.suspect(chunk.grasps if grasps is None else grasps):
+            reason = f"{LOSSES} workers of the cluster {what}, one after the other"
             failed = Outcome.SIMULATION_FAILED
             yield (
                 chunk.job.job,
@@ -265,10 +290,11 @@ class Dispatch:
         """Ends the children of this run."""
         futures = [chunk.future for chunk, _ in self._sent.values()]
         self._sent.clear()
+        self._waiting.end()
         if self.client.status != "running":
             return
         try:
             self.client.cancel(futures, force=True)
             self.client.unregister_worker_plugin(self._name)
-        except OSError:
+        except LOST:
             pass  # the scheduler is lost, and its workers end with it

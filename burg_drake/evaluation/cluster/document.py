@@ -175,21 +175,29 @@ def read_cluster(text: str) -> Cluster:
     return Cluster(document=document, tls=tls)
 
 
-def require_safe(address: str) -> None:
+def require_safe(address: str, whose: str = "") -> None:
     """Refuses an address at which anybody could listen, or run code.
+
+    Args:
+        address: where a scheduler or a worker listens; what is in this process is safe.
+        whose: put before the address in messages.
 
     Raises:
         InvalidInputError: it is no address.
         ClusterError: plain TCP beyond this machine.
     """
+    if address.startswith("inproc://"):
+        return
     found = ADDRESS.fullmatch(address)
     if found is None:
         raise InvalidInputError(
-            f"{quoted(address)} is no address of a scheduler; write tls://HOST:PORT"
+            f"{whose}{quoted(address)} is no address of a scheduler or worker; write"
+            " tls://HOST:PORT"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
-            f"{address} is not encrypted, and whoever reaches its port runs code as you: {HOW_TLS}"
+            f"{whose}{address} is not encrypted, and whoever reaches its port runs code as you:"
+            f" {HOW_TLS}"
         )
 
 

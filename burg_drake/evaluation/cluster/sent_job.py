@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,6 +35,7 @@ class SentJob:
         false_starts: of children in a row that died while they built the judge.
         crashes_in_a_row: grasps that ended their children since one was judged.
         failed: whether it is given up.
+        deliveries: how often its bundle was sent, by the worker's address.
     """
 
     job: Job
@@ -43,6 +45,7 @@ class SentJob:
     false_starts: int = 0
     crashes_in_a_row: int = 0
     failed: bool = False
+    deliveries: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
         self.recipe, self.bundle = recipe_of(self.job.make_judge)
@@ -101,15 +104,15 @@ class SentChunk:
         else:
             self.job.waiting.extendleft(reversed(self.grasps))
 
-    def suspect(self) -> Candidate | None:
-        """Returns the grasps to their job, as each of them may be why a worker was lost.
+    def suspect(self, grasps: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Returns grasps to their job, as each of them may be why a worker was lost.
 
         Returns:
-            The one grasp, if that has happened too often.
+            Those with which that has happened too often.
         """
         if self.job.failed:
-            return None
+            return ()
         if self.losses + 1 >= LOSSES:
-            return self.grasps[0]
-        self.job.suspects.extend((grasp, self.losses + 1) for grasp in self.grasps)
-        return None
+            return grasps
+        self.job.suspects.extend((grasp, self.losses + 1) for grasp in grasps)
+        return ()

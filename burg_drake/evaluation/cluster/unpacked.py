@@ -41,30 +41,42 @@ def unpack(data: bytes, place: Path, name: str) -> Path:
         The folder.
 
     Raises:
-        InvalidInputError: the data are others, or cannot be written.
+        InvalidInputError: the data are others, or cannot be written, or something else is in
+            their place.
     """
     if hashlib.sha256(data).hexdigest() != name:
         raise InvalidInputError(f"bundle {name[:12]} was damaged on the way")
-    found = bundle_folder(place, name)
-    if found is not None:
-        return found
     every = place / FOLDER
     folder, unfinished = every / name, every / f".{name}.{secrets.token_hex(8)}"
     try:
         every.mkdir(mode=0o700, parents=True, exist_ok=True)
         _remove_unused(every)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if _is_whole(folder, archive):
+                return folder
+            shutil.rmtree(folder, ignore_errors=True)  # what somebody has removed files of
             archive.extractall(unfinished)
-        with contextlib.suppress(OSError):  # another process was first
-            unfinished.rename(folder)
+            try:
+                unfinished.rename(folder)
+            except OSError:
+                if not _is_whole(folder, archive):  # otherwise another process was first
+                    raise
     except OSError as error:
         raise InvalidInputError(
-            f"cannot unpack the scene into {every}: {error.strerror}; give Dask's workers another"
+            f"cannot unpack the scene into {folder}: {error.strerror}; give Dask's workers another"
             " --local-directory"
         ) from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
     return folder
+
+
+def _is_whole(folder: Path, archive: zipfile.ZipFile) -> bool:
+    """Whether a folder has the files of an archive, as they are there."""
+    try:
+        return all((folder / n).read_bytes() == archive.read(n) for n in archive.namelist())
+    except OSError:
+        return False
 
 
 def _remove_unused(every: Path) -> None:

@@ -69,7 +69,7 @@ def disagreements(
         ("fn", ~pairs.predicted & pairs.actual),
     ):
         for row in np.flatnonzero(wrong)[:MOST_LISTED].tolist():
-            scene, grasp = pairs.scene[row], str(pairs.id[row])
+            scene, grasp = pairs.scene[row], pairs.id[row]
             trial = trials[row] if trials else None
             offset = np.nan if offset_mm is None else float(offset_mm[row])
             found.append(

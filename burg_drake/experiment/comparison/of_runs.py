@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.calibration import MARGINS, PROBABILITY
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
 from burg_drake.experiment.comparison.judgement import judgement
@@ -39,12 +40,14 @@ def compare_runs(
     """Compares the verdicts of two runs; see `comparison.compare`."""
     sides = Judged.load(first), Judged.load(second)
     require_common_scene(*sides)
-    tables = sides[0].table(NAMES), sides[1].table(REFERENCE_NAMES)
+    with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
+        one, other = pool.map(Judged.table, sides, (NAMES, REFERENCE_NAMES))
+    tables = one, other
     found = match_rows(*tables)
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))
     pairs, left_out = pairs_of_runs(tables, found, success)
-    probability = predicted_probability(sides[0], pairs.id, robustness)
+    probability = predicted_probability(sides[0], pairs, robustness)
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY, probability)
     scenes = sides[0].scenes
@@ -74,7 +77,9 @@ def pairs_of_runs(
 ) -> tuple[Pairs, dict[str, int]]:
     """Pairs of verdicts of the grasps in common, and what is left out by reason."""
     ended = tables[1].texts["outcome"].take(found.second)
-    pairs = make_pairs(tables[0].take(found.first), ended, successes(ended, success), success)
+    pairs = make_pairs(
+        tables[0].take(found.first, MARGINS), ended, successes(ended, success), success
+    )
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}
     for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from burg_drake.core.frames import Array
 from burg_drake.evaluation.campaign import Campaign
 from burg_drake.evaluation.run_store import Run
 from burg_drake.evaluation.table import Columns
-from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.experiment.comparison.calibration import MARGINS, PROBABILITY
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
 from burg_drake.experiment.comparison.judgement import Judgement, Strata, judgement
@@ -47,13 +47,9 @@ def compare_trials(
     sheet = load_trials(path)
     success = success or sheet.selection.success
     sides = [Judged.load(run) for run in runs]
-    tables = []
-    left_out: Counter[str] = Counter()
-    for k, side in enumerate(sides):
-        columns, missing = find_tried(sheet, path, side)
-        tables.append(columns)
-        which = "the run" if len(sides) == 1 else f"the {('first', 'second')[k]} run"
-        left_out.update({f"grasp {reason} in {which}": n for reason, n in missing.items()})
+    found_rows = [find_tried(sheet, path, side) for side in sides]
+    tables = [columns for columns, _ in found_rows]
+    left_out = _missing([missing for _, missing in found_rows])
     indices = set.intersection(*(set(t["trial"].tolist()) for t in tables))
     chosen, untold = _telling(sheet, tables, sorted(indices))
     left_out.update(untold)
@@ -63,12 +59,13 @@ def compare_trials(
     found = []
     for side, columns in zip(sides, tables, strict=True):
         pairs = _pairs(trials, columns, chosen, success)
-        probability = predicted_probability(
-            side, pairs.id, robustness if side is sides[0] else None
-        )
+        probability = predicted_probability(side, pairs, robustness if side is sides[0] else None)
         found.append(pairs if probability is None else pairs.with_margin(PROBABILITY, probability))
+    scenes = [sheet.runs[trial.run].scene.content for trial in trials]
+    instances = sides[0].instances_of(set(scenes))
+    there = offsets(trials, [instances[scene] for scene in scenes], placement_limit_mm)
     judged = [
-        _judgement(pairs, side, sheet, trials, placement_limit_mm, seed)
+        _judgement(pairs, side, sheet, trials, there, placement_limit_mm, seed)
         for pairs, side in zip(found, sides, strict=True)
     ]
     two = len(sides) == 2
@@ -87,6 +84,22 @@ def compare_trials(
         notes=_notes(sheet, trials, sides, tables, judged[0]),
         seed=seed,
     )
+
+
+def _missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
+    """Trials that a run has no verdict on, by reason; those that both have none on count once."""
+    left_out: Counter[str] = Counter()
+    for k in sorted(set[int]().union(*by_side)):
+        reasons = [missing.get(k) for missing in by_side]
+        if len(reasons) == 1:
+            told = [f"{reasons[0]} in the run"]
+        elif reasons[0] == reasons[1]:
+            told = [f"{reasons[0]} in either run"]
+        else:
+            named = zip(reasons, ("first", "second"), strict=True)
+            told = [f"{reason} in the {which} run" for reason, which in named if reason]
+        left_out[f"grasp {' and '.join(told)}"] += 1
+    return left_out
 
 
 def _telling(
@@ -121,7 +134,7 @@ def _pairs(
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    table = Table.of_columns(columns, NAMES).take(rows)
+    table = Table.of_columns(columns, NAMES).take(rows, MARGINS)
     return make_pairs(table, ended, actual, success)
 
 
@@ -130,17 +143,17 @@ def _judgement(
     side: Judged,
     sheet: TrialSheet,
     trials: Sequence[RealTrial],
+    offsets_mm: tuple[Array, Array],
     limit_mm: float,
     seed: int,
 ) -> Judgement:
-    largest, target = offsets(trials, limit_mm)
-    placement = placement_agreement(pairs, largest, target, limit_mm=limit_mm, seed=seed)
+    placement = placement_agreement(pairs, *offsets_mm, limit_mm=limit_mm, seed=seed)
     return judgement(
         pairs,
         scenes=side.scenes,
         strata=_strata(sheet, trials),
         placement=placement,
-        disagreements=disagreements(pairs, side.scenes, [side.folders], trials, largest),
+        disagreements=disagreements(pairs, side.scenes, [side.folders], trials, offsets_mm[0]),
         seed=seed,
     )
 

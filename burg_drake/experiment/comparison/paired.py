@@ -48,7 +48,7 @@ def paired_counts(
     both: int, only_first: int, only_second: int, neither: int, *, seed: int = 0
 ) -> Paired:
     """As `paired`, from counts."""
-    from scipy.stats import binomtest
+    from scipy.special import bdtr
 
     trials = both + only_first + only_second + neither
     difference, p_value = Figure.undefined("no trials"), None
@@ -59,8 +59,9 @@ def paired_counts(
         value = (only_first - only_second) / trials
         difference = Figure.between(value, float(low), float(high))
         p_value = 1.0
-        if only_first + only_second:
-            p_value = float(binomtest(only_first, only_first + only_second).pvalue)
+        apart = only_first + only_second
+        if apart:  # either tail of the binomial distribution with one half, which is symmetric
+            p_value = min(1.0, 2.0 * float(bdtr(min(only_first, only_second), apart, 0.5)))
     return Paired(
         trials=trials,
         both=both,

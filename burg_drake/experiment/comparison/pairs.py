@@ -11,7 +11,7 @@ from burg_drake.experiment.comparison.arrays import Flags, Values
 from burg_drake.experiment.comparison.calibration import MARGINS
 from burg_drake.experiment.comparison.matching import CONTENT, KEY
 from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.experiment.comparison.texts import Factor, Ids
 from burg_drake.experiment.trials.sheet import Success, succeeded
 
 NAMES = (*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", *MARGINS)
@@ -36,7 +36,7 @@ class Pairs:
         margins: (N,) numbers of the verdicts by name.
     """
 
-    id: Values
+    id: Ids
     run: Factor
     scene: Factor
     object: Factor
@@ -60,7 +60,7 @@ class Pairs:
         factors = ("run", "scene", "object", "simulated", "stage", "blocker", "ended")
         return replace(
             self,
-            id=self.id[rows],
+            id=self.id.take(rows),
             predicted=self.predicted[rows],
             actual=self.actual[rows],
             margins={name: values[rows] for name, values in self.margins.items()},

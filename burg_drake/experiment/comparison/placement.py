@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ class PlacementAgreement:
         limit_mm: how far off every object may be to stand where it should [mm].
         within: trials in which every object did.
         beyond: trials in which one was measured farther off.
-        unmeasured: trials in which one was not measured, and none farther off.
+        unmeasured: trials in which one of the scene was not measured, and none farther off.
         largest: share of right verdicts over the largest offset of any object [mm].
         target: the same over the offset of the target [mm].
     """
@@ -74,27 +74,32 @@ def placement_agreement(
     )
 
 
-def offsets(trials: Sequence[RealTrial], limit_mm: float = LIMIT_MM) -> tuple[Array, Array]:
+def offsets(
+    trials: Sequence[RealTrial],
+    instances: Sequence[Collection[str]],
+    limit_mm: float = LIMIT_MM,
+) -> tuple[Array, Array]:
     """Offsets of the objects before trials [mm].
 
     Args:
         trials: N trials.
+        instances: the free instances of the scene of each.
         limit_mm: see `placement_agreement`.
 
     Returns:
         (N,) the largest of any object, and (N,) that of the target; NaN where unknown.
     """
-    largest = np.array([_largest(trial, limit_mm) for trial in trials], dtype=float)
+    pairs = zip(trials, instances, strict=True)
+    largest = np.array([_largest(trial, there, limit_mm) for trial, there in pairs], dtype=float)
     target = np.array([_measured(trial).get(trial.instance, math.nan) for trial in trials])
     return largest, target.astype(float)
 
 
-def _largest(trial: RealTrial, limit_mm: float) -> float:
+def _largest(trial: RealTrial, instances: Collection[str], limit_mm: float) -> float:
     """Largest offset; NaN if an object was not measured, unless another one is beyond the limit."""
     measured = _measured(trial)
     most = max(measured.values(), default=math.nan)
-    complete = len(measured) == len(trial.placement) and trial.instance in measured
-    return most if complete or most > limit_mm else math.nan
+    return most if set(instances) <= set(measured) or most > limit_mm else math.nan
 
 
 def _measured(trial: RealTrial) -> dict[str, float]:

@@ -6,38 +6,56 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.evaluation.robustness import TABLE_FILE
+from burg_drake.evaluation.campaign import Campaign
+from burg_drake.evaluation.robustness_shares import lifted_shares, own_table
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.experiment.comparison.arrays import Values
+from burg_drake.experiment.comparison.pairs import Pairs
 from burg_drake.experiment.comparison.side import Judged
 
 
 def predicted_probability(
-    judged: Judged, ids: Values, table: str | Path | None = None
+    judged: Judged, pairs: Pairs, table: str | Path | None = None
 ) -> Array | None:
     """Share of the perturbed repeats that were lifted.
 
     Args:
         judged: the run of the grasps.
-        ids: (N,) of the grasps.
-        table: of robustness; that in the run's folder if None.
+        pairs: N verdicts of it.
+        table: of robustness; those in the folders of its runs if None.
 
     Returns:
         (N,) NaN where a grasp was not tested; None without a table.
 
     Raises:
-        InvalidInputError: the table cannot be read, or is another one.
+        InvalidInputError: a table cannot be read, or is of another run.
     """
-    if table is None:
-        table = judged.path / TABLE_FILE
-        if not isinstance(judged.found, Run) or not table.is_file():
-            return None
-    columns = read_table(Path(table))
-    if not {"id", "success"} <= set(columns):
-        raise InvalidInputError(f"{table} is no table of robustness: it has no column success")
-    values = columns["success"].astype(float).tolist()
-    known = dict(zip(columns["id"].tolist(), values, strict=True))
-    return np.array([known.get(id, np.nan) for id in ids.tolist()], dtype=float)
+    found = judged.found
+    known: dict[tuple[str, str], float] = {}
+    places = _places(found, None if table is None else Path(table))
+    for runs, path in places:
+        known |= lifted_shares(
+            path, runs, None if isinstance(found, Campaign) else found.candidates.id
+        )
+    return _along(pairs, known) if places else None
+
+
+def _places(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
+    """Tables, with the runs that they may be of."""
+    folders = {found.document.hash: found.path}
+    if isinstance(found, Campaign):
+        folders = {state.run: found.folder(n) for n, state in found.states.items() if state.run}
+    if table is not None:
+        return [(set(folders), table)]
+    own = {run: own_table(folder) for run, folder in folders.items()}
+    return [({run}, path) for run, path in own.items() if path is not None]
+
+
+def _along(pairs: Pairs, known: dict[tuple[str, str], float]) -> Array:
+    """(N,) shares of pairs by run and id."""
+    values = np.full(len(pairs), np.nan)
+    tested = {run for run, _ in known}
+    rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
+    for row in rows.tolist():
+        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
+    return values

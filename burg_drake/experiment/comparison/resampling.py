@@ -91,6 +91,15 @@ def bounds(values: Array) -> tuple[Array, Array]:
     Returns:
         Lower and upper bounds (...).
     """
-    ordered = np.sort(np.moveaxis(np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0), 0, -1))
-    low, high = np.quantile(ordered, TAILS, axis=-1)
+    finite = np.where(np.isfinite(values), values, 0.0)
+    ordered = np.sort(np.ascontiguousarray(np.moveaxis(finite, 0, -1)))
+    last = ordered.shape[-1] - 1
+    low, high = (_between(ordered, tail * last) for tail in TAILS)
     return low, high
+
+
+def _between(ordered: Array, place: float) -> Array:
+    """What sorted values (..., draws) are at a place between two of them."""
+    below = min(int(place), ordered.shape[-1] - 2) if ordered.shape[-1] > 1 else 0
+    one, other = ordered[..., below], ordered[..., min(below + 1, ordered.shape[-1] - 1)]
+    return one + (other - one) * (place - below)

@@ -86,6 +86,10 @@ class Judged:
         folders = [Path(self.folders[content]) for content in self.scenes if content in wanted]
         return [load_run(folder) for folder in folders if (folder / RUN_FILE).exists()]
 
+    def instances_of(self, contents: Collection[str]) -> dict[str, tuple[str, ...]]:
+        """Names of the free instances of some scenes by their content."""
+        return {run.document.scene.content: run.instances for run in self.runs_of(contents)}
+
     def table(self, names: Sequence[str]) -> Table:
         """Columns of all judged grasps; `evaluation.table` says which there are."""
         if isinstance(self.found, Campaign):

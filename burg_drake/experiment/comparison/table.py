@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,33 @@ import numpy as np
 from burg_drake.evaluation.part_store import Rows as StoredRows
 from burg_drake.evaluation.table import TEXT, Columns
 from burg_drake.experiment.comparison.arrays import Rows, Values
-from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.experiment.comparison.texts import Factor, Ids
 
 ID = "id"
+
+
+class Stored(Mapping[str, Values]):
+    """Columns of numbers in the columnar store, read as they are asked for."""
+
+    def __init__(self, rows: StoredRows, names: Sequence[str]) -> None:
+        """Of some names."""
+        self._rows, self._names = rows, tuple(names)
+        self._read: dict[str, Values] = {}
+
+    def __getitem__(self, name: str) -> Values:
+        if name not in self._read:
+            self._read[name] = self._rows.column(name)
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def same(self, other: Stored, name: str) -> bool:
+        """Whether a column of both is the same, without reading it."""
+        return bool(self._rows.table.column(name).equals(other._rows.table.column(name)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +49,7 @@ class Table:
         numbers: (N,) columns of numbers by name.
     """
 
-    id: Values
+    id: Ids
     texts: Mapping[str, Factor]
     numbers: Mapping[str, Values]
 
@@ -37,7 +61,7 @@ class Table:
         """From columns in memory."""
         others = [name for name in names if name != ID]
         return cls(
-            columns[ID],
+            Ids(columns[ID]),
             {name: Factor.of(columns[name]) for name in others if name in TEXT},
             {name: columns[name] for name in others if name not in TEXT},
         )
@@ -47,17 +71,23 @@ class Table:
         """From the columnar store, which has texts as numbers already."""
         others = [name for name in names if name != ID]
         return cls(
-            rows.column(ID),
+            Ids(rows.table.column(ID)),
             {name: Factor.of_codes(*rows.codes(name)) for name in others if name in TEXT},
-            {name: rows.column(name) for name in others if name not in TEXT},
+            Stored(rows, [name for name in others if name not in TEXT]),
         )
 
-    def take(self, rows: Rows) -> Table:
-        """Some rows; the table itself if they are all of it, in order."""
+    def same(self, other: Table, name: str) -> bool:
+        """Whether a column of numbers is known to be the same in both."""
+        one, two = self.numbers, other.numbers
+        return isinstance(one, Stored) and isinstance(two, Stored) and one.same(two, name)
+
+    def take(self, rows: Rows, numbers: Sequence[str]) -> Table:
+        """Some rows with some columns of numbers; the table itself if they are all of it, in
+        order."""
         if len(rows) == len(self) and np.array_equal(rows, np.arange(len(self))):
             return self
         return Table(
-            self.id[rows],
+            self.id.take(rows),
             {name: factor.take(rows) for name, factor in self.texts.items()},
-            {name: values[rows] for name, values in self.numbers.items()},
+            {name: self.numbers[name][rows] for name in numbers},
         )

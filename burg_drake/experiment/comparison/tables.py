@@ -19,6 +19,7 @@ from burg_drake.experiment.comparison.wording import (
     interval,
     margin_title,
     number,
+    of_selected,
 )
 
 MOST_ROWS = 20
@@ -29,19 +30,20 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     c = comparison
     yield headline(c)
     for name, judged in _judgements(c):
+        of = of_selected(c) + name
         yield matrix_table(c, judged, name)
         yield figure_table(judged, name)
         yield bias_words(c, judged)
         if len(judged.objects) > 1:
-            yield group_table(f"By object{name}", "object", judged.objects)
+            yield group_table(f"By object{of}", "object", judged.objects)
         if len(judged.scenes) > 1:
-            yield group_table(f"By scene{name}", "scene", judged.scenes)
-        yield stopped_table(judged, name)
+            yield group_table(f"By scene{of}", "scene", judged.scenes)
+        yield stopped_table(judged, of)
         telling = [c for c in judged.calibration if c.auroc.value is not None]
         if telling:
             yield calibration_table(telling, name)
         if judged.placement is not None:
-            yield placement_table(judged, name)
+            yield placement_table(judged, of)
     yield coverage_words(c)
     yield from (f"differs: {text}" for text in c.settings)
     yield from (f"note: {text}" for text in c.notes)
@@ -156,7 +158,7 @@ def placement_table(judged: Judgement, name: str = "") -> TextTable:
     groups = [
         Group(name=f"every object within {limit}", agreement=p.within),
         Group(name="one farther off", agreement=p.beyond),
-        Group(name="not measured", agreement=p.unmeasured),
+        Group(name="not all measured", agreement=p.unmeasured),
     ]
     table = group_table(f"By placement of the objects{name}", "placement", groups)
     if p.largest.auroc.value is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from burg_drake.experiment.comparison.arrays import Flags, Rows, Values
 SAMPLE = 4096
 """Rows that are looked at first; where they have all texts, nothing needs sorting."""
 _KEYS = np.random.default_rng(1).integers(1, 1 << 63, 4096).astype(np.uint64) | np.uint64(1)
+_MASKS = np.array([(1 << 8 * k) - 1 for k in range(9)], dtype=np.uint64)
+"""Of the first so many bytes of a word."""
 
 
 def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
@@ -22,21 +25,81 @@ def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
     keys = np.zeros(len(texts), dtype=np.uint64)
     if not texts.dtype.itemsize or not len(texts):
         return keys
-    characters = texts.view(np.uint32).reshape(len(texts), -1)
-    for plane in range(4):  # of characters' bytes; nearly all texts have the first one alone
-        if plane == 0 or characters.max() >= 1 << 8 * plane:
-            keys += _byte_keys((characters >> np.uint32(8 * plane)).astype(np.uint8), plane)
-    return keys
-
-
-def _byte_keys(letters: NDArray[np.uint8], plane: int) -> NDArray[np.uint64]:
-    """Sums of words of eight bytes, each times a number of its own."""
+    letters: Values = texts.view(np.uint32).reshape(len(texts), -1)
+    if letters.max() >= 128:
+        letters = np.char.encode(texts, "utf-8").view(np.uint8).reshape(len(texts), -1)
     words = np.zeros((len(letters), -(-letters.shape[1] // 8) * 8), dtype=np.uint8)
     words[:, : letters.shape[1]] = letters
-    keys = np.zeros(len(letters), dtype=np.uint64)
     for k, word in enumerate(words.view(np.uint64).T):
-        keys += word * _KEYS[(4 * k + plane) % len(_KEYS)]
+        keys += word * _KEYS[k % len(_KEYS)]
     return keys
+
+
+def stored_keys(column: Any) -> NDArray[np.uint64]:
+    """As `text_keys`, of an Arrow column of texts without nulls; none of them becomes an object."""
+    found = [np.zeros(0, dtype=np.uint64), *(_chunk_keys(chunk) for chunk in column.chunks)]
+    return np.concatenate(found)
+
+
+def _chunk_keys(chunk: Any) -> NDArray[np.uint64]:
+    """Sums of words of eight bytes, each times a number of its own."""
+    _, places, data = chunk.buffers()
+    keys = np.zeros(len(chunk), dtype=np.uint64)
+    if not len(chunk) or data is None:
+        return keys
+    kind = np.int64 if str(chunk.type).startswith("large") else np.int32
+    place = np.frombuffer(places, dtype=kind)[chunk.offset : chunk.offset + len(chunk) + 1]
+    begin, length = place[:-1], np.diff(place)
+    text = np.frombuffer(data, dtype=np.uint8)[place[0] : place[-1]]
+    padded = np.zeros(len(text) + 8, dtype=np.uint8)
+    padded[: len(text)] = text
+    words = np.ndarray(len(text) + 1, dtype=np.uint64, buffer=padded.data, strides=(1,))
+    for k in range(-(-int(length.max()) // 8)):
+        at = np.minimum(begin - place[0] + 8 * k, len(text))
+        keys += (words[at] & _MASKS[(length - 8 * k).clip(0, 8)]) * _KEYS[k % len(_KEYS)]
+    return keys
+
+
+@dataclass(frozen=True, eq=False)
+class Ids:
+    """A column of N texts that all differ; they become objects when they are asked for.
+
+    Attributes:
+        column: array of texts, or an Arrow column of them.
+        rows: (N,) places in it; None for all of it.
+    """
+
+    column: Any
+    rows: Rows | None = None
+
+    def __len__(self) -> int:
+        return len(self.column if self.rows is None else self.rows)
+
+    def __getitem__(self, row: int) -> str:
+        found = self.column[row if self.rows is None else int(self.rows[row])]
+        return str(found.as_py() if hasattr(found, "as_py") else found)
+
+    @property
+    def keys(self) -> NDArray[np.uint64]:
+        """(N,) numbers; see `text_keys`."""
+        stored = not isinstance(self.column, np.ndarray)
+        keys = stored_keys(self.column) if stored else text_keys(self.column)
+        return keys if self.rows is None else keys[self.rows]
+
+    def same(self, other: Ids) -> bool:
+        """Whether both columns have the same texts in the same order; they may be found to differ
+        only because they are not kept alike."""
+        if self.rows is not None or other.rows is not None:
+            return False
+        arrays = [isinstance(column, np.ndarray) for column in (self.column, other.column)]
+        if all(arrays):
+            return np.array_equal(self.column, other.column)
+        return not any(arrays) and bool(self.column.equals(other.column))
+
+    def take(self, rows: Values) -> Ids:
+        """The column of some rows, as indices or truth values."""
+        rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+        return Ids(self.column, rows if self.rows is None else self.rows[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +146,10 @@ class Factor:
     def take(self, rows: Values) -> Factor:
         """The column of some rows."""
         return Factor(self.names, self.index[rows])
+
+    def same(self, other: Factor) -> bool:
+        """Whether both columns have the same texts in the same order."""
+        return self.names == other.names and np.array_equal(self.index, other.index)
 
     def __getitem__(self, row: int) -> str:
         return self.names[self.index[row]]

@@ -3,8 +3,7 @@ with the same grasps."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -45,7 +44,7 @@ class _Table:
         return grasp_content(instance, grasps.X_OG[k], float(grasps.width[k]))
 
 
-def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, Counter[str]]:
+def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, dict[int, str]]:
     """Rows of the results about the grasps that were tried.
 
     Args:
@@ -55,7 +54,7 @@ def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, Co
 
     Returns:
         Columns `NAMES` for the trials that have a row, with their index in the sheet as `trial`;
-        and how many have none, by reason.
+        and why others have none, by their index.
 
     Raises:
         InvalidInputError: none has one, or a grasp is not the one that was planned with.
@@ -64,7 +63,7 @@ def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, Co
     for run in side.runs_of({source.scene.content for source in sheet.runs.values()}):
         tables.setdefault(run.document.scene.content, []).append(_Table(run))
     found: list[tuple[int, _Table, int]] = []
-    missing: Counter[str] = Counter()
+    missing: dict[int, str] = {}
     for k, trial in enumerate(sheet.trials):
         source = sheet.runs[trial.run]
         there = tables.get(source.scene.content, [])
@@ -75,8 +74,9 @@ def find_tried(sheet: TrialSheet, path: Path, side: Judged) -> tuple[Columns, Co
             found.append((k, judged[0], judged[0].rows[trial.grasp]))
         else:
             _refuse_changed(trial, [t for t in there if t.run.document.hash == source.hash], path)
-            what = "is not judged" if holds else "is not there" if there else "is of another scene"
-            missing[what] += 1
+            missing[k] = (
+                "is not judged" if holds else "is not there" if there else "is of another scene"
+            )
     if not found:
         raise InvalidInputError(_nothing_in_common(sheet, path, side, missing))
     return _columns(found), missing
@@ -93,11 +93,13 @@ def _refuse_changed(trial: RealTrial, own: Sequence[_Table], path: Path) -> None
             )
 
 
-def _nothing_in_common(sheet: TrialSheet, path: Path, side: Judged, missing: Counter[str]) -> str:
+def _nothing_in_common(
+    sheet: TrialSheet, path: Path, side: Judged, missing: Mapping[int, str]
+) -> str:
     if not sheet.trials:
         return f"{path} has no trials; burg-drake trials plan chooses some"
     sources = sheet.runs.values()
-    if set(missing) == {"is of another scene"}:
+    if set(missing.values()) == {"is of another scene"}:
         theirs = {s.scene.content[:HASH_DIGITS]: s.scene.name for s in sources}
         what = f"{path} is about scene {named(theirs)}, but {side.path} holds {named(side.scenes)}"
     else:

@@ -24,6 +24,11 @@ UNITS = {
 """Units for people by that of a column, and how many of them it is."""
 
 
+def of_selected(comparison: Comparison) -> str:
+    """What titles add to say of which trials their figures are; nothing where all count alike."""
+    return "" if comparison.kind == "runs" else ", selected trials"
+
+
 def number(found: Figure, *, percent: bool) -> str:
     """The value of a figure."""
     if found.value is None:

@@ -31,6 +31,8 @@ from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, RobotRepo
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""
 DIGITS = 12
+DOUBTFUL = "doubtful; the file in placements/ says why"
+"""Of an offset in the trials file, which has no reasons."""
 
 
 class EntryConflict(InvalidInputError):
@@ -119,20 +121,14 @@ class LabBook:
                     trial = changed.trial
 
     def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
-        """Enters what was seen before a trial.
+        """Enters what was seen before a trial, be it carried out meanwhile or not; what people
+        entered stays.
 
         Raises:
-            BurgError: as for `enter`; the trial has an outcome already.
+            BurgError: as for `enter`.
         """
         with self._lock:
-            while True:
-                trial = self.require_open(number)
-                try:
-                    return self.book.record(
-                        number, correct=True, expected=trial, photo=photo, placement=placement
-                    )
-                except TrialChanged:  # since it was read: look again
-                    continue
+            return self.book.record(number, correct=True, photo=photo, placement=placement)
 
     def require_open(self, number: int) -> RealTrial:
         """The trial; refuses a photo of what was before one that is over.
@@ -241,6 +237,7 @@ def plan_data(lab: LabBook) -> dict[str, Any]:
                 "fingers": closing_text(runs.X_SG(trial)),
                 "point": point_text(runs.X_SG(trial)),
                 "width": round(1e3 * runs.width(trial), 1),
+                "opening": round(1e3 * runs.of(trial).station.hand.opening[1], 2),
                 **({"simulated": trial.simulated.value} if lab.show_simulated else {}),
             }
             for trial in sorted(sheet.trials, key=lambda trial: trial.number)
@@ -266,7 +263,8 @@ def entry_data(trial: RealTrial) -> dict[str, Any]:
 
 def _place_data(place: ObjectPlace) -> dict[str, Any]:
     off = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
-    return {"status": place.status, "mm": off, "deg": place.turn_deg}
+    reason = DOUBTFUL if place.status == "uncertain" else ""
+    return {"status": place.status, "mm": off, "deg": place.turn_deg, "reason": reason}
 
 
 def states(lab: LabBook) -> dict[str, Any]:

@@ -70,15 +70,22 @@ class LabCamera:
         self._epoch = 0
         self._check: threading.Thread | None = None
         self._checked: dict[str, Any] | None = None
+        self._measuring: tuple[int, bool] | None = None
+        self._drawing = threading.Lock()
+        self._shown = self._drawn = 0
 
     def watch(self, number: int) -> None:
-        """Looks at the scene of a trial from now on.
+        """Looks at the scene of a trial from now on; offsets of another trial are no longer drawn.
 
         Raises:
             BurgError: there is no such trial, or the camera cannot be opened.
         """
         scene = self._lab.runs.of(self._lab.runs.sheet.trial(number)).scene
         with self._lock:
+            with self._drawing:
+                self._shown = number
+                if self._view is not None and self._drawn not in (0, number):
+                    self._view.live.placement, self._drawn = None, 0
             if self._view is not None and self._view.scene.content == scene.content:
                 return
             self.close()
@@ -91,7 +98,7 @@ class LabCamera:
                 source.close()
                 raise
             self._epoch += 1
-            self._view, self._checked = _View(self._epoch, scene, live), None
+            self._view, self._drawn = _View(self._epoch, scene, live), 0
             live.start()
 
     def close(self) -> None:
@@ -121,7 +128,9 @@ class LabCamera:
 
         Args:
             number: of the trial that it is for.
-            keep: enter photo and placement for the trial.
+            keep: enter photo and placement for the trial when the check ends, also if it has an
+                outcome by then: the photo is from before. One that has an outcome already keeps
+                what it has.
 
         Raises:
             BurgError: there is no picture with a pose, or a check is at work.
@@ -139,9 +148,11 @@ class LabCamera:
                 raise InvalidInputError(
                     "a placement check needs a picture that shows where the board is"
                 )
+            refusal = self._refusal(number) if keep else ""
+            self._measuring = (number, keep and not refusal)
             self._check = threading.Thread(
                 target=self._measure,
-                args=(view, number, picture.sight, keep),
+                args=(view, number, picture.sight, keep, refusal),
                 name="placement check",
                 daemon=True,
             )
@@ -156,7 +167,7 @@ class LabCamera:
         """What the page shows beside the picture."""
         view = self._view
         if view is None:
-            return {"scene": "", "line": "", "checking": False, "check": None}
+            return {"scene": "", "line": "", "checking": False, "check": None, "drawn": 0}
         picture, reader = view.live.picture, view.live.reader
         lost = reader.fault if reader.state == "lost" else ""
         line = pose_line(picture.sight.estimate, view.scene.board) if picture else "waiting"
@@ -166,18 +177,41 @@ class LabCamera:
             "valid": picture is not None and picture.sight.estimate.valid,
             "line": line,
             "checking": self.is_checking,
+            "measuring": self._measured_now(),
+            "drawn": self._drawn,
             "check": self._checked,
         }
 
-    def _measure(self, view: _View, number: int, sight: Sight, keep: bool) -> None:
+    def _measured_now(self) -> dict[str, Any] | None:
+        """Which trial a check is at work for, and whether it is kept."""
+        measuring = self._measuring
+        if measuring is None or not self.is_checking:
+            return None
+        return {"number": measuring[0], "keep": measuring[1]}
+
+    def _refusal(self, number: int) -> str:
+        """Why a photo that is taken now is not kept; empty if it is."""
+        try:
+            self._lab.require_open(number)
+        except BurgError as error:
+            return str(error)
+        return ""
+
+    def _show_offsets(self, view: _View, number: int, check: PlacementCheck) -> None:
+        """Draws offsets of a trial, if it is the one that is shown."""
+        with self._drawing:
+            if self._shown == number:
+                view.live.placement, self._drawn = check, number
+
+    def _measure(self, view: _View, number: int, sight: Sight, keep: bool, refusal: str) -> None:
         begun = time.monotonic()
         told: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
         try:
             check = view.live.session.check(sight)
-            view.live.placement = check
+            self._show_offsets(view, number, check)
             told["objects"] = {n: place_row(p) for n, p in check.instances.items()}
-            told["problem"] = check.reason
-            if keep and not check.reason:
+            told["problem"] = check.reason or refusal
+            if keep and not told["problem"]:
                 self._keep(number, sight, check)
                 told["kept"] = True
         except BurgError as error:
@@ -192,7 +226,6 @@ class LabCamera:
     def _keep(self, number: int, sight: Sight, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
         path = self._lab.runs.path
-        self._lab.require_open(number)
         with tempfile.TemporaryDirectory() as folder:
             photo = Path(folder) / "photo.png"
             write_image(photo, sight.frame.image)

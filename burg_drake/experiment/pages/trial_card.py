@@ -86,7 +86,7 @@ def _lines(trial: RealTrial) -> Html:
         ("note", trial.note, "note"),
         ("width [mm]", width, None),
         ("time", day_and_time(trial.time), None),
-        ("initials", trial.operator, None),
+        ("operator", trial.operator, None),
     )
     return element(
         "div",

@@ -45,12 +45,12 @@ class Exported:
     """What became of the motion of a trial.
 
     Attributes:
-        number, block, run, grasp, instance, object, simulated: as in `RealTrial`.
+        number, block, run, grasp, instance, object: as in `RealTrial`.
         answer: `reachable`, or what hinders the arm.
         blocker: what is in the way.
         reason: why there is no answer, or no file of what is reachable.
         file: name of the file; empty if there is none.
-        duration: of the motion [s]; None without one.
+        duration: of the motion, to a millisecond [s]; None without one.
     """
 
     number: int
@@ -59,7 +59,6 @@ class Exported:
     grasp: str
     instance: str
     object: str
-    simulated: str
     answer: str
     blocker: str
     reason: str
@@ -196,7 +195,8 @@ def _judge(
     with folder.opened() as journal:
         known = folder.finished(retry_failed=retry_failed)
         left = [candidate for candidate in candidates if candidate.id not in known]
-        begin = Progress(STARTING, len(candidates) - len(left), len(candidates))
+        known_already = len(candidates) - len(left)
+        begin = Progress(STARTING, known_already, len(candidates), unit="trials")
         pace = Pace(reporter.show, begin, "planning")
         with closing(judge_all(left, factory, workers=workers)) as judged:
             for candidate, verdict in judged:
@@ -212,6 +212,7 @@ def _exported(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> Exported
     own = plan.with_name(f"{_stem(trial)}{plan.suffix}")
     if there and own != plan and not own.exists():  # the same grasp is tried twice
         atomic_write(own, plan.read_bytes())
+    duration = verdict.margins.get("duration") if there else None
     return Exported(
         number=trial.number,
         block=trial.block,
@@ -219,12 +220,11 @@ def _exported(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> Exported
         grasp=trial.grasp,
         instance=trial.instance,
         object=trial.object,
-        simulated=trial.simulated.value,
         answer="" if failed else verdict.outcome.value,
         blocker=verdict.blocker,
         reason=verdict.reason,
         file=own.name if there else "",
-        duration=verdict.margins.get("duration") if there else None,
+        duration=None if duration is None else round(duration, 3),
     )
 
 

@@ -19,6 +19,9 @@ EMPTY: dict[str, Any] = {
 }
 """Fields of a trial that nothing has been entered for."""
 
+WORDS = ("operator", "note")
+"""Fields that people write."""
+
 
 def real_outcome(name: str) -> RealOutcome:
     """The outcome of a name.
@@ -28,19 +31,25 @@ def real_outcome(name: str) -> RealOutcome:
     """
     known = [outcome.value for outcome in RealOutcome]
     if name not in known:
-        raise InvalidInputError(f"there is no outcome {quoted(name)}; {nearest(name, known)}")
+        meant = nearest(name, known, ordered=True)
+        raise InvalidInputError(f"there is no outcome {quoted(name)}; {meant}")
     return RealOutcome(name)
 
 
 def checked(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """An entry whose fields exist, with the outcome as such."""
+    """An entry whose fields exist, with the outcome as such and without blanks around words."""
     for name, value in entry.items():
         if name not in EMPTY:
             raise UnknownNameError(f"a trial has no entry {quoted(name)}; {nearest(name, FIELDS)}")
         if isinstance(value, str) and "\0" in value:
             raise InvalidInputError(f"{name} has a NUL character: {quoted(value)}")
     outcome = entry.get("outcome")
-    return {**entry, **({} if outcome is None else {"outcome": real_outcome(outcome)})}
+    words = {name: entry[name].strip() for name in WORDS if isinstance(entry.get(name), str)}
+    return {
+        **entry,
+        **words,
+        **({} if outcome is None else {"outcome": real_outcome(outcome)}),
+    }
 
 
 def merged(trial: RealTrial, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,8 +14,10 @@ import numpy as np
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.outcome import Outcome
 from burg_drake.experiment.trials.pool import Pool
-from burg_drake.experiment.trials.sheet import Selection, Stratum
+from burg_drake.experiment.trials.sheet import Selection, Stratum, succeeded
+from burg_drake.experiment.trials.shortfalls import Shortfall, shortfall, shortfall_notes
 from burg_drake.experiment.trials.strata import (
     FAILURE,
     SUCCESS,
@@ -27,8 +29,8 @@ from burg_drake.experiment.trials.strata import (
 
 Chosen = list[tuple[Pool, int, str]]
 """Grasps with the key of their stratum; a number is a place in the pool."""
-MOST_NOTES = 20
-"""Of the same kind; more than these are counted."""
+RARE = 0.1
+"""Share of the trials below which there are almost none of a class."""
 
 
 def drawn_scenes(pools: list[Pool], selection: Selection) -> list[Pool]:
@@ -47,7 +49,7 @@ def choose(
     """Strata, the grasps chosen, and notes about what is missing."""
     strata: dict[str, Stratum] = {}
     chosen: Chosen = []
-    short: list[str] = []
+    short: list[Shortfall] = []
     unknown = 0
     for pool in pools:
         labels = labels_of(pool, selection, lambda run: robustness_of(run, table))
@@ -60,18 +62,31 @@ def choose(
             if selection.balance == "outcome":
                 members[SUCCESS], members[FAILURE]  # also without any
             if not members:
-                short.append(f"{held} of run {pool.key}: no grasp to choose from")
+                short.append(Shortfall(pool.key, held, "no grasp to choose from"))
                 continue
             found = _strata(pool, held, members, selection)
             strata |= found
-            short += _shortfalls(found, selection.per_object)
+            short += shortfall(list(found.values()), selection.per_object)
             for key, stratum in found.items():
                 ranked = _ranked(pool, members[stratum.label], selection.seed)
                 chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
     notes = [f"{unknown} grasps have no {_balanced(selection)}; left out"] if unknown else []
-    if len(short) > MOST_NOTES:
-        short = [*short[:MOST_NOTES], f"and {len(short) - MOST_NOTES} more such shortfalls"]
-    return strata, chosen, notes + short
+    return strata, chosen, notes + shortfall_notes(short) + _rare_class(chosen, selection)
+
+
+def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
+    """A sentence where nearly all that was chosen succeeds, or nearly all fails."""
+    pools = {pool.key: pool for pool, _, _ in chosen}
+    outcomes = {key: pool.cells("outcome") for key, pool in pools.items()}
+    found = [Outcome(str(outcomes[pool.key][k])) for pool, k, _ in chosen]
+    good = [succeeded(outcome, selection.success) for outcome in found]
+    for name, count in (("failures", good.count(False)), ("successes", good.count(True))):
+        if good and count < RARE * len(good):
+            return [
+                f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
+                f" how well {name} are predicted"
+            ]
+    return []
 
 
 def _strata(
@@ -93,18 +108,6 @@ def _strata(
         )
         for label in sorted(members)
     }
-
-
-def _shortfalls(strata: Mapping[str, Stratum], wanted: int) -> list[str]:
-    """A line about an object that has too few grasps of a stratum, or in all."""
-    parts = list(strata.values())
-    total = sum(stratum.selected for stratum in parts)
-    missing = [s for s in parts if s.selected < s.wanted]
-    if not missing:
-        return []
-    told = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
-    rest = "others make up for it" if total == wanted else f"{total} of {wanted} in all"
-    return [f"{parts[0].object} of run {parts[0].run}: {told}; {rest}"]
 
 
 def _balanced(selection: Selection) -> str:

@@ -12,14 +12,12 @@ from burg_drake.core.errors import InvalidInputError, nearest, quoted
 from burg_drake.core.figures import figure
 from burg_drake.core.outcome import Outcome
 from burg_drake.evaluation.judge import MARGINS
+from burg_drake.evaluation.robustness_shares import TABLE_FILES, lifted_shares, own_table
 from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table_file import read_table
 from burg_drake.experiment.trials.pool import Pool
 from burg_drake.experiment.trials.sheet import Selection, succeeded
 
 SUCCESS, FAILURE = "success", "failure"
-ROBUSTNESS = ("robustness.csv", "robustness.parquet")
-"""Tables of `burg-drake robustness` in the folder of a run."""
 
 
 def labels_of(
@@ -66,23 +64,16 @@ def robustness_of(run: Run, table: Path | None = None) -> dict[str, float]:
         table: what `robustness` has written; the one in the run's folder if None.
 
     Raises:
-        InvalidInputError: there is no such table, or it has no such shares.
+        InvalidInputError: there is no such table, it has no such shares, or it is of another run.
     """
-    places = [run.path / name for name in ROBUSTNESS] if table is None else [table]
-    found = next((place for place in places if place.exists()), None)
+    found = own_table(run.path) if table is None else table
     if found is None:
         raise InvalidInputError(
-            f"there is no {places[0]}; `burg-drake robustness {run.path} --tests noise` predicts"
-            " how often grasps are lifted"
+            f"there is no {run.path / TABLE_FILES[0]}; `burg-drake robustness {run.path} --tests"
+            " noise` predicts how often grasps are lifted"
         )
-    columns = read_table(found)
-    if "success" not in columns or "id" not in columns:
-        raise InvalidInputError(
-            f"{found} has no columns id and success, as `burg-drake robustness` writes them"
-        )
-    shares = np.asarray(columns["success"], dtype=float)
-    pairs = zip(columns["id"].tolist(), shares.tolist(), strict=True)
-    return {id: share for id, share in pairs if np.isfinite(share)}
+    shares = lifted_shares(found, {run.document.hash}, run.candidates.id)
+    return {id: share for (of, id), share in shares.items() if of == run.document.hash}
 
 
 def allocate(populations: Mapping[str, int], wanted: int, first: Sequence[str]) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.session import Session
+from burg_drake.cameras.placement_document import PlacementCheck
+from burg_drake.cameras.session import Session, Sight
 from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.synthetic import board_image
 from burg_drake.core.errors import InvalidInputError
@@ -155,37 +157,83 @@ def test_the_page_is_not_told_what_was_simulated(lab: LabBook) -> None:
     assert plan_data(told)["trials"][0]["simulated"] == lab.runs.sheet.trials[0].simulated
 
 
-def test_a_photo_and_the_placement_are_kept_before_a_trial(
-    lab: LabBook, trials: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def over(lab: LabBook, trials: Path) -> Iterator[LabCamera]:
+    """A camera over an empty board."""
     camera = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
     board = lab.runs.of(lab.runs.sheet.trial(5)).scene.board
     photo = board_image(board, camera, make_pose(np.diag([1.0, -1.0, -1.0]), (0.3, 0.21, 0.6)))
     cv2.imwrite(str(trials.parent / "photo.png"), photo[..., ::-1])
     over = LabCamera(lab, lambda scene: open_source(trials.parent / "photo.png"), camera)
-    try:
-        over.watch(5)
-        assert over.next_picture(0, 0, 30.0) is not None
-        over.check(5, keep=True)
-        over.wait_for_check()
-        told = over.status()["check"]
-        assert (told["number"], told["kept"], told["problem"]) == (5, True, "")
-        trial = load_trials(trials).trial(5)
-        assert trial.outcome is None and (trials.parent / trial.photo).is_file()
-        assert trial.placement["bottle"].status == "not_seen"  # the board is empty
-        lab.enter(entry(lab, 5, "lifted"))
-        assert load_trials(trials).trial(5).photo == trial.photo
+    yield over
+    over.close()
 
-        def broken(*_: object) -> None:
-            raise cv2.error("no such matrix")
 
-        monkeypatch.setattr(Session, "check", broken)
-        over.check(4, keep=True)
-        over.wait_for_check()
-        told = over.status()["check"]
-        assert (told["number"], told["kept"]) == (4, False)
-        assert told["problem"] == "the check failed: error: no such matrix"
-    finally:
-        over.close()
-    with pytest.raises(InvalidInputError, match="carried out already"):
-        lab.photographed(5, "photos/005.png", {})
+def test_a_photo_and_the_placement_are_kept_before_a_trial(
+    lab: LabBook, trials: Path, over: LabCamera
+) -> None:
+    over.watch(5)
+    assert over.next_picture(0, 0, 30.0) is not None
+    over.check(5, keep=True)
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert (told["number"], told["kept"], told["problem"]) == (5, True, "")
+    trial = load_trials(trials).trial(5)
+    assert trial.outcome is None and (trials.parent / trial.photo).is_file()
+    assert trial.placement["bottle"].status == "not_seen"  # the board is empty
+    lab.enter(entry(lab, 5, "lifted"))
+    assert load_trials(trials).trial(5).photo == trial.photo
+    over.check(5, keep=True)  # of what is there after the trial
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert not told["kept"] and "carried out already" in told["problem"] and told["objects"]
+    assert load_trials(trials).trial(5).photo == trial.photo
+
+
+def test_a_check_that_fails_says_why(
+    over: LabCamera, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object) -> None:
+        raise cv2.error("no such matrix")
+
+    monkeypatch.setattr(Session, "check", broken)
+    over.watch(4)
+    assert over.next_picture(0, 0, 30.0) is not None
+    over.check(4, keep=True)
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert (told["number"], told["kept"]) == (4, False)
+    assert told["problem"] == "the check failed: error: no such matrix"
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_an_outcome_that_comes_while_a_check_is_at_work(
+    lab: LabBook, trials: Path, over: LabCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Photo and placement stay with the trial that was shown; the next one shows no offsets."""
+    entered, check = threading.Event(), Session.check
+
+    def slow(session: Session, sight: Sight) -> PlacementCheck:
+        assert entered.wait(30.0)
+        return check(session, sight)
+
+    monkeypatch.setattr(Session, "check", slow)
+    over.watch(5)
+    assert over.next_picture(0, 0, 30.0) is not None
+    over.check(5, keep=True)
+    assert over.status()["measuring"] == {"number": 5, "keep": True}
+    lab.enter(entry(lab, 5, "slipped", note="wet"))
+    over.watch(6)  # on the same scene
+    entered.set()
+    over.wait_for_check()
+    status = over.status()
+    assert (status["check"]["number"], status["check"]["kept"], status["drawn"]) == (5, True, 0)
+    done, following = (load_trials(trials).trial(number) for number in (5, 6))
+    assert (done.outcome, done.note, done.time) == (RealOutcome.SLIPPED, "wet", TIME)
+    assert (trials.parent / done.photo).is_file() and set(done.placement) == {"bottle"}
+    assert not following.photo and not following.placement
+    over.check(6, keep=False)
+    over.wait_for_check()
+    assert over.status()["drawn"] == 6
+    over.watch(7)
+    assert over.status()["drawn"] == 0

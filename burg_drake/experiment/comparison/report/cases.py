@@ -89,8 +89,8 @@ def _note(case: Disagreement, photos: Path | None) -> Child:
     return join(case.note, " " if case.note else "", link)
 
 
-def stopped_section(judged: Judgement) -> Html:
-    """What became of grasps by verdict and the body in the way."""
+def stopped_section(judged: Judgement, of: str) -> Html:
+    """What became of grasps by verdict and the body in the way; `of` says of which."""
     rows = [
         element(
             "tr",
@@ -108,7 +108,9 @@ def stopped_section(judged: Judgement) -> Html:
     head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
     text = f"By what the simulation said: how many of these grasps succeeded.{more}"
     return section(
-        "What became of each verdict", text, table(head, rows, numbers=(3,), style="groups")
+        f"What became of each verdict{of}",
+        text,
+        table(head, rows, numbers=(3,), style="groups"),
     )
 
 

@@ -59,8 +59,8 @@ def _row(c: Calibration, weighted: bool) -> Html:
     )
 
 
-def placement_section(judged: Judgement) -> Html | None:
-    """Agreement by placement; nothing without real trials."""
+def placement_section(judged: Judgement, of: str) -> Html | None:
+    """Agreement by placement; nothing without real trials. `of` says of which trials."""
     p = judged.placement
     if p is None or not p.within.trials + p.beyond.trials:
         return None
@@ -75,5 +75,5 @@ def placement_section(judged: Judgement) -> Html | None:
         " met. Agreement that is much better in the first row points at placement, not physics."
     )
     plots = [reliability_plot(c, "right verdicts") for c in (p.largest, p.target) if c.trials]
-    whole = group_section("By placement of the objects", text, "placement", groups)
+    whole = group_section(f"By placement of the objects{of}", text, "placement", groups)
     return element("div", whole, element("div", *plots, class_="charts plots"))

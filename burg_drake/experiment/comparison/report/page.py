@@ -31,6 +31,7 @@ from burg_drake.experiment.comparison.wording import (
     headline,
     interval,
     number,
+    of_selected,
 )
 
 KINDS = {
@@ -139,14 +140,15 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
 
 def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
     text = "Share of right verdicts, precision and recall, with 95 % intervals."
+    of = of_selected(c)
     parts = [
-        group_section("By object", text, "object", judgement.objects),
-        group_section("By scene", text, "scene", judgement.scenes)
+        group_section(f"By object{of}", text, "object", judgement.objects),
+        group_section(f"By scene{of}", text, "scene", judgement.scenes)
         if len(judgement.scenes) > 1
         else None,
-        placement_section(judgement),
+        placement_section(judgement, of),
         margin_section(judgement),
-        stopped_section(judgement),
+        stopped_section(judgement, of),
         case_section(c, judgement, photos),
         outcome_section(c, judgement),
     ]

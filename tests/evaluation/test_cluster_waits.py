@@ -1,0 +1,174 @@
+"""Workers of Dask that come late, go, or do not answer; they are threads of this process."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from known_judge import KnownJudge, Make, expected
+
+from burg_drake.core.errors import ClusterError, InvalidInputError
+from burg_drake.core.outcome import Outcome
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executor import Job
+from burg_drake.evaluation.judge import judge_grasp
+from burg_drake.evaluation.limits import Limits
+from burg_drake.evaluation.station_judge import StationJudgeFactory
+from burg_drake.scene.scene import Scene
+from burg_drake.station.engine import ENGINES
+from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.station.station import Station
+
+distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+
+from burg_drake.evaluation.cluster.crew import threads_by_address  # noqa: E402
+from burg_drake.evaluation.cluster.dask_executor import DaskExecutor  # noqa: E402
+from burg_drake.evaluation.cluster.remote import Answers, Supervisor  # noqa: E402
+
+
+@contextlib.contextmanager
+def cluster(workers: int = 0) -> Iterator[tuple[Any, Any]]:
+    """A cluster and its client."""
+    with (
+        distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as made,
+        distributed.Client(made, set_as_default=False) as client,
+    ):
+        yield made, client
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looks often, and judges without children, unless a test wants them."""
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.1)
+    monkeypatch.setattr(Supervisor, "judge", judge_here)
+
+
+def judge_here(self: Supervisor, job: Job, limits: Limits) -> Answers:
+    judge = KnownJudge()
+    return Answers([(k, judge_grasp(judge, grasp)) for k, grasp in enumerate(job.candidates)])
+
+
+def grasps(n: int, scene: str = "cube") -> list[Candidate]:
+    return [Candidate(f"{scene}-{i:04d}", scene, np.eye(4)) for i in range(n)]
+
+
+def known(*jobs: Job) -> dict[str, Outcome]:
+    return {grasp.id: expected(grasp.id) for job in jobs for grasp in job.candidates}
+
+
+def found(answers: list[Any]) -> dict[str, Outcome]:
+    assert len({grasp.id for _, grasp, _ in answers}) == len(answers)
+    return {grasp.id: verdict.outcome for _, grasp, verdict in answers}
+
+
+def test_workers_that_come_when_there_is_work_are_waited_for() -> None:
+    """Of none, Dask starts one because something waits."""
+    job = Job("job", Make(KnownJudge()), grasps(20))
+    with cluster() as (made, client):
+        made.adapt(minimum=0, maximum=1, interval="50ms")
+        assert found(list(DaskExecutor(client).judge([job]))) == known(job)
+
+
+def test_without_work_nobody_is_waited_for() -> None:
+    with cluster() as (_, client):
+        assert list(DaskExecutor(client).judge([])) == []
+
+
+def test_workers_that_never_come_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.cluster.waiting.PATIENCE", 0.3)
+    job = Job("job", Make(KnownJudge()), grasps(3))
+    with cluster() as (_, client), pytest.raises(ClusterError, match="has had no worker for"):
+        list(DaskExecutor(client).judge([job]))
+
+
+def test_jobs_that_come_when_all_workers_are_lost_are_judged_later() -> None:
+    first, second = (Job(name, Make(KnownJudge()), grasps(3, name)) for name in ("a", "b"))
+    answers: list[Any] = []
+    lost = threading.Event()
+
+    def jobs() -> Iterator[Job | None]:
+        yield first
+        while not lost.is_set():
+            yield None
+        yield second
+
+    with cluster(1) as (made, client):
+        alone = 0
+
+        def tend() -> None:
+            nonlocal alone
+            alone += lost.is_set()
+            if alone == 2:  # one look has seen nobody
+                made.scale(1)
+
+        for answer in DaskExecutor(client, tend=tend).judge(jobs()):
+            answers.append(answer)
+            if len(answers) == 3:
+                made.scale(0)
+                client.sync(made._correct_state)
+                assert not threads_by_address(client)
+                lost.set()
+                time.sleep(0.2)  # so that a look comes before anything is handed out
+    assert found(answers) == known(first, second)
+
+
+def test_grasps_that_are_not_answered_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    job, silent = Job("job", Make(KnownJudge()), grasps(12)), "cube-0005"
+    asked: list[int] = []
+
+    def judge_some(self: Supervisor, job: Job, limits: Limits) -> Answers:
+        """Forgets the last one of several, and always a certain one."""
+        answers = judge_here(self, job, limits)
+        asked.append(len(job.candidates))
+        kept = answers.verdicts[:-1] if len(job.candidates) > 1 else answers.verdicts
+        return Answers([(k, v) for k, v in kept if job.candidates[k].id != silent])
+
+    monkeypatch.setattr(Supervisor, "judge", judge_some)
+    with cluster(1) as (_, client):
+        answers = list(DaskExecutor(client).judge([job]))
+    assert found(answers) == known(job) | {silent: Outcome.SIMULATION_FAILED}
+    verdict = next(v for _, g, v in answers if g.id == silent)
+    assert verdict.reason == "3 workers of the cluster gave no answer about it, one after the other"
+    assert verdict.interrupted
+    assert max(asked) > 1
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (None, "its files are not there afterwards"),
+        (RuntimeError("the disk\nis strange"), "RuntimeError: the disk is strange"),
+    ],
+)
+def test_a_scene_that_does_not_arrive_is_told_of(
+    error: Exception | None,
+    why: str,
+    scene: Scene,
+    station: Station,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    attempts = []
+
+    def unpack_nothing(data: bytes, place: Path, name: str) -> None:
+        attempts.append(name)
+        if len(attempts) > 5:
+            raise InvalidInputError("it would go on without end")
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr("burg_drake.evaluation.cluster.remote.unpack", unpack_nothing)
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
+    with cluster(1) as (_, client):
+        told = rf"^worker inproc://\S+ does not get the scene 'job': {why}$"
+        with pytest.raises(ClusterError, match=told):
+            list(DaskExecutor(client).judge([Job("job", factory, grasps(3))]))
+    assert len(attempts) == (1 if error else 3)
