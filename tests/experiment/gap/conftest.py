@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Generator, Iterable
 
 import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.executor import Job, OnFailure
+from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.run_store import Run
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
@@ -19,6 +23,21 @@ FROM_BELOW = grasp_from_axes((1, 0, 0), (0, math.sin(TILT), -math.cos(TILT)), (0
 """At its upper edge, from the side and below: the hand lifts it, but the arm would be in the
 table."""
 GRASPS = np.stack([ABOVE, FROM_BELOW, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
+
+
+class Here:
+    """An executor without processes, whose start costs more than these few trials."""
+
+    workers = 1
+
+    def judge(
+        self, jobs: Iterable[Job], on_failure: OnFailure | None = None
+    ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
+        """One after the other."""
+        for job in jobs:
+            judge = job.make_judge()
+            for candidate in job.candidates:
+                yield job, candidate, judge_grasp(judge, candidate)
 
 
 @pytest.fixture(scope="session")
@@ -31,6 +50,6 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         grasps={"box": GraspSet.create(GRASPS, object="box", width=0.06)},
         engine="screening",
         mode="hand",
-        workers=1,
+        executor=Here(),
         progress=False,
     )

@@ -17,7 +17,7 @@ from burg_drake.apps import gap as gap_verb
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.outcome import Outcome, RealOutcome, Stage
-from burg_drake.evaluation.executor import Job, LocalExecutor
+from burg_drake.evaluation.executor import Job
 from burg_drake.evaluation.judge import Verdict, judge_grasp
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_document import run_hash
@@ -35,9 +35,10 @@ from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, 
 from burg_drake.experiment.trials.sources import grasp_contents
 from burg_drake.scene.scene import Scene
 from burg_drake.station.engine import ENGINES
+from tests.experiment.gap.conftest import Here
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
-ASKED: dict[str, Any] = {"noise": NONE, "executor": LocalExecutor(1), "progress": False}
+ASKED: dict[str, Any] = {"noise": NONE, "executor": Here(), "progress": False}
 
 
 @pytest.fixture(scope="module")

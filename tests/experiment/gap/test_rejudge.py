@@ -19,7 +19,7 @@ from burg_drake.core.frames import Array
 from burg_drake.core.outcome import Outcome, RealOutcome
 from burg_drake.core.schema import Pose
 from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor, OnFailure
+from burg_drake.evaluation.executor import Job, JobFailed, OnFailure
 from burg_drake.evaluation.journal import decode
 from burg_drake.evaluation.rerun import differences
 from burg_drake.evaluation.run_store import Run
@@ -40,6 +40,7 @@ from burg_drake.experiment.trials.sheet import (
 from burg_drake.experiment.trials.sources import grasp_content
 from burg_drake.scene.scene import Scene
 from burg_drake.station.scene_check import SceneCheck
+from tests.experiment.gap.conftest import Here
 
 MISSED = {"no_contact", "collision_target", "collision_table", "closed_empty", "one_finger"}
 
@@ -112,7 +113,7 @@ def unseen() -> ObjectPlace:
 @pytest.fixture(scope="module")
 def found(run: Run, sheet: TrialSheet) -> Rejudging:
     out = run.path.parent / "again"
-    return rejudge(sheet, "trials.yaml", out, executor=LocalExecutor(1), progress=False)
+    return rejudge(sheet, "trials.yaml", out, executor=Here(), progress=False)
 
 
 def test_each_trial_is_judged_where_its_objects_stood(run: Run, found: Rejudging) -> None:

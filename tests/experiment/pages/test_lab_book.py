@@ -190,6 +190,23 @@ def test_a_photo_and_the_placement_are_kept_before_a_trial(
     assert load_trials(trials).trial(5).photo == trial.photo
 
 
+def test_a_check_that_fails_says_why(
+    over: LabCamera, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object) -> None:
+        raise cv2.error("no such matrix")
+
+    monkeypatch.setattr(Session, "check", broken)
+    over.watch(4)
+    assert over.next_picture(0, 0, 30.0) is not None
+    over.check(4, keep=True)
+    over.wait_for_check()
+    told = over.status()["check"]
+    assert (told["number"], told["kept"]) == (4, False)
+    assert told["problem"] == "the check failed: error: no such matrix"
+    assert "Traceback" in capsys.readouterr().err
+
+
 def test_an_outcome_that_comes_while_a_check_is_at_work(
     lab: LabBook, trials: Path, over: LabCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -220,18 +237,3 @@ def test_an_outcome_that_comes_while_a_check_is_at_work(
     assert over.status()["drawn"] == 6
     over.watch(7)
     assert over.status()["drawn"] == 0
-
-
-def test_a_check_that_fails_says_why(over: LabCamera, monkeypatch: pytest.MonkeyPatch) -> None:
-    over.watch(5)
-    assert over.next_picture(0, 0, 30.0) is not None
-
-    def broken(*_: object) -> None:
-        raise cv2.error("no such matrix")
-
-    monkeypatch.setattr(Session, "check", broken)
-    over.check(5, keep=True)
-    over.wait_for_check()
-    told = over.status()["check"]
-    assert (told["number"], told["kept"]) == (5, False)
-    assert told["problem"] == "the check failed: error: no such matrix"
