@@ -191,9 +191,9 @@ def require_safe(address: str, whose: str = "") -> None:
         return
     found = ADDRESS.fullmatch(address)
     if found is None:
+        what = "worker" if "worker" in whose else "scheduler"
         raise InvalidInputError(
-            f"{whose}{quoted(address)} is no address of a {'worker' if 'worker' in whose else 'scheduler'};"
-            " write tls://HOST:PORT"
+            f"{whose}{quoted(address)} is no address of a {what}; write tls://HOST:PORT"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
