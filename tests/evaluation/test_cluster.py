@@ -257,12 +257,11 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_scheduler_that_dies_is_said_in_one_line(
-    cluster: Cluster, scene: Scene, station: Station, monkeypatch: pytest.MonkeyPatch
+    cluster: Cluster, scene: Scene, station: Station
 ) -> None:
     nodes = cluster.nodes
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.5)
     answers = []
     lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
@@ -271,6 +270,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
                 answers.append(answer)
                 nodes.scheduler.kill()
                 nodes.scheduler.wait()
+        other.client.rpc.timeout = 0.2
         with pytest.raises(ClusterError, match=lost):
             deliver_bundle(other.client, SentJob(Job("job", factory, ())), ["tcp://127.0.0.1:9"])
     assert answers
@@ -280,12 +280,12 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """After the first look at the workers."""
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.5)
     nodes = LocalNodes(0)
     look = Crew.look
 
     def look_and_kill(self: Crew) -> list[Any]:
         lost = look(self)
+        self._client.rpc.timeout = 0.2
         nodes.scheduler.kill()
         nodes.scheduler.wait()
         return lost

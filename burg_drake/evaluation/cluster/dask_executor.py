@@ -46,7 +46,8 @@ class DaskExecutor:
         """
         from burg_drake.evaluation.cluster.crew import asking
 
-        require_safe(client.scheduler.address if client.scheduler is not None else "")
+        address = client.scheduler.address if client.scheduler is not None else ""
+        require_safe(address, "the scheduler at ")
         with asking(client):  # it may listen elsewhere, too, than where it was reached
             require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client

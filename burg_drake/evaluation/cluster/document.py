@@ -179,20 +179,21 @@ def require_safe(address: str, whose: str = "") -> None:
     """Refuses an address at which anybody could listen, or run code.
 
     Args:
-        address: where a scheduler or a worker listens; what is in this process is safe.
-        whose: put before the address in messages.
+        address: where a scheduler or a worker listens.
+        whose: put before the address in messages, of what is connected; that is safe in this
+            process, too, which nobody can ask for.
 
     Raises:
         InvalidInputError: it is no address.
         ClusterError: plain TCP beyond this machine.
     """
-    if address.startswith("inproc://"):
+    if whose and address.startswith("inproc://"):
         return
     found = ADDRESS.fullmatch(address)
     if found is None:
+        what = "worker" if "worker" in whose else "scheduler"
         raise InvalidInputError(
-            f"{whose}{quoted(address)} is no address of a scheduler or worker; write"
-            " tls://HOST:PORT"
+            f"{whose}{quoted(address)} is no address of a {what}; write tls://HOST:PORT"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
