@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -29,7 +30,7 @@ distributed = pytest.importorskip("distributed", reason="the cluster needs burg-
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
 from burg_drake.evaluation.cluster.crew import threads_by_address  # noqa: E402
-from burg_drake.evaluation.cluster.dask_executor import DaskExecutor  # noqa: E402
+from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
 from burg_drake.evaluation.cluster.remote import Answers, Supervisor  # noqa: E402
 
 
@@ -172,3 +173,14 @@ def test_a_scene_that_does_not_arrive_is_told_of(
         with pytest.raises(ClusterError, match=told):
             list(DaskExecutor(client).judge([Job("job", factory, grasps(3))]))
     assert len(attempts) == (1 if error else 3)
+
+
+def test_who_listens_and_stays_silent_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with (
+            pytest.raises(ClusterError, match="does not answer as a scheduler"),
+            connect_cluster(address),
+        ):
+            pass

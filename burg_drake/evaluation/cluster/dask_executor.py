@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import queue
+import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
@@ -17,6 +19,8 @@ from burg_drake.evaluation.limits import Limits
 
 REACH = 5.0
 """Time in which a scheduler has to be reached [s]."""
+HANDSHAKES = 3
+"""So many times longer a connection may take whose steps all keep to that time."""
 
 
 class DaskExecutor:
@@ -121,13 +125,30 @@ def connect_cluster(cluster: str, limits: Limits | None = None) -> Iterator[Dask
 
 
 def _client(distributed: Any, where: Any, security: Any) -> Any:
+    """A client of the scheduler. Dask's own time-out does not cover what a listener that stays
+    silent never answers, hence a thread that is left behind then."""
+    made: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def make() -> None:
+        options = {"timeout": REACH, "security": security, "set_as_default": False}
+        try:
+            made.put(distributed.Client(where, **options))
+        except BaseException as error:
+            made.put(error)
+
+    threading.Thread(target=make, name="client", daemon=True).start()
     try:
-        return distributed.Client(where, timeout=REACH, security=security, set_as_default=False)
-    except (OSError, TimeoutError, ValueError, RuntimeError, TypeError) as error:
+        found = made.get(timeout=HANDSHAKES * REACH)
+    except queue.Empty:
+        found = TimeoutError("no answer")
+    if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
             f"no scheduler of Dask is reached at {where} within {REACH:.0f} s:"
-            f" {why_unreached(where, error)}"
-        ) from error
+            f" {why_unreached(where, found)}"
+        ) from found
+    if isinstance(found, BaseException):
+        raise found
+    return found
 
 
 def _leave(client: Any) -> None:
