@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # them.
 SUCCESSES = ("lifted", "held")
 DEFAULT_LIMIT_MM = 2.0
+TRIALS = (".yaml", ".yml")
+"""Suffixes of trials files."""
 
 
 def add_to(verbs: Any) -> None:
@@ -82,7 +84,7 @@ def run_compare(arguments: argparse.Namespace) -> int:
     from burg_drake.core.files import atomic_write, require_writable
     from burg_drake.experiment.comparison.comparison import compare
 
-    second, trials = _others(arguments.others)
+    second, trials = _others(arguments.run_folder, arguments.others)
     if arguments.html is not None:
         require_writable(arguments.html)
     found = compare(
@@ -139,13 +141,15 @@ def _print(found: Comparison, again: Rejudging | None, arguments: argparse.Names
         print(f"page    {arguments.html}")
 
 
-def _others(paths: list[str]) -> tuple[str, str | None]:
+def _others(first: str, paths: list[str]) -> tuple[str, str | None]:
     """What the run is compared with, and the trials if that is another run."""
     if len(paths) > 2:
         raise InvalidInputError(
             f"{len(paths) + 1} things to compare; give RUN TRIALS, RUN RUN, or RUN RUN TRIALS"
         )
-    kinds = [Path(path).suffix in (".yaml", ".yml") for path in paths]
+    if Path(first).suffix in TRIALS and Path(first).is_file():
+        raise InvalidInputError(f"{shown(first)} is no run; give the run first, then the trials")
+    kinds = [Path(path).suffix in TRIALS for path in paths]
     if kinds == [True, False]:
         raise InvalidInputError(
             f"{shown(paths[0])} is before {shown(paths[1])}; give the trials file last"

@@ -28,6 +28,7 @@ from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
 from burg_drake.experiment.comparison.table import Table
 from burg_drake.experiment.comparison.texts import Factor, Ids, text_keys
+from burg_drake.experiment.comparison.wording import headline
 from burg_drake.experiment.trials.plan import plan_trials
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
@@ -338,7 +339,19 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     for wrong in ([str(sheet), str(first.path)], [str(first.path)] * 3, ["gone"]):
         assert main(["compare", str(first.path), *wrong]) == 2
         assert capsys.readouterr().err.startswith("burg-drake: error: ")
+    assert main(["compare", str(sheet), str(first.path)]) == 2
+    assert "is no run; give the run first" in capsys.readouterr().err
     assert OFFERED == SUCCESSES and DEFAULT_LIMIT_MM == LIMIT_MM
+
+
+def test_the_headline_where_nothing_succeeded(tmp_path: Path) -> None:
+    scene = known_runs.make_scene(tmp_path)
+    run = known_runs.make_run(tmp_path / "run", scene, {"mug": [known_runs.ended("slipped")]})
+    sheet = burg.plan_trials(run, out=tmp_path / "trials.yaml")
+    burg.TrialBook(tmp_path / "trials.yaml").record(sheet.trials[0].number, outcome="slipped")
+    told = headline(compare(run, tmp_path / "trials.yaml"))
+    assert told.startswith("In 1 trial on the robot") and "undefined" not in told
+    assert told.endswith("it predicted no success, none came about.")
 
 
 def test_json_has_the_same_keys_whatever_is_undefined(tmp_path: Path) -> None:

@@ -64,7 +64,8 @@ def headline(comparison: Comparison) -> str:
             f" {brief(found.predicted)} by the first ({c.first.label}) and in"
             f" {brief(found.actual)} by the second ({c.reference.label})."
         )
-    trials = f"In {found.trials} trials on the robot"
+    plural = "" if found.trials == 1 else "s"
+    trials = f"In {found.trials:,} trial{plural} on the robot"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
         p = "" if c.difference.p_value is None else f" (McNemar p = {figure(c.difference.p_value)})"
@@ -72,11 +73,14 @@ def headline(comparison: Comparison) -> str:
             f"{trials} {first} was right in {brief(found.accuracy)}, {second} in"
             f" {brief(c.other.selected.accuracy)}; {difference_words(c)}{p}."
         )
-    return (
-        f"{trials} the simulator's verdict was right in {brief(found.accuracy)}; of the successes"
-        f" that it predicted {brief(found.precision)} came true, of those that came about it had"
-        f" predicted {brief(found.recall)}."
-    )
+    true = f"of the successes that it predicted {brief(found.precision)} came true"
+    foreseen = f"of those that came about it had predicted {brief(found.recall)}"
+    if found.precision.value is None:
+        true = "it predicted no success"
+    if found.recall.value is None:
+        foreseen = "none came about"
+    right = f"{trials} the simulator's verdict was right in {brief(found.accuracy)}"
+    return f"{right}; {true}, {foreseen}."
 
 
 def difference_words(comparison: Comparison) -> str:

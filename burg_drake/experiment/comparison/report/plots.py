@@ -26,7 +26,9 @@ def reliability_plot(found: Calibration, vertical: str) -> Html:
     """
     title, unit, size = margin_title(found.name)
     ends = [size * found.bins[0].low, size * found.bins[-1].high]
-    step = nice_step(max(ends[1] - ends[0], 1e-12) / 5)
+    size_of_all = max(abs(end) for end in ends)
+    spread = ends[1] - ends[0]
+    step = nice_step((spread if spread > 1e-6 * size_of_all else size_of_all or 1.0) / 5)
     low, high = math.floor(ends[0] / step + 1e-9), math.ceil(ends[1] / step - 1e-9)
     low, high = (low, high) if low < high else (low - 1, high + 1)
 

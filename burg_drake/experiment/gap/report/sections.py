@@ -42,7 +42,8 @@ def flow_section(ladder: Ladder, found: Sequence[Change]) -> Html | None:
     columns, scale = [], []
     for step in ladder.steps:
         outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
-        scenes = f" in {len(step.runs)} scenes" if step.name == "placed" else ""
+        plural = "" if len(step.runs) == 1 else "s"
+        scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
         columns.append(Column(TITLES[step.name] + scenes, outcomes))
         scale.append(1.0 / max(len(step.runs), 1))
     return section(
