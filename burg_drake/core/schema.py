@@ -135,6 +135,10 @@ def dump_document(document: Any) -> str:
     )
 
 
+BREAKS = frozenset("\x85\u2028\u2029")
+"""Line breaks of YAML that are read as spaces, or not at all, unless they are escaped."""
+
+
 class _Dumper(yaml.SafeDumper):
     """Block style for structure, flow style for short lists of numbers, indented lists."""
 
@@ -144,6 +148,10 @@ class _Dumper(yaml.SafeDumper):
     def represent_sequence(self, tag: str, sequence: Any, flow_style: Any = None) -> Any:
         scalar = all(isinstance(item, (int, float, str)) for item in sequence)
         return super().represent_sequence(tag, sequence, flow_style=scalar)
+
+    def represent_scalar(self, tag: str, value: Any, style: str | None = None) -> Any:
+        breaks = isinstance(value, str) and not BREAKS.isdisjoint(value)
+        return super().represent_scalar(tag, value, '"' if breaks else style)
 
 
 def plain_data(value: Any) -> Any:

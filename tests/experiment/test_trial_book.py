@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
@@ -173,6 +173,8 @@ TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0
 PLAIN = st.text("abc: #'\"-{}[]&*!|>%@`,?\n\t~äß€ 7", max_size=60)
 
 
+@example(note="\x85", second="", comment="", blank=0, newline="\n", first="number")
+@example(note="a\u2028b\u2029", second="", comment="", blank=0, newline="\n", first="number")
 @settings(max_examples=25, deadline=None)
 @given(
     note=TEXTS | PLAIN,
