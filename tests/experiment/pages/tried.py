@@ -22,6 +22,7 @@ from burg_drake.experiment.trials.sheet import (
 from burg_drake.experiment.trials.sources import grasp_content, source_of
 from burg_drake.scene.scene import load_scene
 from burg_drake.station.station import load_station
+from tests.evaluation.inline_executor import Inline
 from tests.evaluation.known_judge import install
 
 SCENES = {
@@ -68,9 +69,8 @@ def make_runs(folder: Path, patch: pytest.MonkeyPatch) -> list[Run]:
         (folder / f"{name}.yaml").write_text(text)
         scene, station = load_scene(folder / f"{name}.yaml"), load_station("panda_tabletop")
         place = folder / f"run_{name}"
-        runs.append(
-            evaluate(scene, station, place, grasps=given[name], mode="hand", progress=False)
-        )
+        options = {"grasps": given[name], "executor": Inline(), "mode": "hand", "progress": False}
+        runs.append(evaluate(scene, station, place, **options))
     return runs
 
 
