@@ -10,6 +10,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -114,7 +115,8 @@ class CrashingJudge(KnownJudge):
             case "segfault":
                 os.kill(os.getpid(), signal.SIGSEGV)
             case "killed":
-                subprocess.run(["kill", "-KILL", str(os.getpid())], check=False)
+                other = f"import os; os.kill({os.getpid()}, {signal.SIGKILL:d})"
+                subprocess.run([sys.executable, "-c", other], check=False)
                 time.sleep(3600.0)
             case "exit":
                 raise SystemExit("a condition of Drake failed")
