@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import burg_drake as burg
-from burg_drake.evaluation.run_store import load_run
+from burg_drake.evaluation.store.run_folder import load_run
 
 README = Path(__file__).parents[1] / "README.md"
 NOT_RUN = "<!-- not run by tests: needs files of yours -->"
