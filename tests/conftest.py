@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import hashlib
 import os
 import shutil
 import signal
@@ -48,6 +49,35 @@ def _announce_tools(folder: Path) -> None:
 _announce_tools(Path(__file__).resolve().parents[1] / "tools")
 
 
+PHYSICS = (
+    *("apps", "cameras", "compose", "evaluation", "export", "fuzzing", "motion", "pipeline"),
+    *("simulation", "station", "ui", "visualization", "test_packaging.py", "test_readme.py"),
+)
+"""Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
+WITHOUT_PHYSICS = "not physics"
+
+
+def _is_physics(path: Path) -> bool:
+    tests = Path(__file__).parent
+    return tests in path.parents and path.relative_to(tests).parts[0] in PHYSICS
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "physics: Drake, renderers, programs; see PHYSICS")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """What is not going to run is not imported either."""
+    left_out = config.option.markexpr == WITHOUT_PHYSICS and _is_physics(collection_path)
+    return True if left_out else None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if _is_physics(item.path):
+            item.add_marker(pytest.mark.physics)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, Any, Any]:
     """Collecting makes millions of objects, nearly all of which stay: looking through them again
@@ -59,6 +89,33 @@ def pytest_collection() -> Generator[None, Any, Any]:
         gc.collect()
         gc.freeze()
         gc.enable()
+
+
+@pytest.fixture(scope="session")
+def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """How far pieces are from the mesh that they stand for is most of the work of building an
+    object, and tests build the same few ones: all workers of a run share what was measured."""
+    from burg_drake.objects.collision import fit
+
+    folder = tmp_path_factory.getbasetemp()
+    known = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "distances"
+    known.mkdir(exist_ok=True)
+    measure = fit._farthest
+
+    def farthest(points: Any, surface: Any) -> float:
+        digest = hashlib.blake2b(digest_size=16)
+        for array in (points, surface.vertices, surface.faces):
+            digest.update(repr((array.shape, array.dtype)).encode() + array.tobytes())
+        path = known / digest.hexdigest()
+        if not path.exists():
+            made = path.with_name(f"{path.name}.{os.getpid()}")
+            made.write_text(repr(measure(points, surface)))
+            made.replace(path)
+        return float(path.read_text())
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "_farthest", farthest)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -74,8 +131,8 @@ def judged_here() -> Iterator[None]:
 
 def _pool_or_this_process(pool: type) -> Any:
     from burg_drake.core import BurgError
-    from burg_drake.evaluation.workers import JobFailed
     from burg_drake.evaluation.stages.judge import ScreenAnswers, judge_grasp, screen_grasps
+    from burg_drake.evaluation.workers import JobFailed
 
     class ThisProcess:
         """Judges the grasps of one job after the other, in their order, without limits of time."""
