@@ -49,17 +49,22 @@ def _announce_tools(folder: Path) -> None:
 _announce_tools(Path(__file__).resolve().parents[1] / "tools")
 
 
-PHYSICS = (
-    *("apps", "cameras", "compose", "evaluation", "export", "fuzzing", "motion", "pipeline"),
-    *("simulation", "station", "ui", "visualization", "test_packaging.py", "test_readme.py"),
+PHYSICS = tuple(
+    Path(__file__).parent / name
+    for name in (
+        *("apps", "cameras", "compose", "evaluation", "experiment/gap", "experiment/pages"),
+        *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
+        *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
+        *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),
+        *("visualization", "test_packaging.py", "test_readme.py"),
+    )
 )
 """Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
 WITHOUT_PHYSICS = "not physics"
 
 
 def _is_physics(path: Path) -> bool:
-    tests = Path(__file__).parent
-    return tests in path.parents and path.relative_to(tests).parts[0] in PHYSICS
+    return any(path == physics or physics in path.parents for physics in PHYSICS)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -30,8 +30,6 @@ from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Station, load_station
 
-pytestmark = pytest.mark.usefixtures("judged_here")
-
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 BELOW = grasp_from_axes((1, 0, 0), (0, 0, 1), (0.0, 0.0, 0.03))
