@@ -21,15 +21,15 @@ from mixed_grasps import SLIPPERY, sampled_set
 
 import burg_drake as burg
 from burg_drake.core.frames import Array
-from burg_drake.motion.plan import Planner
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.trajectory import Plan
-from burg_drake.scene.scene import Scene
-from burg_drake.simulation.arm_trial import ArmTrial
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import Engine, engine_preset
-from burg_drake.station.station import Station
+from burg_drake.motion.planner import Planner
+from burg_drake.motion.plans.trajectory import Plan
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.arm_trial import ArmTrial
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import Engine, engine_preset
+from burg_drake.station.document.station_document import Station
 
 SAMPLED = 400
 """Grasps that are sampled for each one that is wanted: few are clear in a bin or on a shelf."""

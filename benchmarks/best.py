@@ -33,15 +33,15 @@ from scipy.stats import rankdata
 import burg_drake as burg
 from burg_drake.apps.cli import main as burg_drake
 from burg_drake.core.frames import Array
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.candidates import INSTANCE
-from burg_drake.evaluation.rows import best_rows
-from burg_drake.evaluation.sampled_set import sample_grasps
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.evaluation.scored_set import scored_set
-from burg_drake.grasping.quality import METRICS
-from burg_drake.simulation.perturbation import success_rate
-from burg_drake.station.engine import engine_preset
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.candidates import INSTANCE
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
+from burg_drake.evaluation.grasp_sets.scored import scored_set
+from burg_drake.evaluation.records.rows import best_rows
+from burg_drake.grasping.quality.metrics import METRICS
+from burg_drake.simulation.robustness.perturbation import success_rate
+from burg_drake.station.document.engine import engine_preset
 
 REPEATS, PICKED = 20, 5
 SMALLER_IS_BETTER = (

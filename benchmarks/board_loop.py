@@ -14,7 +14,7 @@ import os
 import time
 from dataclasses import replace
 
-from burg_drake.core.processes import ONE_THREAD
+from burg_drake.core.workers.processes import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
 
@@ -23,10 +23,10 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 import burg_drake as burg
-from burg_drake.cameras.board_loop import BoardLoop, build_board_loop
+from burg_drake.cameras.systems.board_loop import BoardLoop, build_board_loop
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle
-from burg_drake.core.schema import Pose
-from burg_drake.station.station import Camera
+from burg_drake.station.document.station_document import Camera
 
 CAMERAS = {
     "640x480": Camera(X_WC=Pose(), width=640, height=480, focal=(600.0, 600.0)),

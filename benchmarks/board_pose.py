@@ -2,7 +2,7 @@
 
     python benchmarks/board_pose.py [--views N] [--sweep N] [--seed S]
 
-Images of `burg_drake.cameras.synthetic` with exact truth: random views of the default board from
+Images of `tests.cameras.synthetic` with exact truth: random views of the default board from
 0.5 to 1 m, up to 50 degrees off the vertical, turned at random. First as the targets have it:
 clean, with 55 % of the markers hidden, and with 90 % (both with noise of 4 of 256 levels and a blur
 of 0.6 pixels), at 640 x 480 and 1280 x 720. Then a sweep of what else spoils images, at 640 x 480.
@@ -30,12 +30,12 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.board_pose import BoardPose
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import Look, board_image, covers_of, spoiled
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.pose.estimator import BoardPose
 from burg_drake.core.frames import Array, inverse
-from burg_drake.scene.markers import MarkerLayout, Markers, marker_dictionary
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
+from burg_drake.scene.document.scene import Board
+from tests.cameras.synthetic import ImageDegradation, board_image, covers_of, degraded
 
 SMALL = Intrinsics(width=640, height=480, focal=(615.0, 615.0), center=(319.5, 239.5))
 LARGE = Intrinsics(width=1280, height=720, focal=(920.0, 920.0), center=(639.5, 359.5))
@@ -46,7 +46,7 @@ LENS = Intrinsics(
     center=(323.0, 236.0),
     distortion=(0.12, -0.25, 0.001, -0.0015, 0.1),
 )
-REAL = Look(noise=4.0, blur=0.6)
+REAL = ImageDegradation(noise=4.0, blur=0.6)
 OURS = Board()
 PEERS = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019))
 
@@ -69,31 +69,34 @@ class Condition:
     intrinsics: Intrinsics = SMALL
     hidden: float = 0.0
     partial: bool = False
-    look: Look = REAL
+    look: ImageDegradation = REAL
     tilt: tuple[float, float] = (0.0, 50.0)
     target: tuple[float, float] | None = None
 
 
 TARGETS = (
-    Condition(name="clean 640", look=Look(), target=(0.2, 0.02)),
+    Condition(name="clean 640", look=ImageDegradation(), target=(0.2, 0.02)),
     Condition(name="55 % hidden 640", hidden=0.55, target=(0.5, 0.04)),
     Condition(name="90 % hidden 640", hidden=0.9, target=(2.0, 0.15)),
-    Condition(name="clean 1280", intrinsics=LARGE, look=Look(), target=(0.05, 0.005)),
+    Condition(name="clean 1280", intrinsics=LARGE, look=ImageDegradation(), target=(0.05, 0.005)),
     Condition(name="55 % hidden 1280", intrinsics=LARGE, hidden=0.55, target=(0.5, 0.04)),
     Condition(name="90 % hidden 1280", intrinsics=LARGE, hidden=0.9, target=(2.0, 0.15)),
 )
 SWEEP = (
     Condition(name="55 % partly hidden", hidden=0.55, partial=True),
     Condition(name="90 % partly hidden", hidden=0.9, partial=True),
-    Condition(name="blur 1.5 px", look=Look(noise=4.0, blur=1.5)),
-    Condition(name="blur 2.5 px", look=Look(noise=4.0, blur=2.5)),
-    Condition(name="noise 10", look=Look(noise=10.0, blur=0.6)),
-    Condition(name="noise 20", look=Look(noise=20.0, blur=0.6)),
+    Condition(name="blur 1.5 px", look=ImageDegradation(noise=4.0, blur=1.5)),
+    Condition(name="blur 2.5 px", look=ImageDegradation(noise=4.0, blur=2.5)),
+    Condition(name="noise 10", look=ImageDegradation(noise=10.0, blur=0.6)),
+    Condition(name="noise 20", look=ImageDegradation(noise=20.0, blur=0.6)),
     Condition(name="tilt 50 to 60 deg", tilt=(50.0, 60.0)),
     Condition(name="tilt 60 to 70 deg", tilt=(60.0, 70.0)),
-    Condition(name="a third of the light", look=Look(noise=4.0, blur=0.6, gain=0.33)),
-    Condition(name="overexposed by 30 %", look=Look(noise=4.0, blur=0.6, gain=1.3)),
-    Condition(name="light from one side", look=Look(noise=4.0, blur=0.6, gain=0.7, gradient=1.0)),
+    Condition(name="a third of the light", look=ImageDegradation(noise=4.0, blur=0.6, gain=0.33)),
+    Condition(name="overexposed by 30 %", look=ImageDegradation(noise=4.0, blur=0.6, gain=1.3)),
+    Condition(
+        name="light from one side",
+        look=ImageDegradation(noise=4.0, blur=0.6, gain=0.7, gradient=1.0),
+    ),
     Condition(name="lens distortion", intrinsics=LENS),
 )
 
@@ -194,7 +197,7 @@ def measure(condition: Condition, board: Board, views: int, seed: int, peer: boo
         truth, clean = seen(
             board, intrinsics, condition.tilt, condition.hidden, condition.partial, seed, k
         )
-        image = spoiled(clean, condition.look, np.random.default_rng([seed, k, 1]))
+        image = degraded(clean, condition.look, np.random.default_rng([seed, k, 1]))
         p_S = layout.p_SQ.mean(axis=1)
         if peer:
             X_SC = theirs.estimate(image)

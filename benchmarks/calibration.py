@@ -18,13 +18,13 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from burg_drake.cameras.calibration import Calibration, calibrate_views
-from burg_drake.cameras.charuco import CharucoTarget, CharucoView, find_target
-from burg_drake.cameras.charuco_image import target_image
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.lens_uncertainty import image_grid, uncertainty
+from burg_drake.cameras.calibration.estimation import Calibration, calibrate_views
+from burg_drake.cameras.calibration.lens_uncertainty import image_grid, uncertainty
+from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, find_target
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
+from tests.cameras.charuco_image import target_image
 
 CAMERAS = {
     "640x480": Intrinsics(

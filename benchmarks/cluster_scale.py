@@ -29,17 +29,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "evaluation"))
 from known_judge import KnownJudge, Make
 
-from burg_drake.core.processes import start_worker
-from burg_drake.evaluation.candidates import Candidate
+from burg_drake.core.workers.processes import start_worker
+from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cluster import remote
+from burg_drake.evaluation.cluster.bundles.judge_recipe import JudgeRecipe
 from burg_drake.evaluation.cluster.dask_executor import connect_cluster
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes
 from burg_drake.evaluation.cluster.node import LOOPBACK, NO_WEB
-from burg_drake.evaluation.cluster.recipe import Recipe
 from burg_drake.evaluation.cluster.sent_job import MOST
-from burg_drake.evaluation.executor import Job
-from burg_drake.evaluation.judge import judge_grasp
-from burg_drake.evaluation.limits import Limits
+from burg_drake.evaluation.stages.judge import judge_grasp
+from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers.limits import WorkerLimits
 
 IDLE = 10.0
 """For so long the scheduler is watched with nothing to do [s]."""
@@ -134,9 +134,11 @@ def sizes() -> None:
     """Prints bytes a grasp, as Dask pickles them."""
     rng = np.random.default_rng(0)
     grasps = tuple(Candidate(f"cube-{k:06d}", "cube", rng.random((4, 4))) for k in range(MOST))
-    recipe = Recipe(pickle.dumps(Make(KnownJudge())))
-    empty = len(pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, (), Limits())))
-    there = len(pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, grasps, Limits())))
+    recipe = JudgeRecipe(pickle.dumps(Make(KnownJudge())))
+    empty = len(pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, (), WorkerLimits())))
+    there = len(
+        pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, grasps, WorkerLimits()))
+    )
     back = len(pickle.dumps(remote.Answers(answers(grasps))))
     print(
         f"a chunk of {MOST} grasps: {there} bytes there ({empty} without grasps), {back} bytes"
@@ -169,7 +171,7 @@ def main_of_sleepers(handle: int) -> None:
     connection = Connection(handle)
     scheduler, count = connection.recv()
 
-    def judge(self: Any, job: Job, limits: Limits) -> remote.Answers:
+    def judge(self: Any, job: Job, limits: WorkerLimits) -> remote.Answers:
         global _judged
         _judged += 1
         seconds: float = pickle.loads(job.make_judge.make_judge).judge.pause  # type: ignore[attr-defined]

@@ -29,19 +29,19 @@ import numpy as np
 
 from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
-from burg_drake.experiment.comparison import ordered
-from burg_drake.experiment.comparison.agreement import _all_measures, agreement
-from burg_drake.experiment.comparison.calibration import MARGINS
 from burg_drake.experiment.comparison.comparison import compare
-from burg_drake.experiment.comparison.judgement import judgement
-from burg_drake.experiment.comparison.matching import match_rows
-from burg_drake.experiment.comparison.measures import MEASURES
+from burg_drake.experiment.comparison.judge_assessment import judgement
 from burg_drake.experiment.comparison.of_runs import pairs_of_runs
-from burg_drake.experiment.comparison.ordered import Ordered
-from burg_drake.experiment.comparison.pairs import NAMES, REFERENCE_NAMES
-from burg_drake.experiment.comparison.ranking import ranking
-from burg_drake.experiment.comparison.resampling import bounds
-from burg_drake.experiment.comparison.table import Table
+from burg_drake.experiment.pairing.matching import match_rows
+from burg_drake.experiment.pairing.pairs import NAMES, REFERENCE_NAMES
+from burg_drake.experiment.pairing.result_table import ResultTable
+from burg_drake.experiment.statistics import ordered
+from burg_drake.experiment.statistics.confusion import _all_measures, agreement
+from burg_drake.experiment.statistics.estimates import MEASURES
+from burg_drake.experiment.statistics.margin_calibration import MARGINS
+from burg_drake.experiment.statistics.ordered import Ordered
+from burg_drake.experiment.statistics.rank_statistics import ranking
+from burg_drake.experiment.statistics.resampling import bounds
 
 FIGURES = ("precision", "recall", "specificity", "f1", "accuracy", "matthews", "kappa", "actual")
 
@@ -173,8 +173,8 @@ def speed(arguments: argparse.Namespace) -> None:
     """Prints wall times."""
     columns = _made_up(arguments.rows, 0)
     outcomes = np.random.default_rng(5).permutation(columns["outcome"])
-    first = Table.of_columns(columns, NAMES)
-    tables = first, Table.of_columns(columns | {"outcome": outcomes}, REFERENCE_NAMES)
+    first = ResultTable.of_columns(columns, NAMES)
+    tables = first, ResultTable.of_columns(columns | {"outcome": outcomes}, REFERENCE_NAMES)
     with _timed(f"{arguments.rows} rows in memory"):
         with _timed("  matching"):
             found = match_rows(*tables)

@@ -21,10 +21,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, RealOutcome
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,

@@ -18,7 +18,7 @@ import numpy as np
 
 from burg_drake import load_station
 from burg_drake.compose import AddObject, ComposeSession, SetBoard, Turn, board_size
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.scene import Board
 
 
 def main() -> None:

@@ -24,18 +24,18 @@ import numpy as np
 
 import burg_drake as burg
 from burg_drake.core.content import rng_from
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.objects.contact import contact_geometry
-from burg_drake.objects.entry import ContactGeometry
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.objects.obj_file import write_piece
-from burg_drake.objects.sdf import DEFAULT_CONTACT, model_sdf
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import ENGINES
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.objects.collision.contact import contact_geometry
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.objects.library.entry import ContactGeometry
+from burg_drake.objects.library.obj_file import write_piece
+from burg_drake.objects.library.sdf import DEFAULT_CONTACT, model_sdf
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import ENGINES
 
 OBJECTS = ("box", "can", "marble", "mug", "bowl", "banana", "bottle", "screwdriver")
 KINDS = ("truth", "pieces", "compliant_pieces", "mesh", "primitive", "tets")

@@ -29,16 +29,16 @@ from convergence_plot import Panel, plot
 from scipy.optimize import brentq
 
 import burg_drake as burg
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, grasp_from_axes
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import ContactKind
+from burg_drake.core.paths.resources import resolve
+from burg_drake.objects.library.entry import ContactKind
 from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument, save_scene
-from burg_drake.simulation.trial_settings import TrialSettings
-from burg_drake.station.engine import ENGINES, Engine
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import Station, StationDocument, Table
+from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument, save_scene
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.station.document.engine import ENGINES, Engine
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import Station, StationDocument, Table
 
 FORCE, GRAVITY = 40.0, 9.81
 PAD = (0.0175, 0.0152, 0.0185)

@@ -23,11 +23,11 @@ from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.antipodal import sample_antipodal
-from burg_drake.grasping.coverage import coverage, nearest_grasps
-from burg_drake.grasping.diversity import farthest_points, neighbour_distances
-from burg_drake.grasping.similarity import LEVER
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.comparison.matching import coverage, nearest_grasps
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.similarity.diversity import farthest_points, neighbour_distances
+from burg_drake.grasping.similarity.pose_distance import LEVER
 
 PEER_SECONDS = 3.9
 """For 100,000 by 500; for other numbers in proportion to the pairs."""

@@ -27,13 +27,13 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.outcome import Stage
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance, Scene
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import engine_preset
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Stage
+from burg_drake.scene.document.scene import Instance, Scene
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.station_document import Station
 
 SCENES = ("tabletop_six", "tabletop_close")
 NEXT_BOARD = 0.44

@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
 from burg_drake.core.content import rng_from
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose, transform_points
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.engine import ENGINES, Engine
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.station.document.engine import ENGINES, Engine
 
 STATION = "panda_tabletop"
 POSES = 3

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from engine_cases import NOISE, PROBES, Case
 
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
-from burg_drake.station.engine import Engine
+from burg_drake.station.document.engine import Engine
 
 TUNED = ("household/box", "household/can", "household/bottle", "household/mug", "household/bowl")
 """Objects, or such as these, with which the presets were chosen."""

@@ -49,7 +49,7 @@ from engine_report import print_report
 import burg_drake as burg
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.station.engine import ENGINES, Engine
+from burg_drake.station.document.engine import ENGINES, Engine
 
 LIBRARY = "household"
 CHUNK = 8

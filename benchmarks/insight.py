@@ -21,16 +21,16 @@ from typing import Any
 import numpy as np
 
 import burg_drake as burg
-from burg_drake.cameras.board_picture import board_picture
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import board_image
-from burg_drake.cameras.visibility import visible_from
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.projection.visibility import visible_from
+from burg_drake.cameras.rectification.top_view import board_picture
 from burg_drake.core.frames import make_pose
-from burg_drake.evaluation.grasp_counts import count_grasps
-from burg_drake.evaluation.scene_acceptance import clear_grasp_counts, within_reach
-from burg_drake.motion.reach_layer import reach_from_above, reach_without_objects
-from burg_drake.scene.scene import Board, Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.stages.counts import count_grasps
+from burg_drake.evaluation.stages.scene_acceptance import clear_grasp_counts, within_reach
+from burg_drake.motion.workspace.reach_layer import reach_from_above, reach_without_objects
+from burg_drake.scene.document.scene import Board, Scene
+from burg_drake.station.document.station_document import Station
+from tests.cameras.synthetic import board_image
 
 SHEETS = {"A3": (0.420, 0.297), "A2": (0.594, 0.420), "A0": (1.189, 0.841)}
 STEP = 0.002

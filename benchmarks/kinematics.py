@@ -16,11 +16,11 @@ import time
 import numpy as np
 
 from burg_drake.core.frames import Array
-from burg_drake.motion.ik import solve_ik
-from burg_drake.motion.panda_ik import PandaIk, panda_forward
-from burg_drake.motion.reach import ArmReach
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.motion.ik.numeric import solve_ik
+from burg_drake.motion.ik.panda import PandaIk, panda_forward
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 TARGET = 1.0
 """Of a pair of pose and joint value [microseconds]."""

@@ -22,7 +22,7 @@ import numpy as np
 import trimesh
 
 import burg_drake as burg
-from burg_drake.core.processes import ONE_THREAD
+from burg_drake.core.workers.processes import ONE_THREAD
 from burg_drake.pipeline.build import BuildReport
 from burg_drake.pipeline.source import ObjectSource
 

@@ -21,23 +21,23 @@ from typing import TypeVar
 
 import numpy as np
 
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.campaign import Campaign, load_campaign, save_campaign
-from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.journal import encode
-from burg_drake.evaluation.judge import MARGINS, Verdict
-from burg_drake.evaluation.ledger import Ledger, SceneState
-from burg_drake.evaluation.many_scenes import _document
-from burg_drake.evaluation.part_writer import PartWriter
-from burg_drake.evaluation.request import Request
-from burg_drake.evaluation.run_document import run_hash
-from burg_drake.evaluation.run_store import JOURNAL_FILE, create_run
-from burg_drake.evaluation.scene_entries import read_scenes
-from burg_drake.evaluation.shard import Shard
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records.journal import encode
+from burg_drake.evaluation.records.ledger import Ledger, SceneState
+from burg_drake.evaluation.records.run_document import run_hash
+from burg_drake.evaluation.records.shard import Shard
+from burg_drake.evaluation.run.many_scenes import _document
+from burg_drake.evaluation.run.request import Request
+from burg_drake.evaluation.run.scene_list import read_scenes
+from burg_drake.evaluation.stages.judge import MARGINS, Verdict
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign, save_campaign
+from burg_drake.evaluation.store.part_writer import PartWriter
+from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, create_run
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
 
 T = TypeVar("T")
 OUTCOMES = (Outcome.LIFTED, Outcome.SLIPPED, Outcome.COLLISION_TABLE, Outcome.LIFT_LINE)
@@ -153,8 +153,8 @@ def timed(what: str, work: Callable[[], T]) -> T:
 
 def ask(folder: Path) -> None:
     """What a fresh process is asked for."""
-    from burg_drake.evaluation.results import read_results
-    from burg_drake.evaluation.summary import summarize
+    from burg_drake.evaluation.results.summary import summarize
+    from burg_drake.evaluation.store.loading import read_results
 
     campaign = timed("open", lambda: load_campaign(folder))
     summary = timed("summarise", lambda: summarize(campaign))
@@ -189,7 +189,7 @@ def main() -> None:
     subprocess.run(command, check=True)
     if not arguments.merge:
         return
-    from burg_drake.evaluation.merge import merge_runs
+    from burg_drake.evaluation.merge.runs import merge_runs
 
     merged = arguments.output / "merged"
     shutil.rmtree(merged, ignore_errors=True)

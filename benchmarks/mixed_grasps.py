@@ -8,10 +8,10 @@ import numpy as np
 
 import burg_drake as burg
 from burg_drake.core.content import rng_from
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose, rot_z
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station, Table
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station, Table
 
 CONE = np.deg2rad(75.0)
 """Grasps approach from above, within this angle."""

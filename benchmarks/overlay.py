@@ -18,7 +18,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake.core.processes import ONE_THREAD
+from burg_drake.core.workers.processes import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
 
@@ -29,17 +29,17 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 import burg_drake as burg
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.line_drawing import OUTLINE, visible_lines
-from burg_drake.cameras.overlay import Overlay, instance_labels
-from burg_drake.cameras.overlay_style import OverlayStyle
-from burg_drake.cameras.painting import Bytes
-from burg_drake.cameras.scene_shape import SceneShape, scene_shape
-from burg_drake.cameras.view import FieldOfView
+from burg_drake.cameras.optics.field_of_view import FieldOfView
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.overlay.painting import Bytes
+from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
+from burg_drake.cameras.overlay.style import OverlayStyle
+from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
+from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.schema import Pose
 from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 
 LENS = (-0.25, 0.08, 0.0004, -0.0003, 0.0)
 """Distortion of a webcam's wide lens: 20 pixels in the corners of 640 x 480."""
@@ -62,7 +62,7 @@ def main() -> None:
         if arguments.scans:
             scenes.append(scan_scene(arguments.scans, Path(folder)))
         for scene in scenes:
-            faces = len(scene_shape(scene).outline.faces)
+            faces = len(build_scene_mesh(scene).outline.faces)
             print(f"\n{scene.name}: {len(scene.instances)} objects, {faces} faces")
             for size in arguments.size:
                 width, height = map(int, size.split("x"))
@@ -76,7 +76,7 @@ def report(scene: Scene, intrinsics: Intrinsics) -> None:
     image = np.full((intrinsics.height, intrinsics.width, 3), 200, np.uint8)
     overlay.draw(image, views()[0])
     times = [min(timed(overlay, image, X_SC) for _ in range(5)) for X_SC in views()]
-    shape, projected, drawn = scene_shape(scene), [], []
+    shape, projected, drawn = build_scene_mesh(scene), [], []
     for X_SC in views():
         points, normals, alone = borders(scene, shape, intrinsics, X_SC)
         lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
@@ -127,7 +127,7 @@ def views() -> list[Array]:
 
 
 def borders(
-    scene: Scene, shape: SceneShape, intrinsics: Intrinsics, X_SC: Array
+    scene: Scene, shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Points (N, 2) where one pixel shows another instance than its neighbour, found by rays; unit
     normals (N, 2) of the border; and whether (N,) no other border is near."""
@@ -160,7 +160,7 @@ def borders(
     return np.asarray(found), normals, alone & edge.all(axis=1)
 
 
-def cast(shape: SceneShape, intrinsics: Intrinsics, X_SC: Array, pixels: Array) -> Array:
+def cast(shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array, pixels: Array) -> Array:
     """(N,) number of the instance that a point of the image shows, -1 for none."""
     flat = (intrinsics.undistort(pixels) - intrinsics.center) / intrinsics.focal
     rays = np.column_stack([flat, np.ones(len(flat))]) @ X_SC[:3, :3].T

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, quaternion_from_rotation
-from burg_drake.core.outcome import Outcome
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 STEP = 1.0 / 240.0
 FORCE = 40.0

@@ -20,14 +20,14 @@ from collections import Counter, defaultdict
 import cv2
 import numpy as np
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement import check_placement
-from burg_drake.cameras.placement_document import Placement
-from burg_drake.cameras.placement_photo import ScenePhotographer
-from burg_drake.cameras.placement_shape import Shape, scene_shapes
-from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shapes
+from burg_drake.cameras.placement.check import check_placement
+from burg_drake.cameras.placement.document import Placement
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
+from tests.cameras.placement_photo import ScenePhotographer
 
 SEEN = 0.5
 DEPTH_NOISE, DEPTH_STEP = 1e-3, 1e-3
@@ -55,7 +55,7 @@ class Study:
     def __init__(self, arguments: argparse.Namespace) -> None:
         self.arguments = arguments
         self.scene = load_scene(arguments.scene)
-        self.shapes = scene_shapes(self.scene)
+        self.shapes = target_shapes(self.scene)
         self.photographer = ScenePhotographer(self.scene)
         width = arguments.width
         height = 480 if width == 640 else 720
@@ -104,7 +104,7 @@ class Study:
         if check.reason:
             print(f"photo {seed}: {check.reason}")
         standing_here = {n: q for n, q in truth.items() if n not in odd}
-        view = View(self.intrinsics.K, (self.intrinsics.width, self.intrinsics.height), X_SC)
+        view = PinholeView(self.intrinsics.K, (self.intrinsics.width, self.intrinsics.height), X_SC)
         labels = [np.sum(photo.label == i) for i in range(len(self.shapes))]
         for i, (name, placement) in enumerate(check.instances.items()):
             if name in odd:
@@ -191,12 +191,12 @@ def random_displacement(rng: np.random.Generator) -> Array:
     return np.array([far * np.cos(way), far * np.sin(way), np.deg2rad(rng.uniform(-20, 20))])
 
 
-def standing(shape: Shape, place: Shape) -> Array:
+def standing(shape: TargetShape, place: TargetShape) -> Array:
     """(4, 4) X_SO of an object on another's place."""
     return shape.placed(np.array([*(place.p_SR - shape.p_SR)[:2], 0.0]))
 
 
-def silhouette_area(view: View, shape: Shape, q: Array) -> float:
+def silhouette_area(view: PinholeView, shape: TargetShape, q: Array) -> float:
     """Pixels of the image that an object would cover if nothing stood before it."""
     return float(np.isfinite(view.depth([(shape, q)])).sum())
 

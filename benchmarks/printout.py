@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from burg_drake.core.frames import Array
 from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
-from burg_drake.printout.height_map import height_map
-from burg_drake.scene.markers import MarkerLayout, Markers, marker_dictionary
-from burg_drake.scene.scene import Board, Scene, load_scene
+from burg_drake.printout.relief import height_map
+from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
+from burg_drake.scene.document.scene import Board, Scene, load_scene
 
 SCENES = ("tabletop_six", "tabletop_twelve")
 PAGES = ("A4", "A3", "A2", "letter")

@@ -19,13 +19,13 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from burg_drake.core.frames import Array
-from burg_drake.grasping.antipodal import sample_antipodal
-from burg_drake.grasping.ball import ball
-from burg_drake.grasping.contacts import friction_needed, grasp_contacts
-from burg_drake.grasping.quality import Payload, grasp_quality
-from burg_drake.grasping.surface import Surface
-from burg_drake.grasping.wrench_margins import ANY_WRENCH, epsilon_bracket, reaches
-from burg_drake.grasping.wrench_space import WrenchSpace, hull_volume
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.quality.contacts import friction_needed, grasp_contacts
+from burg_drake.grasping.quality.metrics import Payload, grasp_quality
+from burg_drake.grasping.quality.triangulation import triangulated_ball
+from burg_drake.grasping.quality.wrench_margins import ANY_WRENCH, epsilon_bracket, reaches
+from burg_drake.grasping.quality.wrench_space import WrenchSpace, hull_volume
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
 
 FRICTION = 0.4
 TARGET = 5.0
@@ -86,12 +86,12 @@ def compare(space: WrenchSpace, seconds: float, count: int) -> None:
     some = space.select(np.linspace(0, len(space) - 1, count).astype(int))
     (epsilon,) = reaches(some, [ANY_WRENCH])
     lower, _ = epsilon_bracket(some, 2)
-    volume = hull_volume(some, ball(3, of_volume=True))
-    ours = np.abs(hull_volume(some, ball(1, of_volume=True)) / volume - 1.0)
+    volume = hull_volume(some, triangulated_ball(3, of_volume=True))
+    ours = np.abs(hull_volume(some, triangulated_ball(1, of_volume=True)) / volume - 1.0)
     print(f"epsilon at most {np.max(1.0 - lower / epsilon):.1%} above a certain lower bound")
     print(f"volume within {ours.max():.1%}")
     for subdivisions in (0, 1):
-        vertices = ball(subdivisions).vertices
+        vertices = triangulated_ball(subdivisions).vertices
         start = time.process_time()
         hulls = [hull(basis, vertices) for basis in some.basis]
         each = (time.process_time() - start) / count

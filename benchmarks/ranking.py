@@ -21,16 +21,16 @@ from scipy.stats import rankdata
 
 import burg_drake as burg
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.candidates import INSTANCE
-from burg_drake.evaluation.sampled_set import sample_grasps
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.evaluation.scored_set import scored_set
-from burg_drake.grasping.quality import METRICS, score_of
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import engine_preset
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.candidates import INSTANCE
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
+from burg_drake.evaluation.grasp_sets.scored import scored_set
+from burg_drake.grasping.quality.metrics import METRICS, score_of
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.station_document import Station
 
 SAMPLER = "sampler's score"
 RESAMPLED = 1000

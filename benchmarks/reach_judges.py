@@ -27,12 +27,12 @@ from pydrake.solvers import SnoptSolver
 
 from burg_drake.core.content import rng_from
 from burg_drake.core.frames import Array, inverse, swap_fingers
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.panda_ik import PandaIk
-from burg_drake.scene.scene import Scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.ik.panda import PandaIk
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Station
 
 LAYER = 0.025
 """Distance between the hand poses of the exhaustive judge [m]."""

@@ -18,13 +18,13 @@ from reach_prover import Prover
 
 from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.motion.verdict import Reach
-from burg_drake.motion.witness import Witness
-from burg_drake.scene.scene import Scene
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station
+from burg_drake.motion.lines.reach_settings import ReachSettings
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.motion.reach.verdict import Reach
+from burg_drake.motion.reach.witness import Witness
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Station
 
 STEP = 0.003
 """Of the audit of motions that we have missed [m]."""

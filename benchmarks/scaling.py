@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.results import read_results
-from burg_drake.evaluation.table import CPU_COLUMNS
+from burg_drake.evaluation.records.table import CPU_COLUMNS
+from burg_drake.evaluation.store.loading import read_results
 
 
 def main() -> None:

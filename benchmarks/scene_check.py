@@ -22,13 +22,13 @@ from pathlib import Path
 
 import numpy as np
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.station.check import check_scene
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import load_station
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.document.station_document import load_station
 
 SPACING = 0.15
 """Of the grid [m]."""

@@ -21,12 +21,12 @@ import numpy as np
 
 from burg_drake.generation.many import sample_scenes
 from burg_drake.generation.sample import SampledScene, SceneSampler
-from burg_drake.objects.library import load_library
-from burg_drake.scene.board import Board
-from burg_drake.scene.layout import LAYOUTS, Layout
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.simulation.stillness import is_still, stillness
-from burg_drake.station.station import Station, load_station
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.board import Board
+from burg_drake.scene.document.layout import LAYOUTS, Layout
+from burg_drake.scene.document.recipe import SceneRecipe
+from burg_drake.simulation.rest.still_check import is_still, stillness
+from burg_drake.station.document.station_document import Station, load_station
 
 A2, A3 = Board(), Board(size=(0.42, 0.297))
 

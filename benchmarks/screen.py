@@ -29,9 +29,9 @@ from pydrake.geometry import HydroelasticContactRepresentation
 import burg_drake as burg
 from burg_drake.core.content import rng_from
 from burg_drake.core.frames import Array
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.grasping.clearances import Clearances
-from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.grasping.clearance.verdict import ClearanceBatch
+from burg_drake.simulation.trials.hand_trial import HandTrial
 
 PEER_FILTER = (2400.0, 8800.0)
 PEER_REJECTED = 0.07
@@ -147,7 +147,7 @@ def measure_object(
     start_trials(overall, trial, name, clear[: arguments.started])
 
 
-def conservative(screen: HandClearance, name: str, X_WG: Array) -> Clearances:
+def conservative(screen: HandClearance, name: str, X_WG: Array) -> ClearanceBatch:
     """Screens grasps in the other mode."""
     return screen.measure(name, X_WG, mode="conservative")
 
@@ -173,7 +173,7 @@ def sampled(scene: burg.Scene, name: str, n: int, X_WO: Array) -> Array:
 
 
 def disagreements(
-    name: str, order: list[str], verdicts: Clearances, touched: list[dict[str, float]]
+    name: str, order: list[str], verdicts: ClearanceBatch, touched: list[dict[str, float]]
 ) -> list[tuple[float, str]]:
     """Grasps with another deciding body, and the larger of the two depths [m]."""
     found = []
@@ -188,7 +188,7 @@ def disagreements(
 
 
 def compare_distances(
-    figures: Figures, screen: HandClearance, X_WG: Array, found: Clearances, most: int
+    figures: Figures, screen: HandClearance, X_WG: Array, found: ClearanceBatch, most: int
 ) -> None:
     """Asks Drake for the distances of some clear grasps."""
     for k in np.flatnonzero(found.clear)[:most]:

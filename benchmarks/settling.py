@@ -19,16 +19,16 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.frames import inverse
-from burg_drake.generation import pile as piling
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.layout import Layout
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.scene import Board, Scene, SceneDocument
-from burg_drake.simulation import settle_scene as settling
-from burg_drake.simulation.stillness import stillness
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import Station, load_station
+from burg_drake.generation import heap as piling
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.arrangement.arranging import arrange, choose
+from burg_drake.scene.arrangement.object_shapes import ObjectShapes
+from burg_drake.scene.document.layout import Layout
+from burg_drake.scene.document.scene import Board, Scene, SceneDocument
+from burg_drake.simulation.rest.still_check import stillness
+from burg_drake.simulation.settling import settled_scene as settling
+from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.document.station_document import Station, load_station
 
 A2, A3 = Board(size=(0.594, 0.420)), Board(size=(0.420, 0.297))
 KINDS: tuple[tuple[str, str, Layout, int, Board], ...] = (

@@ -26,8 +26,8 @@ from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
 from burg_drake.core.frames import Array, swap_fingers
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import engine_preset
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import engine_preset
 
 SCENES = ("tabletop_six", "tabletop_close")
 PEER = {"swapped": 0.088, "turned": 0.056}

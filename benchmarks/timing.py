@@ -22,16 +22,16 @@ from pydrake.trajectories import PiecewisePolynomial
 from reach import Grasps, clear_grasps
 
 from burg_drake.core.frames import Array
-from burg_drake.core.resources import data_root
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.line_path import line_error
-from burg_drake.motion.plan import Planner
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.timing import time_motion
-from burg_drake.motion.trajectory import Plan, Trajectory
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import Station, load_station
+from burg_drake.core.paths.resources import data_root
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.planner import Planner
+from burg_drake.motion.plans.trajectory import Plan, Trajectory
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.motion.timing.grasp_timing import time_motion
+from burg_drake.motion.timing.line_path import line_error
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import Station, load_station
 
 AUDITED = 40
 """Plans whose samples are asked to Drake, every `EVERY`th."""

@@ -25,10 +25,10 @@ from mixed_grasps import clear_grasps, frictions, hand_only, sampled_grasps
 from peer_pybullet import Peer, is_installed
 
 import burg_drake as burg
-from burg_drake.core.outcome import Outcome
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import ENGINES, engine_preset
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import ENGINES, engine_preset
+from burg_drake.station.document.station_document import Station
 
 PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
 """The peer's CPU times [s]."""

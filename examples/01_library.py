@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.objects.meshes import unit_scale
+from burg_drake.objects.meshes.surface import unit_scale
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 

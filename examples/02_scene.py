@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 
 from burg_drake import build_station_diagram, load_scene, load_station
-from burg_drake.station.check import check_scene
+from burg_drake.station.checks.scene_issues import check_scene
 
 scene = load_scene("tabletop_six")
 station = load_station("panda_tabletop")

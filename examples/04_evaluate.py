@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from burg_drake import evaluate
-from burg_drake.evaluation.run_store import load_run
+from burg_drake.evaluation.store.run_folder import load_run
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run"

@@ -10,7 +10,7 @@ from PIL import Image
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from burg_drake import load_scene, load_station
-from burg_drake.cameras.board_loop import build_board_loop
+from burg_drake.cameras.systems.board_loop import build_board_loop
 from burg_drake.printout.board_printout import print_board
 
 scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")

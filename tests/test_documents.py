@@ -1,4 +1,4 @@
-"""What the documents say is so: links lead somewhere, Python runs, commands and YAML are understood.
+"""What the documents say is so: links lead somewhere, code runs, commands and YAML fit.
 
 The Python of a page runs as it is printed, one block after the other, in a folder of its own. A
 comment of the page right before a block (`<!-- ... -->`) says what is different:
@@ -14,6 +14,7 @@ from __future__ import annotations
 import ast
 import importlib
 import inspect
+import pkgutil
 import re
 import shlex
 from collections.abc import Iterator
@@ -25,14 +26,14 @@ import pytest
 from markdown_it import MarkdownIt
 
 from burg_drake.apps.cli import build_parser, main
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core.schema import parse_document
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.documents.schema import parse_document
 from burg_drake.evaluation.cluster.document import ClusterDocument
-from burg_drake.evaluation.executor import LocalExecutor
+from burg_drake.evaluation.workers.executor import LocalExecutor
 from burg_drake.experiment.trials.sheet import TrialSheet
-from burg_drake.scene.scene import SceneDocument
-from burg_drake.station.hand import Hand
-from burg_drake.station.station import StationDocument
+from burg_drake.scene.document.scene import SceneDocument
+from burg_drake.station.document.gripper_document import Hand
+from burg_drake.station.document.station_document import StationDocument
 from burg_drake.system_libraries import missing_render_libraries
 from tests.evaluation.inline_executor import Inline
 
@@ -40,9 +41,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 SMALLER = {
     "README": {
-        "grasps_per_object=100)": "grasps_per_object=1, engine='screening')",
+        "grasps_per_object=100)": "grasps_per_object=2, engine='screening', only=['mug'])",
         "scene, station, 50, ": "scene, station, 8, ",
-        "scene, station, 500)": "scene, station, 1)",
+        "scene, station, 500)": "scene, station, 1, only=['mug', 'box'])",
         "burg.reach(scene, station, grasps)": "burg.reach(scene, station, grasps, workers=1)",
         "AdvanceTo(plan.duration)": "AdvanceTo(0.1)",
         '"runs/best", grasps=best)': '"runs/best", grasps=best, engine="screening")',
@@ -164,12 +165,20 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_names_in_the_text_exist(page: Path) -> None:
+    for code in re.findall(r"`[^`\n]+`", page.read_text("utf-8")):
+        for name in re.findall(r"\bburg(?:_drake)?((?:\.[A-Za-z_]\w*)+)\b", code):
+            pkgutil.resolve_name(f"burg_drake{name}")
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.runs for b in BLOCKS[p])], ids=ids)
 def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "camera" in page.read_text("utf-8") and missing_render_libraries():
         pytest.skip("the renderer's system libraries are missing")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(LocalExecutor, "judge", lambda self, *jobs: Inline().judge(*jobs))
+    monkeypatch.setattr("burg_drake.evaluation.run.scene_processes.preparers", lambda workers: 0)
     names: dict[str, Any] = {}
     for block in filter(lambda block: block.runs, BLOCKS[page]):
         if block.language == "python":
@@ -194,7 +203,7 @@ def test_what_does_not_run_is_about_what_there_is(block: Block) -> None:
                 names[alias.asname or alias.name] = importlib.import_module(alias.name)
         elif isinstance(node, ast.ImportFrom):
             module = importlib.import_module(str(node.module))
-            names |= {alias.asname or alias.name: getattr(module, alias.name) for alias in node.names}
+            names |= {a.asname or a.name: getattr(module, a.name) for a in node.names}
     for node in ast.walk(block.module):
         if isinstance(node, ast.Attribute):
             looked_up(node, names)

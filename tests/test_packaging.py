@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 import burg_drake
-from burg_drake.core.resources import data_root
+from burg_drake.core.paths.resources import data_root
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(burg_drake.__file__).parent
@@ -36,6 +36,7 @@ HEAVY = {
 }
 # Distributions whose import name is another one.
 IMPORT_NAMES = {
+    "lazy-loader": "lazy_loader",
     "dask-jobqueue": "dask_jobqueue",
     "pillow": "PIL",
     "drake": "pydrake",
@@ -146,7 +147,8 @@ def test_light_imports(statement: str) -> None:
 def test_workers_start_without_scipys_rotations() -> None:
     """Half of the time that importing them takes would go there."""
     run_python(
-        "import sys, burg_drake.evaluation.executors\nassert 'scipy.spatial' not in sys.modules"
+        "import sys, burg_drake.evaluation.workers.single_job\n"
+        "assert 'scipy.spatial' not in sys.modules"
     )
 
 

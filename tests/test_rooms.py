@@ -13,6 +13,7 @@ PACKAGE = Path(burg_drake.__file__).parent
 # A room may import itself and the rooms before it.
 ROOMS = [
     "core",
+    "geometry",
     "formats",
     "objects",
     "scene",

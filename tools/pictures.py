@@ -26,17 +26,17 @@ if __package__ in (None, ""):
 
 from burg_drake import build_station_diagram, load_library, load_scene, load_station
 from burg_drake.apps.cli import main as burg_drake
-from burg_drake.cameras.board_loop import build_board_loop
-from burg_drake.cameras.overlay import Overlay
-from burg_drake.cameras.placement import check_placement
+from burg_drake.cameras.overlay.renderer import Overlay
+from burg_drake.cameras.placement.check import check_placement
+from burg_drake.cameras.systems.board_loop import build_board_loop
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import rot_z
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.run_store import load_run
+from burg_drake.evaluation.store.run_folder import load_run
 from burg_drake.generation.sample import sample_scene
-from burg_drake.scene.layout import Layout
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.station import Camera, Station
+from burg_drake.scene.document.layout import Layout
+from burg_drake.scene.document.recipe import SceneRecipe
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.station.document.station_document import Camera, Station
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 PLACES = {

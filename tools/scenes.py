@@ -11,6 +11,7 @@ import dataclasses
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
+from burg_drake.core.documents.schema import Pose, save_document
 from burg_drake.core.frames import (
     Array,
     inverse,
@@ -19,14 +20,13 @@ from burg_drake.core.frames import (
     rotation_angle,
     transform_points,
 )
-from burg_drake.core.resources import data_root
-from burg_drake.core.schema import Pose, save_document
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.scene.validate import read_vertices
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import data_root
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.scene.document.validation import read_vertices
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
 
 LIBRARY = "household"
 STATION = "panda_tabletop"

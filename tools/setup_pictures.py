@@ -17,12 +17,12 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from burg_drake import build_station_diagram, load_scene, load_station
-from burg_drake.compose.board_change import SetBoard
-from burg_drake.compose.moving import Move, SetPose
-from burg_drake.compose.placing import AddObject
+from burg_drake.compose.commands.board import SetBoard
+from burg_drake.compose.commands.moving import MoveObjects, SetPose
+from burg_drake.compose.commands.placing import AddObject
 from burg_drake.compose.session import ComposeSession
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.ui.door import serve
+from burg_drake.ui.server.door import serve
 from burg_drake.ui.setup_page import SetupPage
 
 SIZE = {"width": 1360, "height": 850}
@@ -109,7 +109,7 @@ def place(open: Open, places: dict[str, tuple[float, float, float]]) -> None:
         X = open.session.view.X_SO(name)
         R = rot_z(np.deg2rad(turn)) @ X[:3, :3]
         X_SO[name] = make_pose(R, X[:3, 3] + np.array([x, y, 0.0]))
-    open.session.do(Move(X_SO))
+    open.session.do(MoveObjects(X_SO))
 
 
 def whole_page(path: Path) -> None:
@@ -139,7 +139,7 @@ def settling(path: Path) -> None:
         X_SO = open.session.view.X_SO("mug")
         p_SO = open.session.view.X_SO("bowl")[:3, 3]
         X_SO[:3, 3] = p_SO + np.array([0.02, -0.01, 0.11])
-        open.session.do(Move({"mug": X_SO}))
+        open.session.do(MoveObjects({"mug": X_SO}))
         open.session.do(SetPose(("bottle",), 1))
         open.session.select([])
         open.show("Check")
@@ -193,7 +193,7 @@ def backdrop(path: Path) -> None:
         for name in ("bowl", "banana", "screwdriver"):
             open.session.do(AddObject(name))
         open.session.restrict_movement(False)
-        open.session.do(Move({n: scene.X_SO(n) for n in ("bowl", "banana", "screwdriver")}))
+        open.session.do(MoveObjects({n: scene.X_SO(n) for n in ("bowl", "banana", "screwdriver")}))
         open.session.restrict_movement(True)
         open.session.select([])
         open.show("View")

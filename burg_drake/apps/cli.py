@@ -17,32 +17,14 @@ import sys
 from collections.abc import Sequence
 
 from burg_drake import __version__
-from burg_drake.apps import (
-    ar,
-    camera,
-    compare,
-    evaluate,
-    frames,
-    gap,
-    grasps,
-    hand,
-    library,
-    merge,
-    printout,
-    reach,
-    replay,
-    report,
-    robustness,
-    ros,
-    scene,
-    setup,
-    station,
-    status,
-    trials,
-)
-from burg_drake.apps.arguments import Parser, examples
-from burg_drake.apps.interrupts import terminated_as_interrupted
-from burg_drake.core.errors import BurgError, shown
+from burg_drake.apps import ar, camera, grasps, hand, library, ros, scene, station, trials
+from burg_drake.apps.comparison import compare, gap
+from burg_drake.apps.grasps import frames
+from burg_drake.apps.options import Parser, examples
+from burg_drake.apps.runs import evaluate, merge, reach, replay, report, robustness, status
+from burg_drake.apps.scene import printout, setup
+from burg_drake.apps.terminal import terminated_as_interrupted
+from burg_drake.core import BurgError, shown
 
 INPUT_ERROR = 2
 INTERRUPTED = 130

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from burg_drake.apps.arguments import add_group, add_verb
+from burg_drake.apps.options import add_group, add_verb
 
 
 def add_to(verbs: Any) -> None:
@@ -29,9 +29,9 @@ def add_to(verbs: Any) -> None:
 
 def run_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in hand."""
-    from burg_drake.core.resources import builtin_names
-    from burg_drake.core.text_table import TextTable
-    from burg_drake.station.hand import load_hand
+    from burg_drake.core.paths import builtin_names
+    from burg_drake.core.terminal import TextTable
+    from burg_drake.station.document import load_hand
 
     hands = [load_hand(name) for name in builtin_names("models/hands")]
     table = TextTable().texts("hand", "description")
@@ -43,8 +43,8 @@ def run_list(arguments: argparse.Namespace) -> int:
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Prints what a hand does and measures; what does not fit is an error."""
-    from burg_drake.station.hand import locate_hand
-    from burg_drake.station.hand_check import check_hand
+    from burg_drake.station.document import locate_hand
+    from burg_drake.station.world import check_hand
 
     hand, model, path = locate_hand(arguments.hand)
     figures = check_hand(hand, model, path)

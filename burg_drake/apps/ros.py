@@ -6,7 +6,7 @@ import argparse
 import signal
 from typing import Any, NoReturn
 
-from burg_drake.apps.arguments import add_scene, add_verb, measured_mm
+from burg_drake.apps.options import add_scene, add_verb, measured_mm
 
 # Kept in step with ros.link, which imports too much for a help text; a test compares them.
 PARENTS = ("camera", "board", "none")
@@ -81,8 +81,7 @@ def add_to(verbs: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serves until Ctrl-C, SIGTERM or ROS ends it."""
-    from burg_drake.ros.distribution import choose, connect
-    from burg_drake.ros.link import Names, Parent
+    from burg_drake.ros import Names, Parent, choose, connect
 
     names = Names(
         node=arguments.name,
@@ -93,10 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
     )
     version = choose(arguments.distro)
 
-    from burg_drake.cameras.intrinsics_file import load_intrinsics
-    from burg_drake.ros.board_node import BoardNode
-    from burg_drake.ros.serve import serve
-    from burg_drake.scene.scene import load_scene
+    from burg_drake.cameras.optics import load_intrinsics
+    from burg_drake.ros import BoardNode, serve
+    from burg_drake.scene.document import load_scene
 
     intrinsics = load_intrinsics(arguments.intrinsics) if arguments.intrinsics else None
     scene = load_scene(arguments.scene)

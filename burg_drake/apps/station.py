@@ -6,14 +6,13 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.arguments import Parser, add_group, add_verb, add_view
-from burg_drake.core.text_table import TextTable
+from burg_drake.apps.options import Parser, add_group, add_verb, add_view
+from burg_drake.core.terminal import TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.motion.reachability import ReachabilityMap
-    from burg_drake.motion.station_check import ArmFigures, StationReport
-    from burg_drake.scene.scene import Scene
-    from burg_drake.station.station import Station
+    from burg_drake.motion.workspace import ArmFigures, ReachabilityMap, StationReport
+    from burg_drake.scene.document import Scene
+    from burg_drake.station.document import Station
 
 
 def add_to(verbs: Any) -> None:
@@ -59,8 +58,8 @@ def _add_station(parser: Parser) -> None:
 
 def run_list(arguments: argparse.Namespace) -> int:
     """Prints name and description of each built-in station."""
-    from burg_drake.core.resources import builtin_names
-    from burg_drake.station.station import load_station
+    from burg_drake.core.paths import builtin_names
+    from burg_drake.station.document import load_station
 
     stations = [load_station(name) for name in builtin_names("stations")]
     table = TextTable().texts("station", "description")
@@ -85,9 +84,9 @@ def run_check(arguments: argparse.Namespace) -> int:
 
 def run_show(arguments: argparse.Namespace) -> int:
     """Shows a station; what its author should know goes to stderr."""
-    from burg_drake.apps.live import open_view, present
-    from burg_drake.motion.station_check import empty_scene
-    from burg_drake.visualization.station_view import show_station
+    from burg_drake.apps.terminal import open_view, present
+    from burg_drake.motion.workspace import empty_scene
+    from burg_drake.visualization.scenes import show_station
 
     meshcat = open_view(arguments)
     station, scene, report = _inspect(arguments)
@@ -111,9 +110,9 @@ def run_show(arguments: argparse.Namespace) -> int:
 
 
 def _inspect(arguments: argparse.Namespace) -> tuple[Station, Scene | None, StationReport]:
-    from burg_drake.motion.station_check import inspect_station
-    from burg_drake.scene.scene import load_scene
-    from burg_drake.station.station import load_station
+    from burg_drake.motion.workspace import inspect_station
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.document import load_station
 
     station = load_station(arguments.station)
     if getattr(arguments, "camera", None) is not None:
@@ -124,7 +123,7 @@ def _inspect(arguments: argparse.Namespace) -> tuple[Station, Scene | None, Stat
 
 def _lines(station: Station, scene: Scene | None, report: StationReport) -> list[tuple[str, str]]:
     """What is printed about a station, by name."""
-    from burg_drake.evaluation.motion_numbers import motion_text
+    from burg_drake.evaluation.records import motion_text
 
     low, high = (round(1e3 * width) + 0 for width in report.hand.opening)
     hand = station.hand
@@ -165,7 +164,7 @@ def _arm_lines(station: Station, arm: ArmFigures) -> list[tuple[str, str]]:
 
 
 def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tuple[str, str]]:
-    from burg_drake.scene.scene import Board
+    from burg_drake.scene.document import Board
 
     width, height = (1e3 * extent for extent in (scene.board if scene else Board()).size)
     content = f"{len(scene.instances)} objects of {scene.name}" if scene else "empty"
@@ -185,6 +184,6 @@ def _board_lines(scene: Scene | None, reach: ReachabilityMap | None) -> list[tup
 
 
 def _percent(share: float) -> str:
-    from burg_drake.motion.station_check import percent
+    from burg_drake.motion.workspace import percent
 
     return percent(share)

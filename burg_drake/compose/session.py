@@ -7,26 +7,34 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from burg_drake.compose.beside import BesideEditor
-from burg_drake.compose.checker import known_scene
-from burg_drake.compose.history import Step
-from burg_drake.compose.library_watch import LibraryWatch, UseLibrary, changes_notice
-from burg_drake.compose.opening import Opened, new_scene, open_reference, open_scene_file
-from burg_drake.compose.scene_file import UnsavedChanges, fingerprint, scene_path
-from burg_drake.compose.state import State
-from burg_drake.compose.view import View
-from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.references import portable_reference
-from burg_drake.core.resources import builtin_names
+from burg_drake.compose.document import HistoryStep, State, known_scene
+from burg_drake.compose.editing import (
+    BackgroundEditor,
+    LibraryWatch,
+    SessionView,
+    UseLibrary,
+    changes_notice,
+)
+from burg_drake.compose.storage import (
+    Opened,
+    UnsavedChanges,
+    fingerprint,
+    new_scene,
+    open_reference,
+    open_scene_file,
+    scene_path,
+)
+from burg_drake.core import BurgError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.paths import builtin_names, portable_reference
 from burg_drake.objects.library import LIBRARY_FILE, load_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import Station
+from burg_drake.scene.document import load_scene
+from burg_drake.station.document import Station
 
 if TYPE_CHECKING:
-    from burg_drake.printout.board_printout import Printout, PrintSettings
+    from burg_drake.printout import Printout, PrintSettings
 
 
-class ComposeSession(BesideEditor):
+class ComposeSession(BackgroundEditor):
     """Document, selection, commands and history of one scene, without any user interface.
 
     All methods may be called from any thread. What is refused raises a `BurgError`, and changes
@@ -100,7 +108,7 @@ class ComposeSession(BesideEditor):
             self._callbacks.clear()
             self._storage.close(keep=self._changed)
 
-    def save(self, name: str | None = None, *, overwrite: bool = False) -> View:
+    def save(self, name: str | None = None, *, overwrite: bool = False) -> SessionView:
         """Writes the scene to its file, or to another one in the folder, which is its file then.
 
         Args:
@@ -120,7 +128,7 @@ class ComposeSession(BesideEditor):
             self._drag = None
             return self._show(replace(self._history.state, selection=selection))
 
-    def load(self, name: str | None = None, *, discard: bool = False) -> View:
+    def load(self, name: str | None = None, *, discard: bool = False) -> SessionView:
         """Opens a scene of the folder. Its own file is a step, which can be undone; with another
         one the history begins anew.
 
@@ -144,12 +152,12 @@ class ComposeSession(BesideEditor):
             known = fingerprint(path)
             scene = load_scene(path)
             self._drag = None
-            self._take(Step(f"load {path.name}", State(scene.document, scene.library)))
+            self._take(HistoryStep(f"load {path.name}", State(scene.document, scene.library)))
             self._storage.known, self._storage.saved = known, scene.document
             self._storage.record_all(self._history)
             return self._publish()
 
-    def new(self, library: str | Path | None = None, *, discard: bool = False) -> View:
+    def new(self, library: str | Path | None = None, *, discard: bool = False) -> SessionView:
         """Begins another scene with an empty board.
 
         Args:
@@ -174,7 +182,7 @@ class ComposeSession(BesideEditor):
         Raises:
             InvalidInputError: the settings do not fit, or the markers do not.
         """
-        from burg_drake.printout.board_printout import print_board
+        from burg_drake.printout import print_board
 
         return print_board(known_scene(self._history.state, self._storage.place), settings)
 
@@ -187,7 +195,7 @@ class ComposeSession(BesideEditor):
             own = []
         return (*builtin_names("models"), *(name for name in own if not name.startswith(".")))
 
-    def use_library(self, reference: str | Path) -> View:
+    def use_library(self, reference: str | Path) -> SessionView:
         """Takes the objects from another library; a step.
 
         Args:
@@ -216,14 +224,14 @@ class ComposeSession(BesideEditor):
             )
         return reference if reference in builtin_names("models") else self.folder / reference
 
-    def refresh(self) -> View:
+    def refresh(self) -> SessionView:
         """Looks whether the library or the scene's file has changed on the disk; notices say so.
         Each step does that first."""
         with self._alone():
             self._look_around()
             return self._view
 
-    def _change(self, opened: Opened) -> View:
+    def _change(self, opened: Opened) -> SessionView:
         """Goes over to another scene."""
         self._drop_settling()
         self._storage.close(keep=False)

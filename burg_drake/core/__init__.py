@@ -1,1 +1,5 @@
 """Ground floor: errors, frames, documents and grasp sets. Nothing here imports pydrake."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -28,11 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.damaged import reading
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import UNFINISHED, atomic_write
-from burg_drake.core.numpy_file import NpzFile, open_npz
-from burg_drake.core.stored_array import NUMBERS
+from burg_drake.core.files import NUMBERS, UNFINISHED, NpzFile, atomic_write, open_npz, reading
 
 VARIABLE = "BURG_DRAKE_CACHE"
 OFF = "off"
@@ -43,7 +40,7 @@ TOUCHED = 86_400.0
 """An entry in use is marked as such no more often than that [s]."""
 ABANDONED = 3_600.0
 """A file that has not got its name for so long [s] is of a process that was killed."""
-ROOMS = ("core", "objects", "scene", "station", "grasping", "motion")
+ROOMS = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
 """Packages whose code decides about what is kept."""
 MAKERS = ("numpy", "scipy", "drake")
 """Packages whose version does."""
@@ -159,8 +156,8 @@ def _limit(folder: Path) -> None:
 def _makers() -> tuple[str, ...]:
     """Hash of the code, and versions of what it computes with."""
     package = Path(__file__).parents[1]
-    files = [file for room in ROOMS for file in sorted((package / room).glob("*.py"))]
-    code = content_hash([file.name for file in files], files)
+    files = [file for room in ROOMS for file in sorted((package / room).rglob("*.py"))]
+    code = content_hash([file.relative_to(package).as_posix() for file in files], files)
     return code, *(_version(name) for name in MAKERS)
 
 

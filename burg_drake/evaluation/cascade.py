@@ -15,36 +15,49 @@ from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.processes import default_workers
-from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
-from burg_drake.evaluation.campaign import Campaign
-from burg_drake.evaluation.candidates import given_candidates
-from burg_drake.evaluation.complete import require_judged
-from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
-from burg_drake.evaluation.journal import Journal
-from burg_drake.evaluation.mode import Mode, mode_for
-from burg_drake.evaluation.part_writer import keep_parts
-from burg_drake.evaluation.preparation import finish_run, open_grasps, open_run
-from burg_drake.evaluation.preparation import require_sound as _require_sound
-from burg_drake.evaluation.request import Given, Request, names
-from burg_drake.evaluation.run_document import TableFormat, begun_now
-from burg_drake.evaluation.run_store import (
+from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.workers import default_workers
+from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG, given_candidates
+from burg_drake.evaluation.records import (
+    Journal,
+    Shard,
+    TableFormat,
+    as_shard,
+    begun_now,
+    require_writer,
+)
+from burg_drake.evaluation.run import (
+    Given,
+    Request,
+    finish_run,
+    names,
+    open_grasps,
+    open_run,
+    require_judged,
+    require_sound as _require_sound,
+)
+from burg_drake.evaluation.stages import Mode, StationJudgeFactory, mode_for
+from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,
+    Campaign,
     Run,
+    keep_parts,
     require_run_folder,
     save_run,
 )
-from burg_drake.evaluation.sampling_settings import DEFAULT_APPROACH_ANGLE_DEG
-from burg_drake.evaluation.shard import Shard, as_shard
-from burg_drake.evaluation.station_judge import StationJudgeFactory
-from burg_drake.evaluation.table_file import require_writer
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.engine import ENGINES, Engine, engine_preset
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station, load_station
+from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
+from burg_drake.scene.document import Scene, load_scene
+from burg_drake.station.document import (
+    ENGINES,
+    Engine,
+    GraspMotion,
+    Station,
+    engine_preset,
+    load_station,
+)
 
 SceneReference = Scene | str | Path
 
@@ -202,7 +215,7 @@ def evaluate(
     require_writer(table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
-    from burg_drake.evaluation.many_scenes import evaluate_scenes
+    from burg_drake.evaluation.run import evaluate_scenes
 
     return evaluate_scenes(
         scene, request, Path(out), executor, StationJudgeFactory, _require_sound, progress

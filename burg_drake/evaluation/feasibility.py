@@ -11,34 +11,37 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import quaternion_from_rotation
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.names import require_name
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
-from burg_drake.evaluation.candidate_files import by_names
-from burg_drake.evaluation.candidates import INSTANCE, Candidate, Candidates, given_candidates
-from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.judge import LIFT_HEIGHT, Decide, Decision, Verdict, one_line
-from burg_drake.evaluation.plan_folder import PlanFolder, plans_document
-from burg_drake.evaluation.plan_folder import PlanFormat as PlanFormat
-from burg_drake.evaluation.run_document import input_of, numbers
-from burg_drake.evaluation.screens import (
+from burg_drake.core import InvalidInputError, quaternion_from_rotation
+from burg_drake.core.grasps import GraspSet, Outcome, Stage
+from burg_drake.core.paths import require_name
+from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.evaluation.candidates import (
+    INSTANCE,
+    Candidate,
+    Candidates,
+    given_candidates,
+)
+from burg_drake.evaluation.grasp_sets import by_names, set_documents
+from burg_drake.evaluation.records import Columns, input_of, numbers
+from burg_drake.evaluation.stages import (
+    LIFT_HEIGHT,
+    Decide,
+    Decision,
+    Verdict,
     arm_reach,
     arm_screen,
     arm_settings,
     hand_alone,
     hand_screen,
+    one_line,
 )
-from burg_drake.evaluation.set_documents import set_documents
-from burg_drake.evaluation.table import Columns
-from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.motion.trajectory import Plan
-from burg_drake.motion.witness import Witness
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station, load_station
+from burg_drake.evaluation.store import PlanFolder, PlanFormat as PlanFormat, plans_document
+from burg_drake.evaluation.workers import judge_all
+from burg_drake.motion.lines import ReachSettings
+from burg_drake.motion.plans import Plan
+from burg_drake.motion.reach import Witness
+from burg_drake.scene.document import Scene, load_scene
+from burg_drake.station.document import GraspMotion, Station, load_station
 
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
@@ -102,7 +105,7 @@ def reach(
         UnknownNameError: a reference, instance or object that does not exist.
         SimulationError: the worker processes die.
     """
-    from burg_drake.motion.usable_arm import require_usable_arm
+    from burg_drake.motion.workspace import require_usable_arm
 
     scene = scene if isinstance(scene, Scene) else load_scene(scene)
     station = station if isinstance(station, Station) else load_station(station)
@@ -160,7 +163,7 @@ class ReachJudge:
     """
 
     def __init__(self, factory: ReachJudgeFactory) -> None:
-        from burg_drake.motion.plan import Planner
+        from burg_drake.motion import Planner
 
         scene, station = factory.scene, factory.station
         hand, X_WO = hand_alone(scene, station)

@@ -9,14 +9,13 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array
-from burg_drake.export.box_model import box_model
 from burg_drake.export.layout import Layout
 from burg_drake.export.legal_names import LegalNames
-from burg_drake.export.object_model import object_model, sdf_document
-from burg_drake.objects.library import package_manifest, package_name
-from burg_drake.objects.sdf import LINK
+from burg_drake.export.sdf_box import box_model
+from burg_drake.export.sdf_object import object_model, sdf_document
+from burg_drake.objects.library import LINK, package_manifest, package_name
 
 DIRECTIVES_FILE = "scene.dmd.yaml"
 OBJECTS, STATION = "objects", "station"
@@ -58,7 +57,10 @@ def write_directives(layout: Layout, folder: Path) -> tuple[str, ...]:
         directives += [_add(names[name], file), _weld(names[name], box.X_WB)]
     atomic_write(folder / "package.xml", package_manifest(package, "Scene"))
     text = yaml.dump(
-        {"directives": directives}, Dumper=_Dumper, sort_keys=False, default_flow_style=None
+        {"directives": directives},
+        Dumper=_DirectivesDumper,
+        sort_keys=False,
+        default_flow_style=None,
     )
     atomic_write(folder / DIRECTIVES_FILE, text)
     return names.notes
@@ -68,18 +70,18 @@ class _AngleAxis(dict[str, Any]):
     """A rotation as Drake's schema has it, exact for any."""
 
 
-class _Dumper(yaml.SafeDumper):
+class _DirectivesDumper(yaml.SafeDumper):
     """Writes rotations with their tag, and repeats values rather than giving them anchors."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
 
-def _angle_axis(dumper: _Dumper, value: _AngleAxis) -> yaml.Node:
+def _angle_axis(dumper: _DirectivesDumper, value: _AngleAxis) -> yaml.Node:
     return dumper.represent_mapping("!AngleAxis", value.items(), flow_style=True)
 
 
-_Dumper.add_representer(_AngleAxis, _angle_axis)
+_DirectivesDumper.add_representer(_AngleAxis, _angle_axis)
 
 
 def _add(name: str, file: str) -> dict[str, Any]:

@@ -10,9 +10,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from burg_drake.core.errors import DocumentError, InvalidInputError, listing
+from burg_drake.core import DocumentError, InvalidInputError, listing
+from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
-from burg_drake.core.schema import load_document, save_document
 
 RECORD_FILE = "export.yaml"
 """Says what an export is of, and which files it wrote: those are replaced by the next one."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
-from burg_drake.core.packages import NO_PACKAGES, Packages
-from burg_drake.objects.entry import ObjectEntry
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
-from burg_drake.station.surroundings import FixedBox, obstacle_boxes, table_box
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.core.paths import NO_PACKAGES, Packages
+from burg_drake.objects.library import ObjectEntry, ObjectLibrary
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+from burg_drake.station.world import FixedBox, obstacle_boxes, table_box
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
-from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
+from burg_drake.core.files import IMAGE_SIZE, read_bytes
 
 _MTL = re.compile(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)
 _MAP = re.compile(rb"^[ \t]*(?:map_\w+|bump|disp|decal|norm)[ \t]+(.+?)[ \t\r]*$", re.MULTILINE)

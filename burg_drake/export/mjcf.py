@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from burg_drake.core import Array, quaternion_from_rotation
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array, quaternion_from_rotation
 from burg_drake.export.layout import Layout, PlacedObject
 from burg_drake.export.legal_names import LegalNames, model_name
 from burg_drake.export.mjcf_assets import MjcfAssets
-from burg_drake.objects.entry import Primitive
-from burg_drake.station.surroundings import FixedBox
+from burg_drake.objects.library import Primitive
+from burg_drake.station.world import FixedBox
 
 MJCF_FILE = "scene.xml"
 

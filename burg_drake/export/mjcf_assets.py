@@ -10,9 +10,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from burg_drake.core.files import atomic_write
-from burg_drake.export.visual_parts import VisualPart, collision_meshes, visual_parts
-from burg_drake.objects.entry import ObjectEntry
-from burg_drake.objects.library import ObjectLibrary
+from burg_drake.export.parts import VisualPart, collision_meshes, visual_parts
+from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 
 OBJECTS = "objects"
 """Folder with one folder an object."""

@@ -6,13 +6,13 @@ from copy import deepcopy
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from burg_drake.core import Array, quaternion_from_rotation
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array, quaternion_from_rotation
-from burg_drake.export.box_model import box_model
 from burg_drake.export.layout import Layout
 from burg_drake.export.legal_names import LegalNames, model_name
-from burg_drake.export.object_model import object_model, sdf_document
-from burg_drake.objects.sdf import LINK
+from burg_drake.export.sdf_box import box_model
+from burg_drake.export.sdf_object import object_model, sdf_document
+from burg_drake.objects.library import LINK
 
 WORLD_FILE = "world.sdf"
 OBJECTS = "objects"

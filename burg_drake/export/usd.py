@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
-from burg_drake.core.frames import quaternion_from_rotation
+from burg_drake.core import quaternion_from_rotation
 from burg_drake.export.layout import Layout, PlacedObject
 from burg_drake.export.legal_names import LegalNames
 from burg_drake.export.usd_object import write_object
 from burg_drake.export.usd_stage import bind_color, bind_friction, box_prim, new_stage, place
-from burg_drake.objects.entry import MassProperties
-from burg_drake.station.surroundings import FixedBox
+from burg_drake.objects.library import MassProperties
+from burg_drake.station.world import FixedBox
 
 USD_FILE = "scene.usda"
 OBJECTS = "objects"

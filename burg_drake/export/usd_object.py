@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
+from burg_drake.export.parts import VisualPart, collision_meshes, visual_parts
 from burg_drake.export.usd_stage import bind_color, bind_friction, box_prim, new_stage, place
-from burg_drake.export.visual_parts import VisualPart, collision_meshes, visual_parts
-from burg_drake.objects.entry import ObjectEntry, Primitive
-from burg_drake.objects.library import ObjectLibrary
+from burg_drake.objects.library import ObjectEntry, ObjectLibrary, Primitive
 
 ROOT = "/Object"
 

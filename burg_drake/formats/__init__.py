@@ -1,1 +1,5 @@
 """Documents of other projects, read into plain data; needs nothing but `core`."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

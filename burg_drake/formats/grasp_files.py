@@ -6,23 +6,21 @@ import importlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from burg_drake.core.damaged import reading
-from burg_drake.core.document_text import GRASP_FILE, read_text
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.documents import checked_events, load_json
+from burg_drake.core.files import GRASP_FILE, read_text, reading
 from burg_drake.core.grasps import GraspSet
-from burg_drake.core.json_text import load_json
-from burg_drake.core.yaml_events import checked_events
-from burg_drake.formats.grasp_format import PANDA, GraspFormat, Gripper, Imported
+from burg_drake.formats.common import PANDA, GraspFormat, Gripper, ImportedGrasps
 
 MODULES = {
-    "burg_drake": "burg_drake_grasps",
+    "burg_drake": "burg_drake",
     "acronym": "acronym",
     "isaac_grasp": "isaac_grasp",
     "graspgen": "graspgen",
     "graspgen_yaml": "graspgen_yaml",
     "graspnet": "graspnet",
     "vgn": "vgn",
-    "burg": "burg_grasps",
+    "burg": "burg_toolkit",
 }
 """Module of each format in this package, in the order in which files are tried."""
 
@@ -33,7 +31,7 @@ class _Formats(Mapping[str, GraspFormat]):
     def __getitem__(self, name: str) -> GraspFormat:
         if name not in MODULES:
             raise UnknownNameError(f"there is no grasp format {name!r}; {nearest(name, MODULES)}")
-        module = importlib.import_module(f"burg_drake.formats.{MODULES[name]}")
+        module = importlib.import_module(f"burg_drake.formats.grasps.{MODULES[name]}")
         found: GraspFormat = module.FORMAT
         return found
 
@@ -50,7 +48,7 @@ FORMATS: Mapping[str, GraspFormat] = _Formats()
 
 def read_grasp_file(
     path: str | Path, format: str | None = None, gripper: Gripper = PANDA
-) -> Imported:
+) -> ImportedGrasps:
     """Reads grasps in any format.
 
     Args:

@@ -1,1 +1,5 @@
 """Scenes by the thousand: drawn from a recipe, settled, accepted or not, kept in a folder."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -17,12 +17,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.files import atomic_write, open_regular, remove_unfinished, writable_folder
-from burg_drake.core.schema import load_document, save_document
+from burg_drake.core import DocumentError, InvalidInputError
+from burg_drake.core.documents import load_document, save_document
+from burg_drake.core.files import (
+    atomic_write,
+    open_regular,
+    remove_unfinished,
+    writable_folder,
+)
 from burg_drake.generation.sample import SampledScene
-from burg_drake.scene.origin import Ingredients
-from burg_drake.scene.scene import SceneDocument, save_scene
+from burg_drake.scene.document import Ingredients, SceneDocument, save_scene
 
 RECIPE_FILE = "recipe.yaml"
 TABLE_FILE = "scenes.csv"
@@ -32,7 +36,7 @@ LONGEST_TABLE = 1 << 28
 
 
 @dataclass(frozen=True)
-class Row:
+class SceneRow:
     """What the table tells of a number.
 
     Attributes:
@@ -54,7 +58,7 @@ class Row:
     refused: Mapping[str, int]
 
     @classmethod
-    def of(cls, sampled: SampledScene) -> Row:
+    def of(cls, sampled: SampledScene) -> SceneRow:
         """The row of a scene."""
         return cls(
             sampled.number,
@@ -84,7 +88,7 @@ class Row:
         return line.getvalue()
 
     @classmethod
-    def read(cls, fields: Mapping[str, str]) -> Row:
+    def read(cls, fields: Mapping[str, str]) -> SceneRow:
         """Reads a line.
 
         Raises:
@@ -171,7 +175,7 @@ class SceneFolder:
         """
         if sampled.accepted:
             save_scene(sampled.scene.document, self.file(sampled.number))
-        row = Row.of(sampled)
+        row = SceneRow.of(sampled)
         try:
             with self._table.open("a", encoding="utf-8") as stream:
                 stream.write(row.text())
@@ -208,7 +212,7 @@ def _require_sound(path: Path) -> None:
         raise DocumentError(f"{error}; mend it, or delete it and it is made again") from error
 
 
-def read_table(path: Path) -> list[Row]:
+def read_table(path: Path) -> list[SceneRow]:
     """The rows of a table; lines that cannot be read, such as a torn last one, count as not there.
 
     Raises:
@@ -222,7 +226,7 @@ def read_table(path: Path) -> list[Row]:
     rows = []
     for fields in csv.DictReader(io.StringIO(whole)):
         try:
-            rows.append(Row.read(fields))
+            rows.append(SceneRow.read(fields))
         except (ValueError, KeyError, TypeError, AttributeError):
             continue
     return rows

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from burg_drake.core.crew import serve, work_through
-from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.evaluation.judge import one_line
-from burg_drake.generation.folder import Row, SceneFolder
+from burg_drake.core import InvalidInputError, SimulationError
+from burg_drake.core.workers import serve, work_through
+from burg_drake.evaluation.stages import one_line
+from burg_drake.generation.folder import SceneFolder, SceneRow
 from burg_drake.generation.sample import (
     SampledScene,
     SceneSampler,
@@ -18,13 +18,12 @@ from burg_drake.generation.sample import (
     require_possible,
 )
 from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.origin import Ingredients
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.station.station import Station, load_station
+from burg_drake.scene.document import Ingredients, SceneRecipe
+from burg_drake.station.document import Station, load_station
 
 
 @dataclass(frozen=True)
-class Kitchen:
+class SamplingInputs:
     """Where a recipe's scenes are made: all that a worker needs to know.
 
     Attributes:
@@ -42,10 +41,10 @@ class Kitchen:
 
 
 @dataclass(frozen=True)
-class Work:
+class SceneTask:
     """A scene to sample: where, and its number."""
 
-    kitchen: Kitchen
+    kitchen: SamplingInputs
     number: int
 
 
@@ -60,7 +59,7 @@ class SampledFolder:
             the next time.
     """
 
-    rows: dict[int, Row]
+    rows: dict[int, SceneRow]
     new: tuple[int, ...]
     failed: dict[int, str]
 
@@ -94,7 +93,7 @@ def sample_scenes(
     ingredients = ingredients_of(recipe, library, station)
     with SceneFolder(folder, ingredients) as opened:
         kitchen = _kitchen(ingredients, library, station, opened.path)
-        todo = [Work(kitchen, number) for number in range(count) if number not in opened.rows]
+        todo = [SceneTask(kitchen, number) for number in range(count) if number not in opened.rows]
         if known is not None:
             known(count - len(todo))
         new: list[int] = []
@@ -114,7 +113,7 @@ def sample_scenes(
     return SampledFolder(rows, tuple(sorted(new)), failed)
 
 
-def attempt(work: Work) -> SampledScene | BaseException:
+def attempt(work: SceneTask) -> SampledScene | BaseException:
     """Samples one scene; what cannot be simulated is one failure."""
     try:
         return _sampler(work.kitchen).sample(work.number, work.kitchen.folder)
@@ -131,13 +130,13 @@ def main(handle: int) -> None:
 
 def _kitchen(
     ingredients: Ingredients, library: ObjectLibrary, station: Station, folder: Path
-) -> Kitchen:
+) -> SamplingInputs:
     contents = (ingredients.library_content, ingredients.station_content)
-    return Kitchen(ingredients.recipe, library.root, station.path, contents, folder)
+    return SamplingInputs(ingredients.recipe, library.root, station.path, contents, folder)
 
 
 @lru_cache(maxsize=1)
-def _sampler(kitchen: Kitchen) -> SceneSampler:
+def _sampler(kitchen: SamplingInputs) -> SceneSampler:
     """The sampler that a process keeps from scene to scene.
 
     Raises:

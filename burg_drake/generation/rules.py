@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from burg_drake.cameras.visibility import visible_from
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
-from burg_drake.evaluation.scene_acceptance import clear_grasp_counts, within_reach
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.cameras.projection import visible_from
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+from burg_drake.evaluation.stages import clear_grasp_counts, within_reach
+from burg_drake.scene.document import Scene, SceneRecipe
+from burg_drake.station.document import Station
 
 OUT_OF_REACH = "an object is out of the arm's reach"
 FEW_GRASPS = "an object has too few clear grasps"

@@ -13,21 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.content import content_hash, rng_from
-from burg_drake.evaluation.run_document import HASH_DIGITS, software_versions
-from burg_drake.generation.pile import pile
+from burg_drake.core import content_hash, rng_from
+from burg_drake.evaluation.records import HASH_DIGITS, software_versions
+from burg_drake.generation.heap import pile
 from burg_drake.generation.rules import broken_rule, require_rules
 from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import Wanted
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.origin import Ingredients, SceneOrigin
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.scene.scene import Scene, SceneDocument
-from burg_drake.simulation.settle_scene import settle_scene
-from burg_drake.station.boxes import boxes_in_scene
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import MODEL_NAMES, Station, load_station
+from burg_drake.scene.arrangement import ObjectRequest, ObjectShapes, arrange, choose
+from burg_drake.scene.document import Ingredients, Scene, SceneDocument, SceneOrigin, SceneRecipe
+from burg_drake.simulation.settling import settle_scene
+from burg_drake.station.checks import SceneCheck
+from burg_drake.station.document import MODEL_NAMES, Station, boxes_in_scene, load_station
 
 NO_ROOM = "an object found no place"
 REASONS = {
@@ -225,7 +220,7 @@ def require_possible(recipe: SceneRecipe, library: ObjectLibrary, station: Stati
 
 def _chosen(
     recipe: SceneRecipe, library: ObjectLibrary, station: Station, rng: np.random.Generator
-) -> tuple[Wanted, ...]:
+) -> tuple[ObjectRequest, ...]:
     return choose(
         library,
         recipe.count,

@@ -1,1 +1,5 @@
 """Whether the arm can bring the hand to a grasp."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

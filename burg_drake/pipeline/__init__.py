@@ -1,1 +1,5 @@
 """Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -15,11 +15,16 @@ from pathlib import Path
 
 import trimesh
 
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.objects.entry import ObjectEntry
-from burg_drake.objects.library import LIBRARY_FILE, LibraryDocument, ObjectLibrary, load_library
+from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.objects.library import (
+    LIBRARY_FILE,
+    LibraryDocument,
+    ObjectEntry,
+    ObjectLibrary,
+    load_library,
+)
 from burg_drake.pipeline.keys import StageKeys, stage_keys
-from burg_drake.pipeline.pool import Work, build_all
+from burg_drake.pipeline.pool import BuildTask, build_all
 from burg_drake.pipeline.source import ObjectSource, object_name
 from burg_drake.pipeline.stages import Built, is_current
 from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_folder
@@ -110,7 +115,7 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
             todo.append((source, keys))
     with scratch_folder(root) as scratch:
         work = [
-            Work(s, keys, root, scratch / s.name, _confirms(s, confirm))
+            BuildTask(s, keys, root, scratch / s.name, _confirms(s, confirm))
             for s, keys in _longest_first(todo)
         ]
         try:

@@ -10,12 +10,11 @@ from typing import Literal
 
 import numpy as np
 
-from burg_drake.core.errors import BurgError, MeshError
-from burg_drake.objects.entry import ObjectEntry
-from burg_drake.objects.fit import coarse_note
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.objects.mass import implausible
+from burg_drake.core import BurgError, MeshError
+from burg_drake.objects.collision import coarse_note
+from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 from burg_drake.objects.meshes import mesh_hash
+from burg_drake.objects.physics import implausible
 from burg_drake.pipeline.record import (
     Record,
     entry_hash,
@@ -171,7 +170,7 @@ def drake_complaint(sdf: Path) -> str:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    from burg_drake.station.model_file import add_models, held_remarks  # imports Drake
+    from burg_drake.station.world import add_models, held_remarks  # imports Drake
 
     plant, graph = MultibodyPlant(0.001), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(graph)

@@ -8,10 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import trimesh
 
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.decompose import Pieces, convex_pieces, given_pieces
-from burg_drake.objects.entry import Decomposition, Fit
-from burg_drake.objects.fit import coarseness, describe_fit, measure_fit
+from burg_drake.core import MeshError
+from burg_drake.objects.collision import (
+    Pieces,
+    coarseness,
+    convex_pieces,
+    describe_fit,
+    given_pieces,
+    measure_fit,
+)
+from burg_drake.objects.library import Decomposition, Fit
 from burg_drake.objects.meshes import SurfaceMesh
 from burg_drake.pipeline.source import ObjectSource
 

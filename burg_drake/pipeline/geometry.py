@@ -12,25 +12,31 @@ from typing import Any, cast
 import numpy as np
 import trimesh
 
+from burg_drake.core import Array
+from burg_drake.core.documents import Vector3
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array
-from burg_drake.core.schema import Vector3
-from burg_drake.objects.contact import contact_geometry
-from burg_drake.objects.entry import (
+from burg_drake.objects.collision import contact_geometry, primitive_mesh
+from burg_drake.objects.library import (
     DEFAULT_FRICTION,
     ContactGeometry,
+    LibraryDocument,
     ObjectEntry,
+    ObjectLibrary,
     Source,
     StablePose,
+    model_sdf,
+    write_piece,
+    write_visual,
 )
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary
-from burg_drake.objects.mass import Solid, mass_properties, solid_of_pieces, solid_of_surface
 from burg_drake.objects.meshes import Preparation, SurfaceMesh, load_mesh, texture_image
-from burg_drake.objects.obj_file import write_piece, write_visual
-from burg_drake.objects.primitive import primitive_mesh
-from burg_drake.objects.sdf import model_sdf
-from burg_drake.objects.shell import solid_of_shell
-from burg_drake.objects.stable_poses import stable_poses
+from burg_drake.objects.physics import (
+    Solid,
+    mass_properties,
+    solid_of_pieces,
+    solid_of_shell,
+    solid_of_surface,
+    stable_poses,
+)
 from burg_drake.pipeline.cutting import Cut, cut
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import Geometry, intact, read_record
@@ -149,7 +155,7 @@ def _confirmed(
 
     The object's own mass and friction do not enter: the test sets its own.
     """
-    from burg_drake.simulation.resting import confirm_poses  # imports Drake
+    from burg_drake.simulation.settling import confirm_poses  # imports Drake
 
     properties = mass_properties(geometry.solid, center_of_mass=source.center_of_mass)
     name = source.name

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.core.content import content_hash
-from burg_drake.objects.mass import DEFAULT_DENSITY
+from burg_drake.core import content_hash
+from burg_drake.objects.library import DEFAULT_CONTACT
 from burg_drake.objects.meshes import mesh_hash
-from burg_drake.objects.sdf import DEFAULT_CONTACT
+from burg_drake.objects.physics import DEFAULT_DENSITY
 from burg_drake.pipeline.cutting import FINER, MOST_PIECES
 from burg_drake.pipeline.source import ObjectSource, check_source
 

@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core.crew import serve, work_through
-from burg_drake.core.errors import SimulationError
+from burg_drake.core import SimulationError
+from burg_drake.core.workers import serve, work_through
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.stages import Built, build_object
 
 
 @dataclass(frozen=True)
-class Work:
+class BuildTask:
     """An object to build.
 
     Attributes:
@@ -35,12 +35,12 @@ class Work:
 Outcome = Built | BaseException
 
 
-def build_all(work: Sequence[Work], workers: int) -> Iterator[tuple[Work, Outcome]]:
+def build_all(work: Sequence[BuildTask], workers: int) -> Iterator[tuple[BuildTask, Outcome]]:
     """Builds objects; see `core.crew.work_through`."""
     return work_through(work, workers, __name__, attempt)
 
 
-def attempt(item: Work) -> Outcome:
+def attempt(item: BuildTask) -> Outcome:
     """Builds one object; one broken mesh is one failure, whatever it broke."""
     try:
         item.folder.mkdir()

@@ -27,14 +27,11 @@ from typing import Any, Literal, cast
 
 import yaml
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.names import require_name
-from burg_drake.core.reader import Reader
-from burg_drake.core.schema import Vector3
-from burg_drake.core.yaml_nodes import load_nodes
-from burg_drake.objects.entry import ContactKind, Decomposition, Inertia
+from burg_drake.core import InvalidInputError
+from burg_drake.core.documents import Reader, Vector3, load_nodes
+from burg_drake.core.paths import require_name
+from burg_drake.objects.library import ContactKind, Decomposition, Inertia, Rgba
 from burg_drake.objects.meshes import UNITS
-from burg_drake.objects.obj_file import Rgba
 from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource, Openings, object_name
 
 Unit = Literal["mm", "cm", "m", "in"]

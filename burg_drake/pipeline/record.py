@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.errors import DocumentError
+from burg_drake.core import DocumentError
+from burg_drake.core.documents import Vector3, load_document, load_json, plain_data
 from burg_drake.core.files import atomic_write
-from burg_drake.core.json_text import load_json
-from burg_drake.core.schema import Vector3, load_document, plain_data
-from burg_drake.objects.entry import ContactGeometry, Fit, ObjectEntry, StablePose
-from burg_drake.objects.mass import Solid
+from burg_drake.objects.library import ContactGeometry, Fit, ObjectEntry, StablePose
+from burg_drake.objects.physics import Solid
 from burg_drake.pipeline.keys import VERSION, StageKeys
 
 RECORD_FILE = "build.json"

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.names import name_from
-from burg_drake.formats.burg_scene import BurgInstance, BurgScene
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.paths import name_from
+from burg_drake.formats.collections import BurgInstance, BurgScene
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.pipeline.source import object_name
-from burg_drake.scene.markers import Markers
-from burg_drake.scene.scene import Board, Instance, SceneDocument
-from burg_drake.station.station import MODEL_NAMES
+from burg_drake.scene.document import Board, Instance, Markers, SceneDocument
+from burg_drake.station.document import MODEL_NAMES
 
 
 @dataclass(frozen=True)

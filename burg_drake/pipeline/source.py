@@ -9,11 +9,9 @@ from typing import Any, Literal
 
 import trimesh
 
-from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError, quoted
-from burg_drake.core.schema import Vector3
-from burg_drake.objects.entry import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
-from burg_drake.objects.obj_file import Rgba
+from burg_drake.core import InvalidInputError, content_hash, quoted
+from burg_drake.core.documents import Vector3
+from burg_drake.objects.library import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia, Rgba
 
 Openings = Literal["wall", "close"]
 

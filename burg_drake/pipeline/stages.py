@@ -12,10 +12,16 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.files import atomic_write
-from burg_drake.objects.entry import Decomposition, MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.objects.fit import coarse_note
-from burg_drake.objects.mass import DEFAULT_DENSITY, implausible, mass_properties
-from burg_drake.objects.sdf import model_sdf
+from burg_drake.objects.collision import coarse_note
+from burg_drake.objects.library import (
+    Decomposition,
+    MassProperties,
+    ObjectEntry,
+    Source,
+    StablePose,
+    model_sdf,
+)
+from burg_drake.objects.physics import DEFAULT_DENSITY, implausible, mass_properties
 from burg_drake.pipeline.geometry import MESH_FILE, build_geometry
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import (

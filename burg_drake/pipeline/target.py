@@ -16,7 +16,7 @@ from pathlib import Path
 
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.objects.library import LIBRARY_FILE
 from burg_drake.pipeline.record import is_object_folder

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array
 from burg_drake.printout.board_edge import draw_edge, draw_origin
 from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
 from burg_drake.printout.page_frame import Caption, draw_page_frame
@@ -22,9 +21,7 @@ from burg_drake.printout.paper import PAPERS, Paper, orientations
 from burg_drake.printout.pen import POINT, WHITE, Pen, rectangle
 from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
 from burg_drake.printout.tiling import Tile, Tiling, tile_board
-from burg_drake.scene.markers import EDGE, MarkerLayout
-from burg_drake.scene.scene import Scene
-from burg_drake.scene.validate import validate_scene
+from burg_drake.scene.document import EDGE, MarkerLayout, Scene, validate_scene
 
 MEASURED = (0.080, 0.125)
 """What a printed ruler of 100 mm can measure [m]; else it was read in another unit."""
@@ -95,7 +92,7 @@ class Printout:
             that scales as `measured` says puts in its true place.
         """
         tile = self.tiling.tiles[page - 1]
-        return (np.asarray(p_SQ)[..., :2] + tile.p_PS) * _stretch(self.settings)
+        return (np.asarray(p_SQ)[..., :2] + tile.p_PS) * _scale_correction(self.settings)
 
     def save(self, path: str | Path) -> None:
         """Writes the PDF.
@@ -231,13 +228,13 @@ def _without_white(size: tuple[float, float], layout: MarkerLayout) -> list[str]
     ]
 
 
-def _stretch(settings: PrintSettings) -> Array:
+def _scale_correction(settings: PrintSettings) -> Array:
     """How much larger all is drawn along x and y."""
     return 0.1 / np.array(settings.measured)
 
 
 def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings) -> bytes:
-    stretch, paper = _stretch(settings), tiling.paper
+    stretch, paper = _scale_correction(settings), tiling.paper
     stream = io.BytesIO()
     page_size = tuple((stretch * [paper.width, paper.height] / POINT).tolist())
     canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)

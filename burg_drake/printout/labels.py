@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 from burg_drake.printout.projection import Grid, Layer
 
 STEP = 0.5e-3

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 from burg_drake.printout.projection import Layer
 
 SMOOTHING = 0.6

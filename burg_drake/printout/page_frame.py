@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 from burg_drake.printout.paper import BOTTOM_STRIP, Paper
 from burg_drake.printout.pen import (
     BOLD,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
 
 PAPERS = {
     "A4": (0.210, 0.297),

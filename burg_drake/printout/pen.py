@@ -9,7 +9,7 @@ import numpy as np
 from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import FILL_EVEN_ODD, FILL_NON_ZERO, Canvas
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 from burg_drake.printout.tints import Rgb
 
 POINT = 0.0254 / 72

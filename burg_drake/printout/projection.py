@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 
 CHUNK = 2_000_000
 """Pixels that are painted at a time; bounds the memory."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core import Array
 from burg_drake.printout.board_edge import ORIGIN
 from burg_drake.printout.drawings import Arrow, Drawing
 from burg_drake.printout.labels import FreeSpace
@@ -29,7 +29,7 @@ from burg_drake.printout.pen import (
 )
 from burg_drake.printout.tiling import BLEED, Tiling
 from burg_drake.printout.tints import Rgb
-from burg_drake.scene.markers import MarkerLayout
+from burg_drake.scene.document import MarkerLayout
 
 FRAME = 3e-3
 """Width of a marker's white frame [m], where the gap between markers is wide enough."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.printout.paper import PAPERS, Paper, orientations
-from burg_drake.scene.markers import MarkerLayout
+from burg_drake.scene.document import MarkerLayout
 
 MOST_PAGES = 100
 """A board of more is a mistake in its size."""

@@ -3,3 +3,7 @@
 All but two modules (`ros1`, `ros2`) know messages only as objects with fields, and neither
 imports ROS nor cv_bridge, whose compiled part is bound to one version of OpenCV and numpy.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.board_pose import BoardPose
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.overlay import Overlay
-from burg_drake.cameras.text_tags import notice
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.overlay import Overlay, notice
+from burg_drake.cameras.pose import BoardEstimate, BoardPose
+from burg_drake.core import InvalidInputError
 from burg_drake.ros.camera_info import intrinsics_of
 from burg_drake.ros.images import pixels
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.document import Scene
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

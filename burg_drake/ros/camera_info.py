@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.cameras.intrinsics import HALF_PIXEL, Intrinsics
-from burg_drake.cameras.intrinsics_file import ROS_MODELS
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras.optics import HALF_PIXEL, ROS_MODELS, Intrinsics
+from burg_drake.core import InvalidInputError
 
 
 def intrinsics_of(message: Any, *, rectified: bool = False) -> Intrinsics:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from burg_drake.core.errors import MissingDependencyError
+from burg_drake.core import MissingDependencyError
 from burg_drake.ros.link import Link, Names
 
 CLIENTS = {1: "rospy", 2: "rclpy"}

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.image_file import decode_image
-from burg_drake.core.errors import InvalidInputError, listing
+from burg_drake.cameras.sources import decode_image
+from burg_drake.core import InvalidInputError, listing
 
 
 @dataclass(frozen=True)

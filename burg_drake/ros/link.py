@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.ros.board_node import Sighting
 from burg_drake.ros.messages import (
     MessageClasses,

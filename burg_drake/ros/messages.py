@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array, inverse, quaternion_from_rotation
+from burg_drake.core import Array, inverse, quaternion_from_rotation
 from burg_drake.ros.board_node import Sighting
 from burg_drake.ros.images import jpeg
 

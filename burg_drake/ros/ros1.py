@@ -9,7 +9,7 @@ import xmlrpc.client
 from collections.abc import Mapping
 from typing import Any
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.ros.link import Link, Names, Publications
 from burg_drake.ros.messages import message_classes
 

@@ -11,37 +11,37 @@ from typing import Any, Protocol
 
 import viser
 
-from burg_drake.compose.session import ComposeSession
-from burg_drake.compose.view import View
+from burg_drake.compose import ComposeSession
+from burg_drake.compose.editing import SessionView
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.ui.arrange_panel import ArrangePanel
-from burg_drake.ui.backdrop_panel import BackdropPanel
-from burg_drake.ui.board_layers import BoardLayers
-from burg_drake.ui.board_panel import BoardPanel
-from burg_drake.ui.board_view import BoardView
-from burg_drake.ui.check_panel import CheckPanel
-from burg_drake.ui.display_panel import DisplayPanel
-from burg_drake.ui.file_panel import FilePanel
-from burg_drake.ui.fill_panel import FillPanel
-from burg_drake.ui.ghost_view import GhostView
-from burg_drake.ui.gizmo import Gizmo
-from burg_drake.ui.grasp_panel import GraspPanel
-from burg_drake.ui.key_calls import selection_calls
-from burg_drake.ui.library_panel import LibraryPanel
-from burg_drake.ui.object_drags import ObjectDrags
-from burg_drake.ui.object_panel import ObjectPanel
-from burg_drake.ui.object_pictures import ObjectPictures
-from burg_drake.ui.object_shapes import ObjectShapes
-from burg_drake.ui.page_actions import PageActions
-from burg_drake.ui.panel_text import style
-from burg_drake.ui.picking import Picking
-from burg_drake.ui.pose_panel import PosePanel
-from burg_drake.ui.reach_panel import ReachPanel
-from burg_drake.ui.scene_view import SceneView, Shown
-from burg_drake.ui.settle_panel import SettlePanel
-from burg_drake.ui.shortcuts import Call, register, show_overlay
-from burg_drake.ui.summary_panel import SummaryPanel
-from burg_drake.ui.views import begin_with
+from burg_drake.ui.panels import (
+    ArrangePanel,
+    BackdropPanel,
+    BoardPanel,
+    CheckPanel,
+    DisplayPanel,
+    FilePanel,
+    FillPanel,
+    GraspPanel,
+    LibraryPanel,
+    ObjectPanel,
+    PosePanel,
+    ReachPanel,
+    SettlePanel,
+    SummaryPanel,
+)
+from burg_drake.ui.pointing import Gizmo, ObjectDrags, Picking, selection_calls
+from burg_drake.ui.view import (
+    BoardLayers,
+    BoardView,
+    GhostView,
+    ObjectMeshes,
+    ObjectPictures,
+    SceneView,
+    Shown,
+    begin_with,
+)
+from burg_drake.ui.widgets import Call, PageActions, register, show_overlay, style
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
@@ -51,7 +51,7 @@ BLUE = (34, 139, 230)
 class _Panel(Protocol):
     """Shows a view of the session."""
 
-    def show(self, view: View) -> None: ...
+    def show(self, view: SessionView) -> None: ...
 
 
 class SetupPage:
@@ -70,7 +70,7 @@ class SetupPage:
         self._server, self._session = server, session
         view = session.view
         self._pictures = self._pictures_of(view.library)
-        self._shapes = ObjectShapes(view.library)
+        self._shapes = ObjectMeshes(view.library)
         self._set_stage(view)
         self._board = BoardView(server.scene, session.station)
         self._layers = BoardLayers(server.scene)
@@ -93,7 +93,7 @@ class SetupPage:
         self._backdrop.close()
         self._pictures.close()
 
-    def _set_stage(self, view: View) -> None:
+    def _set_stage(self, view: SessionView) -> None:
         scene, gui = self._server.scene, self._server.gui
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -194,7 +194,7 @@ class SetupPage:
         if view.library is not self._shapes.library:
             self._pictures.close()
             self._pictures = self._pictures_of(view.library)
-            self._shapes = ObjectShapes(view.library)
+            self._shapes = ObjectMeshes(view.library)
             self._scene.use(self._shapes)
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
@@ -212,7 +212,7 @@ class SetupPage:
         self._gizmo.drop(client.client_id)
 
 
-def _shown(view: View) -> dict[str, Shown]:
+def _shown(view: SessionView) -> dict[str, Shown]:
     fixed = {id(instance) for instance in view.document.background}
     return {
         name: Shown(

@@ -14,9 +14,9 @@ from pathlib import Path
 from pydrake.geometry import Meshcat
 
 from burg_drake.core.files import atomic_write
-from burg_drake.visualization.camera_aim import VIEW_ASPECT
-from burg_drake.visualization.grasp_picker import GraspPicker
-from burg_drake.visualization.legend import SCRIPT, STYLE, ColorBar, LegendEntry, legend_html
+from burg_drake.visualization.grasps import GraspPicker
+from burg_drake.visualization.meshcat import VIEW_ASPECT
+from burg_drake.visualization.style import SCRIPT, STYLE, ColorBar, LegendEntry, legend_html
 
 PANE = '<div id="meshcat-pane">'
 """How Meshcat's element for the view begins in its page; what is in it ends before a script."""

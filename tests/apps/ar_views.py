@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 
-from burg_drake.cameras.frame_source import Frame, FrameSource
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.sources.frame import Frame, FrameSource
 from burg_drake.core.frames import make_pose
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
+from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
 X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.3, 0.21, 0.6))

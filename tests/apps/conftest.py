@@ -9,9 +9,9 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.store.run_folder import Run
 
 SCENE = """\
 version: 1

@@ -13,19 +13,19 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps import ar
+from burg_drake.apps.ar import verb
 from burg_drake.apps.cli import main
-from burg_drake.apps.interrupts import terminated_as_interrupted
-from burg_drake.cameras.event_log import EventLog
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import save_intrinsics
-from burg_drake.cameras.live_session import LiveSession
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.session import Session
-from burg_drake.cameras.snapshot import load_snapshot
-from burg_drake.cameras.view_actions import ViewActions
-from burg_drake.scene.scene import load_scene
+from burg_drake.apps.terminal.interrupts import terminated_as_interrupted
+from burg_drake.cameras.live.actions import ViewActions
+from burg_drake.cameras.live.event_log import EventLog
+from burg_drake.cameras.live.frame_processing import FrameProcessor
+from burg_drake.cameras.live.recording_table import read_poses
+from burg_drake.cameras.live.session import LiveSession
+from burg_drake.cameras.live.snapshot import load_snapshot
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.scene.document.scene import load_scene
 from tests.apps.ar_views import CAMERA, TIMEOUT, Camera, photo
 
 TWO = """\
@@ -192,14 +192,14 @@ def test_a_recording_replaces_nothing(
 
 def test_the_end_waits_for_a_placement_check(tmp_path: Path) -> None:
     (tmp_path / "two.yaml").write_text(TWO)
-    session = Session(load_scene(tmp_path / "two.yaml"), CAMERA)
+    session = FrameProcessor(load_scene(tmp_path / "two.yaml"), CAMERA)
     live = LiveSession(session, Camera(photo()), events=EventLog())
     actions = ViewActions(live, tmp_path)
     live.on_frame(lambda picture: actions.start_check())
     parser = argparse.ArgumentParser()
-    ar.add_to(parser.add_subparsers())
+    verb.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["ar", "two", "--no-browser", "--frames", "1"])
-    assert ar._run(arguments, live, actions) == 0
+    assert verb._run(arguments, live, actions) == 0
     assert not actions.checking and live.placement is not None
 
 

@@ -14,22 +14,22 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.ar_viewer.server import PAGES, ViewServer
-from burg_drake.cameras.event_log import EventLog
-from burg_drake.cameras.live_session import LiveSession
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.session import Session
-from burg_drake.cameras.snapshot import load_snapshot
-from burg_drake.cameras.view_actions import ViewActions
+from burg_drake.apps.ar.server import PAGES, ViewServer
+from burg_drake.cameras.live.actions import ViewActions
+from burg_drake.cameras.live.event_log import EventLog
+from burg_drake.cameras.live.frame_processing import FrameProcessor
+from burg_drake.cameras.live.recording_table import read_poses
+from burg_drake.cameras.live.session import LiveSession
+from burg_drake.cameras.live.snapshot import load_snapshot
+from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 from tests.apps.ar_views import CAMERA, TIMEOUT, X_SC, Camera, photo
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewServer]:
-    session = Session(load_scene("tabletop_six"), CAMERA)
+    session = FrameProcessor(load_scene("tabletop_six"), CAMERA)
     live = LiveSession(session, Camera(photo()), events=EventLog())
     server = ViewServer(live, ViewActions(live, tmp_path_factory.mktemp("shots")), port=0)
     live.start()
@@ -92,7 +92,7 @@ def test_page_needs_nothing_from_elsewhere(server: ViewServer) -> None:
 def test_page_has_what_its_script_looks_for() -> None:
     from importlib.resources import files as package_files
 
-    folder = package_files("burg_drake.apps.ar_viewer")
+    folder = package_files("burg_drake.apps.ar")
     script, page = ((folder / name).read_text() for name in ("page.js", "page.html"))
     wanted = {part.split('"')[0] for part in script.split('$("')[1:]}
     assert len(wanted) > 20

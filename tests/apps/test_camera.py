@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.camera import field_of_view
+from burg_drake.apps.camera.verbs import field_of_view
 from burg_drake.apps.cli import main
-from burg_drake.cameras.charuco import CharucoTarget
-from burg_drake.cameras.frame_source import Image
-from burg_drake.cameras.image_file import write_image
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import load_intrinsics, save_intrinsics
-from burg_drake.cameras.opencv_log import quiet
+from burg_drake.cameras.calibration.target import CharucoTarget
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import load_intrinsics, save_intrinsics
+from burg_drake.cameras.sources.frame import Image
+from burg_drake.cameras.sources.image_file import write_image
+from burg_drake.cameras.sources.opencv_log import quiet
 
 Capture = pytest.CaptureFixture[str]
 TRUTH = Intrinsics(width=320, height=240, focal=(330.0, 332.0), center=(163.0, 117.0))

@@ -11,18 +11,18 @@ import pytest
 import yaml
 from PIL import Image
 
-from burg_drake.apps.arguments import Parser, add_group
-from burg_drake.apps.camera_locate import add_to
-from burg_drake.cameras.intrinsics import of_camera
-from burg_drake.cameras.intrinsics_file import save_intrinsics
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.apps.camera.locate import add_to
+from burg_drake.apps.options.arguments import Parser, add_group
+from burg_drake.cameras.optics.intrinsics import of_camera
+from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import rotation_angle
-from burg_drake.core.resources import resolve
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 from burg_drake.system_libraries import missing_render_libraries
+from tests.cameras.synthetic import board_image
 
 Capture = pytest.CaptureFixture[str]
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import save_intrinsics
-from burg_drake.cameras.placement_document import load_placement
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
+from burg_drake.cameras.placement.document import load_placement
 from burg_drake.core.frames import make_pose
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.placement_views import looking
+from tests.cameras.synthetic import board_image
 
 Capture = pytest.CaptureFixture[str]
 INTRINSICS = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
@@ -49,7 +49,7 @@ def folder(tmp_path: Path) -> Path:
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
 )
 def test_a_photo_becomes_a_table_a_document_and_a_picture(folder: Path, capsys: Capture) -> None:
-    from burg_drake.cameras.placement_photo import ScenePhotographer
+    from tests.cameras.placement_photo import ScenePhotographer
 
     scene = load_scene(folder / "two.yaml")
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.29, 0.21, 0.7))  # straight down

@@ -12,19 +12,20 @@ import sys
 import pytest
 
 from burg_drake import __version__
-from burg_drake.apps import cli, evaluate
-from burg_drake.apps.arguments import (
+from burg_drake.apps import cli
+from burg_drake.apps.options.arguments import (
     DEFAULT_APPROACH_ANGLE,
     DEFAULT_ENGINE,
     DEFAULT_STATION,
     ENGINE_NAMES,
     SCENE_NAMES,
 )
+from burg_drake.apps.runs import evaluate
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.resources import builtin_names
-from burg_drake.evaluation.candidate_sampling import DEFAULT_APPROACH_ANGLE_DEG
-from burg_drake.evaluation.mode import MODES
-from burg_drake.station.engine import ENGINES
+from burg_drake.core.paths.resources import builtin_names
+from burg_drake.evaluation.candidates.sampling import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.evaluation.stages.mode import MODES
+from burg_drake.station.document.engine import ENGINES
 
 GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"], ["trials"])
 HELP = (
@@ -153,7 +154,7 @@ def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
     def fail(arguments: object) -> int:
         raise error
 
-    monkeypatch.setattr("burg_drake.apps.report.run_report", fail)
+    monkeypatch.setattr("burg_drake.apps.runs.report.run_report", fail)
     return cli.main(["report", "somewhere"])
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import build_parser, main
-from burg_drake.apps.grasp_file import DEFAULT_HAND
+from burg_drake.apps.options.grasp_file import DEFAULT_HAND
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
 
 Capture = pytest.CaptureFixture[str]
 

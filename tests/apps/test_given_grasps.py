@@ -9,14 +9,14 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.apps import evaluate, evaluate_many
 from burg_drake.apps.cli import main
+from burg_drake.apps.runs import campaign, evaluate
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 Capture = pytest.CaptureFixture[str]
 
@@ -109,11 +109,11 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
     scene = load_scene("tabletop_six")
     arguments = parser.parse_args(["evaluate", scene.name, "--grasps", str(path)])
     with pytest.raises(InvalidInputError) as error:
-        evaluate_many._FileOfScenes(arguments, station)(scene)
+        campaign._FileOfScenes(arguments, station)(scene)
     assert "and does not say of which; evaluate that scene alone" in str(error.value)
     arguments.grasps = str(tmp_path / "no scene ids.npz")  # another error is not taken for it
     with pytest.raises(InvalidInputError, match=r"no scene ids\.npz does not exist"):
-        evaluate_many._FileOfScenes(arguments, station)(scene)
+        campaign._FileOfScenes(arguments, station)(scene)
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import build_parser, main
-from burg_drake.apps.given_grasps import read_given
-from burg_drake.apps.grasp_file import named_gripper
+from burg_drake.apps.options.given_grasps import read_given
+from burg_drake.apps.options.grasp_file import named_gripper
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 Capture = pytest.CaptureFixture[str]
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.grasp_output import output_of
+from burg_drake.apps.options.grasp_output import output_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
 
 
 @pytest.fixture(autouse=True)

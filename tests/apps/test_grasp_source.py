@@ -7,9 +7,9 @@ import argparse
 import numpy as np
 import pytest
 
-from burg_drake.apps.grasp_source import open_source, source_of
+from burg_drake.apps.grasps.source import open_source, source_of
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 
 
 def options(scene: str | None = None, library: str | None = None) -> argparse.Namespace:

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from burg_drake.apps import cli
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.resources import resolve
-from burg_drake.evaluation.run_store import Run
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.paths.resources import resolve
+from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.formats.grasp_files import FORMATS
 
 DOWN = np.array(

@@ -10,17 +10,17 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.apps import reach
 from burg_drake.apps.cli import build_parser, main
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidate_files import read_grasps
-from burg_drake.evaluation.candidate_sampling import sample_candidates
-from burg_drake.evaluation.candidates import given_candidates
-from burg_drake.evaluation.scored_set import scored_set
+from burg_drake.apps.runs import reach
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.candidates import given_candidates
+from burg_drake.evaluation.candidates.sampling import sample_candidates
+from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
+from burg_drake.evaluation.grasp_sets.scored import scored_set
 from burg_drake.formats.grasp_files import read_grasp_file
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 TILTED = """\
 version: 1
@@ -157,9 +157,9 @@ def test_a_folder_gets_a_file_an_object(scene_file: Path, tmp_path: Path, capsys
 def test_nothing_is_sampled_in_vain(
     scene_file: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from burg_drake.evaluation import candidate_sampling
+    from burg_drake.evaluation.candidates import sampling
 
-    monkeypatch.delattr(candidate_sampling, "sample_scene")
+    monkeypatch.delattr(sampling, "sample_scene")
     (tmp_path / "file").write_text("")
     for out, message in (
         (("x.h5", "--to", "acronym"), "the grasps are of 2 objects (bottle, mug)"),

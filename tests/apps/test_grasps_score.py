@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps import grasps_score
 from burg_drake.apps.cli import main
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.run_store import Run
-from burg_drake.grasping.quality import DEFAULT_METRIC, METRICS
+from burg_drake.apps.grasps import score as score_verb
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.grasping.quality.metrics import DEFAULT_METRIC, METRICS
 
 Capture = pytest.CaptureFixture[str]
 
@@ -135,4 +135,4 @@ def test_a_scene_tells_collisions(scene_file: Path, tmp_path: Path, capsys: Capt
 
 
 def test_help_is_in_step_with_the_metrics() -> None:
-    assert grasps_score.DEFAULT_METRIC == DEFAULT_METRIC
+    assert score_verb.DEFAULT_METRIC == DEFAULT_METRIC

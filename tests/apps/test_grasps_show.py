@@ -12,11 +12,11 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.run_store import Run
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 Capture = pytest.CaptureFixture[str]
 N = 12

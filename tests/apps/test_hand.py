@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.core.resources import builtin_names, resolve
+from burg_drake.core.paths.resources import builtin_names, resolve
 
 Capture = pytest.CaptureFixture[str]
 

@@ -18,17 +18,16 @@ from typing import Any
 
 import pytest
 
-from burg_drake.apps.lab_page.server import PAGES, LabServer
-from burg_drake.apps.trials_serve import _kept_secret as kept_secret
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.apps.trials.lab_page.server import PAGES, LabServer
+from burg_drake.apps.trials.serve import _kept_secret as kept_secret
+from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.pages.lab_book import LabBook
-from burg_drake.experiment.pages.picture_shelf import PictureShelf
+from burg_drake.experiment.pages.picture_cache import PictureCache
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.entries import journal_path, read_entries
 from burg_drake.experiment.trials.sheet import load_trials
-from tests.experiment.pages.conftest import made as made
-from tests.experiment.pages.conftest import trials as trials
+from tests.experiment.pages.conftest import made as made, trials as trials
 
 TIMEOUT = 60.0
 TIME = "2026-05-05T10:02:11+02:00"
@@ -38,7 +37,7 @@ TIME = "2026-05-05T10:02:11+02:00"
 def server(trials: Path) -> Iterator[LabServer]:
     """Without pictures, which have tests of their own."""
     runs = TriedRuns(trials)
-    server = LabServer(LabBook(runs), PictureShelf(runs), port=0)
+    server = LabServer(LabBook(runs), PictureCache(runs), port=0)
     server.start()
     yield server
     server.close()
@@ -142,7 +141,7 @@ def test_other_sites_and_broken_requests_are_refused(server: LabServer, trials: 
 
 def test_other_machines_need_the_token(trials: Path) -> None:
     runs = TriedRuns(trials)
-    server = LabServer(LabBook(runs), PictureShelf(runs), host="0.0.0.0", port=0, secret="s" * 40)
+    server = LabServer(LabBook(runs), PictureCache(runs), host="0.0.0.0", port=0, secret="s" * 40)
     server.start()
     try:
         port = server.server_address[1]
@@ -227,7 +226,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
 def serve_again(trials: Path, port: int) -> LabServer:
     """The program started again, in this process."""
     runs = TriedRuns(trials)
-    server = LabServer(LabBook(runs), PictureShelf(runs), port=port)
+    server = LabServer(LabBook(runs), PictureCache(runs), port=port)
     server.start()
     return server
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from burg_drake.apps.cli import main
-from burg_drake.objects.library import load_library
+from burg_drake.objects.library.document import load_library
 
 Capture = pytest.CaptureFixture[str]
 

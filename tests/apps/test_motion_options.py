@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.apps.arguments import Parser
 from burg_drake.apps.cli import main
-from burg_drake.apps.motion_options import LONGEST_MM, add_motion, chosen_motion
-from burg_drake.station.grasp_motion import RANGES, GraspMotion
-from burg_drake.station.station import load_station
+from burg_drake.apps.options.arguments import Parser
+from burg_drake.apps.options.hand_motion import LONGEST_MM, add_motion, chosen_motion
+from burg_drake.station.document.grasp_motion import RANGES, GraspMotion
+from burg_drake.station.document.station_document import load_station
 
 
 def test_lengths_are_those_of_a_document() -> None:

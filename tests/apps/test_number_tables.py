@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps import number_tables
 from burg_drake.apps.cli import main
-from burg_drake.core.figures import figure
+from burg_drake.apps.terminal import number_tables
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.terminal.number_text import figure
 
 Capture = pytest.CaptureFixture[str]
 

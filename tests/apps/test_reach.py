@@ -10,9 +10,9 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.resources import resolve
-from burg_drake.evaluation.table_file import read_table
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.paths.resources import resolve
+from burg_drake.evaluation.records.table_file import read_table
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

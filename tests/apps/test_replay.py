@@ -16,14 +16,14 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import table_row, trial_columns
-from burg_drake.evaluation.table_file import read_table, write_table
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.station.engine import ENGINES
+from burg_drake.evaluation.records.table import table_row, trial_columns
+from burg_drake.evaluation.records.table_file import read_table, write_table
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.station.document.engine import ENGINES
 
 SCENE = """\
 version: 1
@@ -171,8 +171,8 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
 def test_a_trial_with_another_friction_is_replayed_with_it(
     run: Run, tmp_path: Path, capsys: Capture
 ) -> None:
-    from burg_drake.evaluation.judge import trial_verdict
-    from burg_drake.evaluation.run_document import origin_of
+    from burg_drake.evaluation.records.run_document import origin_of
+    from burg_drake.evaluation.stages.judge import trial_verdict
 
     trial = dataclasses.replace(run.trial(run.candidates.id[0]), friction=0.01, mass=0.5)
     result = HandTrial(run.scene(), run.station(), engine=ENGINE).run(

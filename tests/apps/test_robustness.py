@@ -8,24 +8,23 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps import robustness
 from burg_drake.apps.cli import main
-from burg_drake.core.columns import describe
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.progress import Progress
-from burg_drake.evaluation import probes
-from burg_drake.evaluation import robustness as tested
-from burg_drake.evaluation.journal import Journal, read_journal
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.probes import RobustnessSettings
-from burg_drake.evaluation.robustness import assess_robustness
-from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.simulation.friction_limit import friction_limit
-from burg_drake.simulation.grip import Grip, take_grip
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.hold_force import tug
-from burg_drake.simulation.perturbation import success_rate
+from burg_drake.apps.runs import robustness
+from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.terminal.progress import Progress
+from burg_drake.evaluation.records.journal import Journal, read_journal
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.robustness import assessment as tested, probes
+from burg_drake.evaluation.robustness.assessment import assess_robustness
+from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.stages.judge import Verdict
+from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.simulation.robustness.friction_search import friction_limit
+from burg_drake.simulation.robustness.grip import Grip, take_grip
+from burg_drake.simulation.robustness.hold_force import tug
+from burg_drake.simulation.robustness.perturbation import success_rate
+from burg_drake.simulation.trials.hand_trial import HandTrial
 
 Capture = pytest.CaptureFixture[str]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.core.resources import builtin_names, resolve
-from burg_drake.scene.scene import load_scene
+from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.scene.document.scene import load_scene
 
 Capture = pytest.CaptureFixture[str]
 

@@ -9,12 +9,12 @@ import pytest
 import yaml
 
 from burg_drake.apps.cli import main
-from burg_drake.core.resources import builtin_names
-from burg_drake.motion.usable_arm import require_usable_arm
+from burg_drake.core.paths.resources import builtin_names
+from burg_drake.motion.workspace.usable_arm import require_usable_arm
 from burg_drake.pipeline.check import check_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.check import check_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.document.station_document import load_station
 from tests.apps.burg_kitchen import write_kitchen
 
 Capture = pytest.CaptureFixture[str]

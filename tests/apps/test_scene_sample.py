@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps import recipe_options
 from burg_drake.apps.cli import main
-from burg_drake.scene.layout import LAYOUTS, TRIES
-from burg_drake.scene.recipe import ATTEMPTS, SceneRecipe
-from burg_drake.scene.scene import load_scene
+from burg_drake.apps.scene import recipe
+from burg_drake.scene.document.layout import LAYOUTS, TRIES
+from burg_drake.scene.document.recipe import ATTEMPTS, SceneRecipe
+from burg_drake.scene.document.scene import load_scene
 
 SAMPLE = ("scene", "sample", "household", "--no-settle", "--quiet")
 Captured = pytest.CaptureFixture[str]
@@ -94,7 +94,7 @@ def test_what_cannot_be(arguments: list[str], message: str, capsys: Captured) ->
 
 
 def test_options_are_in_step_with_recipes() -> None:
-    assert set(recipe_options.SPACINGS) | {"random", "packed", "heap"} == set(LAYOUTS)
-    assert recipe_options.DEFAULT_TRIES == TRIES
-    assert recipe_options.DEFAULT_ATTEMPTS == ATTEMPTS
-    assert SceneRecipe(library="household").count == recipe_options.DEFAULT_COUNT
+    assert set(recipe.SPACINGS) | {"random", "packed", "heap"} == set(LAYOUTS)
+    assert recipe.DEFAULT_TRIES == TRIES
+    assert recipe.DEFAULT_ATTEMPTS == ATTEMPTS
+    assert SceneRecipe(library="household").count == recipe.DEFAULT_COUNT

@@ -110,9 +110,9 @@ def test_small_files_of_huge_pictures_are_refused() -> None:
     program = """
 import io
 from PIL import Image
-from burg_drake.apps.setup import bound_pictures
+from burg_drake.apps.scene.setup import bound_pictures
 bound_pictures()
-from burg_drake.cameras.image_file import decode_image
+from burg_drake.cameras.sources.image_file import decode_image
 for side in (1000, 12_000):
     file = io.BytesIO()
     Image.new("1", (side, side)).save(file, "png")

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.core.resources import builtin_names, resolve
-from burg_drake.motion import reachability
+from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.motion.workspace import reachability
 
 Capture = pytest.CaptureFixture[str]
 

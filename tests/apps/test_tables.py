@@ -12,31 +12,31 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from burg_drake.apps.camera_placement import placement_table
-from burg_drake.apps.grasp_tables import comparison_table, ranking_table, summary_table
-from burg_drake.apps.grasps_sample import sampled_table
-from burg_drake.apps.library_view import library_table
-from burg_drake.apps.number_tables import number_table
-from burg_drake.apps.reach_tables import outcome_table, print_tables, reach_table
-from burg_drake.apps.scene import displacement_table
-from burg_drake.cameras.placement_document import Placement
+from burg_drake.apps.camera.placement import placement_table
+from burg_drake.apps.grasps.sample import sampled_table
+from burg_drake.apps.grasps.stats_tables import comparison_table, ranking_table, summary_table
+from burg_drake.apps.library.viewing import library_table
+from burg_drake.apps.runs.reach_tables import outcome_table, print_tables, reach_table
+from burg_drake.apps.scene.verbs import displacement_table
+from burg_drake.apps.terminal.number_tables import number_table
+from burg_drake.cameras.placement.document import Placement
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.schema import Pose
-from burg_drake.core.text_table import TextTable
-from burg_drake.evaluation.probes import RobustnessSettings
-from burg_drake.evaluation.robustness_table import GraspRobustness, robustness_view
-from burg_drake.evaluation.summary import Group, StageCost, Summary
-from burg_drake.evaluation.summary_tables import SummaryView
-from burg_drake.grasping.comparison import compare_grasps, summarize
-from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.ranking import rank_by
-from burg_drake.objects.library import load_library
-from burg_drake.simulation.displacement import Displacement
-from burg_drake.simulation.hold_force import AXES, DIRECTIONS, HoldForces
-from burg_drake.simulation.perturbation import SuccessRate
-from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.terminal.text_table import TextTable
+from burg_drake.evaluation.results.summary import OutcomeCounts, StageCost, Summary
+from burg_drake.evaluation.results.summary_tables import SummaryView
+from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_view
+from burg_drake.grasping.comparison.score_ranking import rank_by
+from burg_drake.grasping.comparison.summary import compare_grasps, summarize
+from burg_drake.grasping.similarity.neighbour_search import Tolerance
+from burg_drake.objects.library.document import load_library
+from burg_drake.simulation.rest.displacement import Displacement
+from burg_drake.simulation.robustness.hold_force import AXES, DIRECTIONS, HoldForces
+from burg_drake.simulation.robustness.perturbation import SuccessRate
+from burg_drake.station.document.grasp_motion import GraspMotion
 
 NAME = "a_scanned_thing_with_a_name_of_sixty_characters_from_a_robot"
 VALUES = (1e-9, 1e9, math.nan, math.inf, -123456.789, 0.0)
@@ -144,7 +144,7 @@ def test_numbers_are_whole_and_lines_fit(name: str, width: int) -> None:
 def test_a_summary_fits(mode: str, width: int) -> None:
     counts = Counter({Outcome.LIFTED: MANY, Outcome.COLLISION_BACKGROUND: 1})
     decided = Counter({Stage.EXECUTED: MANY, Stage.CLEAR: 1})
-    groups = [Group(n, MANY + 1, counts, decided, Counter()) for n in (NAME, "mug", "all")]
+    groups = [OutcomeCounts(n, MANY + 1, counts, decided, Counter()) for n in (NAME, "mug", "all")]
     costs = (StageCost("clear", MANY, 1e9, 1e-9), StageCost("executed", MANY, 1e-9, math.nan))
     summary = Summary(tuple(groups[:2]), groups[2], costs, mode)  # type: ignore[arg-type]
     stream = io.StringIO()

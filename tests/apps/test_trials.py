@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps import trials_plan
 from burg_drake.apps.cli import main
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import save_intrinsics
-from burg_drake.cameras.placement_document import load_placement
+from burg_drake.apps.trials import plan
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
+from burg_drake.cameras.placement.document import load_placement
 from burg_drake.core.frames import make_pose
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import Among, RealTrial, Success, load_trials
@@ -60,7 +60,7 @@ def trial(sheet: Path, number: int) -> RealTrial:
 
 
 def test_choices_are_those_of_the_sheet() -> None:
-    assert get_args(Among) == trials_plan.AMONG and get_args(Success) == trials_plan.SUCCESS
+    assert get_args(Among) == plan.AMONG and get_args(Success) == plan.SUCCESS
 
 
 def test_plan_tells_what_was_chosen_and_what_it_will_tell(planned: Path, capsys: Capture) -> None:
@@ -180,8 +180,8 @@ def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
 )
 def test_a_photo_is_measured_and_kept(sheet: Path, capsys: Capture) -> None:
-    from burg_drake.cameras.placement_photo import ScenePhotographer
-    from burg_drake.scene.scene import load_scene
+    from burg_drake.scene.document.scene import load_scene
+    from tests.cameras.placement_photo import ScenePhotographer
 
     folder = sheet.parent
     scene = load_scene(folder / "run" / "scene.yaml")

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from burg_drake.printout.board_printout import PrintSettings, print_board
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 from tests.printout.paper import rasterised
 
 DPI = 100

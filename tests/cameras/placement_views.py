@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
 from burg_drake.core.frames import Array, make_pose
 
 INTRINSICS = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
@@ -20,6 +20,6 @@ def looking(p_SC: Array, p_ST: Array) -> Array:
 
 
 X_SC = looking(np.array([0.85, 0.62, 0.58]), np.array([0.297, 0.21, 0.03]))
-VIEW = View(INTRINSICS.K, (640, 480), X_SC)
+VIEW = PinholeView(INTRINSICS.K, (640, 480), X_SC)
 NOTHING = np.full((480, 640), np.inf)
 """Depth of other objects where there are none."""

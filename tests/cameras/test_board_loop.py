@@ -12,18 +12,18 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt
 
-from burg_drake.cameras.board_loop import BoardLoop, build_board_loop
-from burg_drake.cameras.line_drawing import OUTLINE, visible_lines
-from burg_drake.cameras.overlay_style import OverlayStyle
-from burg_drake.cameras.pose_filter import PoseFilter
-from burg_drake.cameras.scene_shape import scene_shape
-from burg_drake.cameras.view import FieldOfView
+from burg_drake.cameras.optics.field_of_view import FieldOfView
+from burg_drake.cameras.overlay.style import OverlayStyle
+from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
+from burg_drake.cameras.projection.scene_mesh import build_scene_mesh
+from burg_drake.cameras.systems.board_loop import BoardLoop, build_board_loop
+from burg_drake.cameras.systems.pose_filter import PoseFilter
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle, rotation_from_rpy
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Board, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Camera, Station, load_station
+from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Camera, Station, load_station
 from burg_drake.system_libraries import missing_render_libraries
 
 pytestmark = pytest.mark.skipif(
@@ -154,7 +154,7 @@ def test_outlines_are_on_the_edges_that_drake_renders(
     away = distance_transform_edt(~grid) / (2 * fine)  # in pixels of the camera
 
     X_SC = output(loop, context, "board.X_SC")
-    lines = visible_lines(scene_shape(scene), FieldOfView(loop.intrinsics), X_SC)
+    lines = visible_lines(build_scene_mesh(scene), FieldOfView(loop.intrinsics), X_SC)
     middle = lines.ends[lines.kind == OUTLINE].mean(axis=1)
     column, row = np.round(2 * (fine * (middle + 0.5) - 0.5)).astype(int).T
     inside = (column >= 0) & (row >= 0) & (column < grid.shape[1]) & (row < grid.shape[0])

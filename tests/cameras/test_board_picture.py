@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_looks import board_looks
-from burg_drake.cameras.board_picture import BoardPicture, BoardRectifier, board_picture
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.sources import open_source
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.rectification.stream import board_looks
+from burg_drake.cameras.rectification.top_view import BoardPicture, BoardRectifier, board_picture
+from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, transform_points
-from burg_drake.scene.markers import Markers
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.markers import Markers
+from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import view
 from tests.cameras.live_views import Pictures
 from tests.cameras.paper_photos import photo, shown_at

@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.board_pose import BoardPose, estimate_board
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import Look, board_depth, board_image, covers_of
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.pose.estimator import BoardPose, estimate_board
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.markers import Markers
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.markers import Markers
+from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, SMALL, error, view
+from tests.cameras.synthetic import ImageDegradation, board_depth, board_image, covers_of
 
 BOARD = Board()
 LITTLE = Board(size=(0.3, 0.21))  # 4 x 3 markers
@@ -68,7 +68,9 @@ def test_hidden_markers_and_noise(
 ) -> None:
     rng = np.random.default_rng(3)
     covers, seen = covers_of(BOARD.layout, share, rng)
-    image = board_image(BOARD, CAMERA, VIEW, covers=covers, look=Look(noise=4.0, blur=0.6), rng=rng)
+    image = board_image(
+        BOARD, CAMERA, VIEW, covers=covers, look=ImageDegradation(noise=4.0, blur=0.6), rng=rng
+    )
     estimate = poses.estimate(image)
     assert near(estimate, VIEW, mm, degrees), 1e3 * error(estimate.X_SC, VIEW)
     assert set(estimate.ids) <= set(seen)
@@ -92,7 +94,7 @@ def test_a_lens_that_distorts() -> None:
 
 def test_the_covariance_is_that_of_the_errors() -> None:
     board_pose, rng = BoardPose(LITTLE, SMALL), np.random.default_rng(0)
-    image = board_image(LITTLE, SMALL, NEAR, look=Look(blur=0.6)).astype(float)
+    image = board_image(LITTLE, SMALL, NEAR, look=ImageDegradation(blur=0.6)).astype(float)
     normalised = []
     for _ in range(40):
         noisy = np.clip(np.rint(image + rng.normal(0.0, 8.0, image.shape)), 0, 255)
@@ -234,7 +236,7 @@ def test_one_small_marker_has_two_poses() -> None:
     board = Board(size=(0.1, 0.1), markers=Markers(count=(1, 1), side=0.03))
     far = view((0.05, 0.05), 0.8, 5.0, 30.0, 10.0)
     rng = np.random.default_rng(0)
-    image = board_image(board, CAMERA, far, look=Look(noise=10.0, blur=0.8), rng=rng)
+    image = board_image(board, CAMERA, far, look=ImageDegradation(noise=10.0, blur=0.8), rng=rng)
     estimate = estimate_board(image, CAMERA, board)
     assert not estimate.valid
     assert estimate.reason == (

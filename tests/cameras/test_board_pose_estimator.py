@@ -9,12 +9,12 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ZeroOrderHold
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
-from burg_drake.cameras.board_pose import BoardPose
-from burg_drake.cameras.board_pose_estimator import BoardPoseEstimator
-from burg_drake.cameras.synthetic import board_depth, board_image
+from burg_drake.cameras.pose.estimator import BoardPose
+from burg_drake.cameras.systems.pose_estimator import BoardPoseEstimator
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import SMALL, error, view
+from tests.cameras.synthetic import board_depth, board_image
 
 BOARD = Board(size=(0.3, 0.21))
 ONE = view((0.15, 0.1), 0.4, 25.0, 200.0, 100.0)

@@ -8,17 +8,22 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.calibration import Calibration, calibrate, calibrate_views, displacement
-from burg_drake.cameras.calibration_check import advice, coverage, is_useless
-from burg_drake.cameras.calibration_live import ViewCollector
-from burg_drake.cameras.charuco import CharucoTarget, CharucoView
-from burg_drake.cameras.charuco_image import target_image
-from burg_drake.cameras.frame_source import Frame
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.lens_fit import fit_lens
-from burg_drake.cameras.lens_uncertainty import image_grid, uncertainty
+from burg_drake.cameras.calibration.estimation import (
+    Calibration,
+    calibrate,
+    calibrate_views,
+    displacement,
+)
+from burg_drake.cameras.calibration.lens_fit import fit_lens
+from burg_drake.cameras.calibration.lens_uncertainty import image_grid, uncertainty
+from burg_drake.cameras.calibration.quality import advice, coverage, is_useless
+from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
+from burg_drake.cameras.calibration.view_collector import ViewCollector
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.sources.frame import Frame
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, make_pose
+from tests.cameras.charuco_image import target_image
 
 TARGET = CharucoTarget()
 PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 604.0), center=(325.0, 236.0))

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.cameras.camera_source import CameraSource
-from burg_drake.cameras.frame_source import CameraLost, Frame, FrameSource, Image
-from burg_drake.cameras.image_file import write_image
-from burg_drake.cameras.sources import open_source
+from burg_drake.cameras.sources.frame import CameraLost, Frame, FrameSource, Image
+from burg_drake.cameras.sources.image_file import write_image
+from burg_drake.cameras.sources.opening import open_source
+from burg_drake.cameras.systems.camera_source import CameraSource
 from burg_drake.core.errors import InvalidInputError
 
 

@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.charuco import CharucoTarget, CharucoView, find_target
-from burg_drake.cameras.charuco_image import target_image
-from burg_drake.cameras.charuco_sheet import upper_left, write_target
-from burg_drake.cameras.frame_source import Image
-from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, find_target
+from burg_drake.cameras.calibration.target_sheet import upper_left, write_target
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.sources.frame import Image
 from burg_drake.core.errors import BurgError, InvalidInputError
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.printout.board_printout import PrintSettings
+from tests.cameras.charuco_image import target_image
 from tests.printout.paper import rasterised
 
 TARGET = CharucoTarget()

@@ -5,16 +5,16 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from burg_drake.cameras.board_pose import grey_image
-from burg_drake.cameras.detection import MarkerDetector, other_markers
-from burg_drake.cameras.edge_refinement import moved
-from burg_drake.cameras.edge_views import view_edges
-from burg_drake.cameras.marker_edges import REACH, marker_edges
-from burg_drake.cameras.quadrilaterals import read_cells
-from burg_drake.cameras.synthetic import board_image
-from burg_drake.scene.markers import Markers, marker_dictionary
-from burg_drake.scene.scene import Board
+from burg_drake.cameras.pose.detection import MarkerDetector, other_markers
+from burg_drake.cameras.pose.edge_projection import view_edges
+from burg_drake.cameras.pose.edges import REACH, marker_edges
+from burg_drake.cameras.pose.estimator import grey_image
+from burg_drake.cameras.pose.quadrilaterals import read_cells
+from burg_drake.cameras.pose.refinement import perturbed_pose
+from burg_drake.scene.document.markers import Markers, marker_dictionary
+from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import SMALL, view
+from tests.cameras.synthetic import board_image
 
 BOARD = Board(size=(0.3, 0.21), markers=Markers(first_id=20))
 NEAR = view((0.15, 0.105), 0.52, 20.0, 200.0, 100.0)
@@ -128,7 +128,8 @@ def test_motion_and_print_are_derivatives() -> None:
     h = 1e-5
     for k, unit in enumerate(np.eye(6)):
         ahead, back = (
-            view_edges(edges, views.which, lens, moved(NEAR, s * h * unit)) for s in (1, -1)
+            view_edges(edges, views.which, lens, perturbed_pose(NEAR, s * h * unit))
+            for s in (1, -1)
         )
         change = ((ahead.at - back.at) * normal).sum(axis=1) / (2 * h)
         assert np.allclose(change, views.motion[:, k], rtol=1e-3, atol=0.05), k
@@ -140,7 +141,7 @@ def test_motion_and_print_are_derivatives() -> None:
 def test_a_point_in_sight_stays_while_the_camera_turns_about_it() -> None:
     point, turn = np.array([0.15, 0.1, 0.0]), np.array([0.1, -0.2, 0.15])
     arm = NEAR[:3, 3] - point
-    X_SC = moved(NEAR, np.r_[turn, np.cross(turn, arm)], point)
+    X_SC = perturbed_pose(NEAR, np.r_[turn, np.cross(turn, arm)], point)
     before, after = ((point - X[:3, 3]) @ X[:3, :3] for X in (NEAR, X_SC))
     assert np.allclose(before, after)
-    assert np.allclose(moved(NEAR, np.r_[turn, 0, 0, 0])[:3, 3], NEAR[:3, 3])
+    assert np.allclose(perturbed_pose(NEAR, np.r_[turn, 0, 0, 0])[:3, 3], NEAR[:3, 3])

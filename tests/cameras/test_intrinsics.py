@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pydrake.systems.sensors import CameraInfo
 
-from burg_drake.cameras.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
+from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import Pose
-from burg_drake.station.station import Camera
+from burg_drake.station.document.station_document import Camera
 
 PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 610.0), center=(315.0, 241.0))
 RADIAL = replace(PINHOLE, distortion=(-0.3, 0.1, 0.001, -0.002, -0.01))

@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import load_intrinsics, save_camera_info, save_intrinsics
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import (
+    load_intrinsics,
+    save_camera_info,
+    save_intrinsics,
+)
 from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError
 
 RADIAL = Intrinsics(

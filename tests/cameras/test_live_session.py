@@ -11,23 +11,23 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras import sources_device
-from burg_drake.cameras.event_log import EventLog
-from burg_drake.cameras.frame_reader import FrameReader
-from burg_drake.cameras.frame_source import Frame, FrameSource
-from burg_drake.cameras.live_session import LiveSession
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.session import (
-    Session,
+from burg_drake.cameras.live.actions import ViewActions
+from burg_drake.cameras.live.event_log import EventLog
+from burg_drake.cameras.live.frame_processing import (
+    FrameProcessor,
     ViewSettings,
 )
-from burg_drake.cameras.sources import open_source
-from burg_drake.cameras.synthetic import board_image
-from burg_drake.cameras.view_actions import ViewActions
+from burg_drake.cameras.live.frame_reader import FrameReader
+from burg_drake.cameras.live.recording_table import read_poses
+from burg_drake.cameras.live.session import LiveSession
+from burg_drake.cameras.sources import device
+from burg_drake.cameras.sources.frame import Frame, FrameSource
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene, load_scene
 from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines, until
+from tests.cameras.synthetic import board_image
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +36,8 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def session(scene: Scene) -> Session:
-    return Session(scene, CAMERA)
+def session(scene: Scene) -> FrameProcessor:
+    return FrameProcessor(scene, CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def video(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def live(session: Session) -> Iterator[Callable[..., LiveSession]]:
+def live(session: FrameProcessor) -> Iterator[Callable[..., LiveSession]]:
     """Makes sessions, which are closed in the end."""
     made: list[LiveSession] = []
 
@@ -199,8 +199,8 @@ def test_one_image_of_another_size_is_left_out(
     assert told.startswith("picture 2 has 320 x 238 pixels, the intrinsics are of 320 x 240")
 
 
-def test_another_resolution_is_refused(session: Session, video: Path) -> None:
-    other = Session(session.scene, replace(CAMERA, width=640))
+def test_another_resolution_is_refused(session: FrameProcessor, video: Path) -> None:
+    other = FrameProcessor(session.scene, replace(CAMERA, width=640))
     source = open_source(video)
     with pytest.raises(InvalidInputError, match="320 x 240 pixels, the intrinsics are of 640"):
         LiveSession(other, source, events=EventLog())
@@ -211,15 +211,15 @@ def test_a_lost_camera_is_told_once_and_comes_back(
     live: Callable[..., LiveSession], video: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """OpenCV reads the video as it reads a camera; at its end the camera is gone for a while."""
-    monkeypatch.setattr(sources_device, "PATIENCE", 0.05)
-    monkeypatch.setattr(sources_device, "FIRST_WAIT", 0.05)
+    monkeypatch.setattr(device, "PATIENCE", 0.05)
+    monkeypatch.setattr(device, "FIRST_WAIT", 0.05)
     gone = [True]
 
     def plug_in() -> cv2.VideoCapture | None:
         return None if gone[0] else cv2.VideoCapture(str(video))
 
     gone[0] = False
-    source = sources_device.DeviceSource("camera 7", plug_in)
+    source = device.DeviceSource("camera 7", plug_in)
     gone[0] = True
     log = EventLog()
     running = live(source, events=log)

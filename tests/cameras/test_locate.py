@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.board_pose import estimate_board
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.locate import locate_camera
-from burg_drake.cameras.synthetic import Look, board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.pose.camera_location import locate_camera
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.pose.estimator import estimate_board
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_angle, rotation_from_rpy
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Board
-from burg_drake.station.station import Station, load_station
+from burg_drake.scene.document.scene import Board
+from burg_drake.station.document.station_document import Station, load_station
+from tests.cameras.synthetic import ImageDegradation, board_image
 
 K = Intrinsics(width=640, height=480, focal=(600.0, 602.0), center=(318.0, 241.0))
 X_SC = make_pose(rotation_from_rpy(np.deg2rad([165.0, 8.0, 30.0])), (0.25, 0.08, 0.75))
@@ -32,7 +32,7 @@ def station() -> Station:
 def test_place_in_the_world(station: Station) -> None:
     """From two noisy images."""
     rng = np.random.default_rng(0)
-    clean = board_image(Board(), K, X_SC, look=Look(blur=0.7)).astype(float)
+    clean = board_image(Board(), K, X_SC, look=ImageDegradation(blur=0.7)).astype(float)
     noisy = [clean + rng.normal(0.0, 3.0, clean.shape) for _ in range(2)]
     images = [np.clip(np.round(image), 0, 255).astype(np.uint8) for image in noisy]
     located = locate_camera(station, [estimate_board(i, K, Board()) for i in images], K)

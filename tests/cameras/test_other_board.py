@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_pose import BoardPose
-from burg_drake.cameras.other_board import OtherBoard
-from burg_drake.cameras.synthetic import Look, board_image, covers_of
-from burg_drake.scene.markers import Markers
-from burg_drake.scene.scene import Board
+from burg_drake.cameras.pose.estimator import BoardPose
+from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
+from burg_drake.scene.document.markers import Markers
+from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import SMALL, error, view
+from tests.cameras.synthetic import ImageDegradation, board_image, covers_of
 
 BOARD = Board(size=(0.3, 0.24))  # 4 x 3 markers
 VIEW = view((0.15, 0.1), 0.55, 25.0, 40.0, 15.0)
@@ -55,7 +55,9 @@ def test_more_rows_than_the_document_has() -> None:
     ],
 )
 def test_fewer_rows_are_a_doubt(poses: BoardPose, markers: Markers, row: int, count: str) -> None:
-    image = board_image(replace(BOARD, markers=markers), SMALL, VIEW, look=Look(gradient=0.3))
+    image = board_image(
+        replace(BOARD, markers=markers), SMALL, VIEW, look=ImageDegradation(gradient=0.3)
+    )
     estimate = poses.estimate(image)
     assert estimate.valid
     assert estimate.reason == (
@@ -67,10 +69,10 @@ def test_fewer_rows_are_a_doubt(poses: BoardPose, markers: Markers, row: int, co
 def test_this_board_gives_no_alarm(poses: BoardPose) -> None:
     rng = np.random.default_rng(4)
     looks = [
-        Look(),
-        Look(gain=0.2, noise=3.0),
-        Look(blur=1.8, noise=2.0),
-        Look(gradient=0.6, noise=6.0),
+        ImageDegradation(),
+        ImageDegradation(gain=0.2, noise=3.0),
+        ImageDegradation(blur=1.8, noise=2.0),
+        ImageDegradation(gradient=0.6, noise=6.0),
     ]
     valid = 0
     for k in range(12):
@@ -106,6 +108,6 @@ def test_frames_are_looked_at_where_the_ring_is() -> None:
     X_SC = VIEW.copy()  # marker 5 of the sheet stands where the board of one has its own
     X_SC[:3, 3] -= BOARD.layout.p_SQ[5].mean(axis=0) - one.layout.p_SQ[0].mean(axis=0)
     grey = board_image(BOARD, SMALL, VIEW)[:, :, 1]
-    said = OtherBoard(one, SMALL, (1.0, 1.0)).beyond(grey, X_SC, 200.0)
+    said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, X_SC, 200.0)
     assert "ids 0, 1, 2 ..." in said
-    assert not OtherBoard(BOARD, SMALL, (1.0, 1.0)).beyond(grey, VIEW, 200.0)
+    assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, VIEW, 200.0)

@@ -9,27 +9,27 @@ import trimesh
 from numpy.typing import NDArray
 
 import burg_drake as burg
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.line_drawing import INNER, OUTLINE, Lines, visible_lines
-from burg_drake.cameras.overlay import Overlay, instance_labels
-from burg_drake.cameras.overlay_style import OverlayStyle
-from burg_drake.cameras.placement_document import (
+from burg_drake.cameras.optics.field_of_view import FieldOfView
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.overlay.antialiasing import strokes
+from burg_drake.cameras.overlay.corrections import COLORS, mark
+from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
+from burg_drake.cameras.overlay.style import OverlayStyle
+from burg_drake.cameras.overlay.tag_layout import lay_out
+from burg_drake.cameras.overlay.text_tags import notice
+from burg_drake.cameras.placement.document import (
     CheckedImage,
     CheckedScene,
     Placement,
     PlacementCheck,
 )
-from burg_drake.cameras.placement_marks import COLORS, mark
-from burg_drake.cameras.scene_shape import SceneShape, scene_shape
-from burg_drake.cameras.strokes import strokes
-from burg_drake.cameras.surface_image import SurfaceCamera
-from burg_drake.cameras.tag_layout import lay_out
-from burg_drake.cameras.text_tags import notice
-from burg_drake.cameras.view import FieldOfView
+from burg_drake.cameras.projection.line_drawing import INNER, OUTLINE, VisibleLines, visible_lines
+from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
+from burg_drake.cameras.projection.surface_image import SurfaceCamera
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.document.scene import Scene
 
 LENS = (-0.25, 0.08, 0.0004, -0.0003, 0.0)
 PINHOLE = Intrinsics(width=320, height=240, focal=(300.0, 302.0), center=(160.3, 118.9))
@@ -57,15 +57,15 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def shape(scene: Scene) -> SceneShape:
-    return scene_shape(scene)
+def shape(scene: Scene) -> SceneMesh:
+    return build_scene_mesh(scene)
 
 
 def gray(intrinsics: Intrinsics = PINHOLE) -> NDArray[np.uint8]:
     return np.full((intrinsics.height, intrinsics.width, 3), 128, np.uint8)
 
 
-def labels_at(shape: SceneShape, intrinsics: Intrinsics, X_SC: Array, pixels: Array) -> Array:
+def labels_at(shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array, pixels: Array) -> Array:
     """Which instance points of the image show: a ray each, and nothing else."""
     flat = (intrinsics.undistort(pixels) - intrinsics.center) / intrinsics.focal
     rays = np.column_stack([flat, np.ones(len(flat))]) @ X_SC[:3, :3].T
@@ -74,13 +74,13 @@ def labels_at(shape: SceneShape, intrinsics: Intrinsics, X_SC: Array, pixels: Ar
     return np.where(face < 0, -1, shape.owner[face])
 
 
-def all_labels(shape: SceneShape, intrinsics: Intrinsics, X_SC: Array) -> Array:
+def all_labels(shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array) -> Array:
     size = intrinsics.width, intrinsics.height
     grid = np.stack(np.meshgrid(*[np.arange(n) for n in size]), axis=-1).reshape(-1, 2)
     return labels_at(shape, intrinsics, X_SC, grid.astype(float)).reshape(size[::-1])
 
 
-def borders(shape: SceneShape, intrinsics: Intrinsics, X_SC: Array) -> Array:
+def borders(shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array) -> Array:
     """(N, 2) points where neighbouring pixels' labels change, found by halving with rays."""
     labels, found = all_labels(shape, intrinsics, X_SC), []
     for axis, step in ((0, (0, 1)), (1, (1, 0))):
@@ -105,7 +105,7 @@ def distances(points: Array, ends: Array) -> Array:
 @pytest.mark.parametrize("intrinsics", [PINHOLE, WIDE], ids=["pinhole", "lens"])
 @pytest.mark.parametrize("X_SC", VIEWS)
 def test_outlines_are_where_rays_find_borders(
-    shape: SceneShape, intrinsics: Intrinsics, X_SC: Array
+    shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array
 ) -> None:
     lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
     truth = borders(shape, intrinsics, X_SC)
@@ -115,7 +115,7 @@ def test_outlines_are_where_rays_find_borders(
 
 
 @pytest.mark.parametrize("X_SC", VIEWS)
-def test_every_outline_is_a_border(shape: SceneShape, X_SC: Array) -> None:
+def test_every_outline_is_a_border(shape: SceneMesh, X_SC: Array) -> None:
     lines = visible_lines(shape, FieldOfView(PINHOLE), X_SC)
     ends = lines.ends[lines.kind == OUTLINE]
     along = ends[:, 1] - ends[:, 0]
@@ -130,7 +130,7 @@ def test_every_outline_is_a_border(shape: SceneShape, X_SC: Array) -> None:
 @pytest.mark.parametrize("intrinsics", [PINHOLE, WIDE], ids=["pinhole", "lens"])
 @pytest.mark.parametrize("X_SC", VIEWS)
 def test_labels_are_those_of_a_ray_a_pixel(
-    scene: Scene, shape: SceneShape, intrinsics: Intrinsics, X_SC: Array
+    scene: Scene, shape: SceneMesh, intrinsics: Intrinsics, X_SC: Array
 ) -> None:
     labels = instance_labels(scene, intrinsics, X_SC)
     np.testing.assert_array_equal(labels, all_labels(shape, intrinsics, X_SC))
@@ -139,7 +139,7 @@ def test_labels_are_those_of_a_ray_a_pixel(
 def test_outline_of_a_ball_is_the_ellipse_of_its_cone() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
     center = np.array([0.06, -0.04, 0.5])
-    shape = SceneShape({"ball": (ball.vertices + center, np.array(ball.faces))})
+    shape = SceneMesh({"ball": (ball.vertices + center, np.array(ball.faces))})
     lines = visible_lines(shape, FieldOfView(PINHOLE), np.eye(4))
     flat = (lines.ends.reshape(-1, 2) - PINHOLE.center) / PINHOLE.focal
     rays = np.column_stack([flat, np.ones(len(flat))])
@@ -154,7 +154,7 @@ def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
     # hides the far half.
     ring = trimesh.creation.torus(0.05, 0.01)
     bar = trimesh.creation.box((0.01, 0.01, 0.3))
-    shape = SceneShape(
+    shape = SceneMesh(
         {n: (np.array(m.vertices), np.array(m.faces)) for n, m in (("ring", ring), ("bar", bar))}
     )
     X_SC = looking((0.0, -0.5, 0.25), (0.0, 0.0, 0.0))
@@ -168,7 +168,7 @@ def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
     np.testing.assert_array_equal(owner, all_labels(shape, PINHOLE, X_SC))
 
 
-def test_a_handle_before_its_mug_is_an_inner_line(scene: Scene, shape: SceneShape) -> None:
+def test_a_handle_before_its_mug_is_an_inner_line(scene: Scene, shape: SceneMesh) -> None:
     mug = shape.of(("mug",))
     yaw = np.deg2rad(140.0)  # where the handle points
     middle = mug.boxes[0].mean(axis=0)
@@ -202,7 +202,7 @@ def test_overlapping_bits_cover_no_more_than_one() -> None:
     np.testing.assert_allclose(twice.cover(), once.cover(), atol=2e-3)
 
 
-def test_draws_over_the_objects_alone(scene: Scene, shape: SceneShape) -> None:
+def test_draws_over_the_objects_alone(scene: Scene, shape: SceneMesh) -> None:
     image = gray()
     drawn = Overlay(scene, PINHOLE, PLAIN).draw(image, VIEWS[0])
     assert (image == 128).all() and drawn.dtype == np.uint8
@@ -216,7 +216,7 @@ def test_draws_over_the_objects_alone(scene: Scene, shape: SceneShape) -> None:
     assert changed[labels >= 0].all() and not changed[(labels < 0) & ~near].any()
 
 
-def test_outlines_alone_leave_surfaces_as_they_are(scene: Scene, shape: SceneShape) -> None:
+def test_outlines_alone_leave_surfaces_as_they_are(scene: Scene, shape: SceneMesh) -> None:
     overlay = Overlay(scene, PINHOLE)
     style = OverlayStyle(opacity=0.0, names=False, footprints=False)
     whole = overlay.draw(gray(), VIEWS[0], style=PLAIN)
@@ -263,7 +263,7 @@ def test_an_empty_scene_changes_nothing(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("intrinsics", [PINHOLE, WIDE], ids=["pinhole", "lens"])
-def test_near_and_inside_an_object(scene: Scene, shape: SceneShape, intrinsics: Intrinsics) -> None:
+def test_near_and_inside_an_object(scene: Scene, shape: SceneMesh, intrinsics: Intrinsics) -> None:
     overlay = Overlay(scene, intrinsics)
     box = shape.boxes[shape.names.index("box")]
     inside = box.mean(axis=0)
@@ -280,9 +280,9 @@ def test_near_and_inside_an_object(scene: Scene, shape: SceneShape, intrinsics: 
 def test_lines_bend_with_the_lens() -> None:
     # A square sheet that fills the image: its rim is drawn where its points are.
     side = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float) * (0.55, 0.42, 1.0)
-    shape = SceneShape({"sheet": (side, np.array([[0, 1, 2], [0, 2, 3]]))})
+    shape = SceneMesh({"sheet": (side, np.array([[0, 1, 2], [0, 2, 3]]))})
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 1.0))
-    lines: Lines = visible_lines(shape, FieldOfView(WIDE), X_SC)
+    lines: VisibleLines = visible_lines(shape, FieldOfView(WIDE), X_SC)
     rim = np.linspace(side[0], side[1], 50)
     truth = WIDE.project((rim - X_SC[:3, 3]) @ X_SC[:3, :3])
     inside = ((truth > 0) & (truth < (319, 239))).all(axis=1)

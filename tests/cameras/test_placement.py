@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.placement import check_placement
-from burg_drake.cameras.placement_photo import Photo, ScenePhotographer
-from burg_drake.cameras.placement_shape import scene_shapes
+from burg_drake.cameras.placement.alignment.shape import target_shapes
+from burg_drake.cameras.placement.check import check_placement
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.core.documents.schema import dump_document
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.schema import dump_document
-from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.system_libraries import missing_render_libraries
+from tests.cameras.placement_photo import Photo, ScenePhotographer
 from tests.cameras.placement_views import INTRINSICS, X_SC, looking
 
 needs_renderer = pytest.mark.skipif(
@@ -38,7 +38,7 @@ def scene() -> Scene:
 
 @pytest.fixture(scope="module")
 def photo(scene: Scene) -> Photo:
-    shapes = scene_shapes(scene)
+    shapes = target_shapes(scene)
     X_SO: dict[str, Array | None] = {
         name: shapes[name].placed(np.array([x, y, np.deg2rad(turn)]))
         for name, (x, y, turn) in TRUTH.items()
@@ -119,7 +119,7 @@ def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_han
     whole = load_scene("tabletop_six")
     mug = next(i for i in whole.document.instances if i.object == "mug")
     alone = Scene(replace(whole.document, instances=(mug,)), whole.library, whole.path)
-    shape = scene_shapes(alone)["mug"]
+    shape = target_shapes(alone)["mug"]
     handle = np.deg2rad(turn)
     X_SO = shape.placed(np.array([0.005, 0.005, handle]))
     # seen from the side, and from opposite to the handle, which the mug then hides
@@ -151,7 +151,7 @@ def test_a_slender_object_turned_far_is_found() -> None:
     kept = tuple(i for i in whole.document.instances if i.object == "screwdriver")
     scene = Scene(replace(whole.document, instances=kept), whole.library, whole.path)
     (name,) = scene.instances
-    X_SO = scene_shapes(scene)[name].placed(np.array([0.005, 0.005, np.deg2rad(90.0)]))
+    X_SO = target_shapes(scene)[name].placed(np.array([0.005, 0.005, np.deg2rad(90.0)]))
     taken = ScenePhotographer(scene).take(X_SC, INTRINSICS, {name: X_SO})
     color = np.asarray(taken.color, dtype=np.uint8)
     found = check_placement(scene, color, INTRINSICS).instances[name]

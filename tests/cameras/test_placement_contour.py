@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.placement_contour import Contour, outline
-from burg_drake.cameras.placement_shape import Shape, target_shape
-from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.placement.alignment.contour import ImageContour, outline
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shape
 from burg_drake.core.frames import make_pose, rot_z, transform_points
 from tests.cameras.placement_views import INTRINSICS, NOTHING, VIEW, X_SC
 
@@ -16,12 +16,12 @@ Q = np.array([0.004, -0.003, 0.1])
 
 
 @pytest.fixture(scope="module")
-def box() -> Shape:
+def box() -> TargetShape:
     mesh = trimesh.creation.box((0.05, 0.08, 0.06))
     return target_shape(mesh.vertices, mesh.faces, make_pose(rot_z(0.4), (0.3, 0.2, 0.03)))
 
 
-def offsets(before: Contour, after: Contour) -> np.ndarray:
+def offsets(before: ImageContour, after: ImageContour) -> np.ndarray:
     """By how much an outline moved along the normals of its points: to the nearest of the lines
     through the other's points, of those with alike normals."""
     moved = np.full(len(before), np.nan)
@@ -33,7 +33,7 @@ def offsets(before: Contour, after: Contour) -> np.ndarray:
     return moved
 
 
-def test_outlines_move_as_the_derivatives_say(box: Shape) -> None:
+def test_outlines_move_as_the_derivatives_say(box: TargetShape) -> None:
     before = outline(VIEW, box, Q, NOTHING)
     assert len(before) > 100
     for part, step in enumerate((2e-4, 2e-4, 2e-3)):
@@ -45,7 +45,7 @@ def test_outlines_move_as_the_derivatives_say(box: Shape) -> None:
         assert (np.abs(moved - expected) < 3e-4).mean() > 0.95
 
 
-def test_outlines_move_with_the_camera_as_the_derivatives_say(box: Shape) -> None:
+def test_outlines_move_with_the_camera_as_the_derivatives_say(box: TargetShape) -> None:
     before = outline(VIEW, box, Q, NOTHING)
     for part in range(6):
         error = np.zeros(6)
@@ -56,7 +56,7 @@ def test_outlines_move_with_the_camera_as_the_derivatives_say(box: Shape) -> Non
         u, _, vt = np.linalg.svd(X[:3, :3])
         X[:3, :3] = u @ vt
         X[:3, 3] += error[3:]
-        moved = offsets(before, outline(View(INTRINSICS.K, (640, 480), X), box, Q, NOTHING))
+        moved = offsets(before, outline(PinholeView(INTRINSICS.K, (640, 480), X), box, Q, NOTHING))
         expected = before.camera[:, part] * 3e-4
         assert np.abs(expected).max() > 0.03
         assert (np.abs(moved - expected) < 1e-3).mean() > 0.95
@@ -75,7 +75,7 @@ def test_the_outline_of_a_ball_touches_its_tangents() -> None:
     assert (np.einsum("ni,ni->n", outward, contour.normals) > 0.0).all()
 
 
-def test_what_stands_before_an_outline_hides_it(box: Shape) -> None:
+def test_what_stands_before_an_outline_hides_it(box: TargetShape) -> None:
     whole = outline(VIEW, box, Q, NOTHING)
     middle = float(np.median(whole.pixels[:, 0]))
     wall = NOTHING.copy()
@@ -87,5 +87,5 @@ def test_what_stands_before_an_outline_hides_it(box: Shape) -> None:
     assert len(outline(VIEW, box, Q, wall)) == len(whole)
 
 
-def test_an_object_out_of_the_image_has_no_outline(box: Shape) -> None:
+def test_an_object_out_of_the_image_has_no_outline(box: TargetShape) -> None:
     assert len(outline(VIEW, box, np.array([3.0, 0.0, 0.0]), NOTHING)) == 0

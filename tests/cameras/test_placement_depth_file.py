@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.placement_depth_file import read_depth
+from burg_drake.cameras.sources.depth_file import read_depth
 from burg_drake.core.errors import InvalidInputError
 
 METRES = np.array([[0.5, 0.75], [0.0, 1.25]])

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_document import (
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.document import (
     CameraPlace,
     CheckedImage,
     CheckedScene,
@@ -19,10 +19,10 @@ from burg_drake.cameras.placement_document import (
     load_placement,
     save_placement,
 )
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
+from burg_drake.core.paths.resources import resolve
 
 CHECK = PlacementCheck(
     scene=CheckedScene(name="two", path="two.yaml", content="abc"),

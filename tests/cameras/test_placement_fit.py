@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.placement_fit import fit
+from burg_drake.cameras.placement.alignment.least_squares import fit_displacement
 
 UNIT = np.array([1e-3, 1e-3, 1e-2])
 STEP = np.array([0.002, -0.001, 0.01])
@@ -20,7 +20,7 @@ def test_exact_measurements_with_outliers_give_the_exact_step() -> None:
     along, groups = measurements(np.random.default_rng(0))
     offset = along @ STEP
     offset[::4] += 8.0
-    solved = fit(along, offset, np.full(300, 0.2), groups, False, UNIT)
+    solved = fit_displacement(along, offset, np.full(300, 0.2), groups, False, UNIT)
     assert solved is not None
     np.testing.assert_allclose(solved.step, STEP, atol=1e-9)
     assert (solved.weights[::4] == 0.0).all()
@@ -34,7 +34,7 @@ def test_deviations_are_those_of_repeated_measurements() -> None:
     for _ in range(300):
         common = rng.normal(0.0, 0.2, 37)[groups]
         offset = along @ STEP + common + rng.normal(0.0, 0.2, 300)
-        solved = fit(along, offset, np.full(300, 0.3), groups, False, UNIT)
+        solved = fit_displacement(along, offset, np.full(300, 0.3), groups, False, UNIT)
         assert solved is not None
         errors.append(solved.step - STEP)
         said.append(np.diag(solved.covariance))
@@ -47,9 +47,9 @@ def test_the_gain_says_how_a_measurement_moves_the_result() -> None:
     along, groups = measurements(np.random.default_rng(2))
     deviation = np.full(300, 0.2)
     offset = along @ STEP
-    base = fit(along, offset, deviation, groups, False, UNIT)
+    base = fit_displacement(along, offset, deviation, groups, False, UNIT)
     offset[17] += 1e-3
-    moved = fit(along, offset, deviation, groups, False, UNIT)
+    moved = fit_displacement(along, offset, deviation, groups, False, UNIT)
     assert base is not None
     assert moved is not None
     np.testing.assert_allclose(
@@ -60,7 +60,7 @@ def test_the_gain_says_how_a_measurement_moves_the_result() -> None:
 def test_a_symmetric_object_keeps_its_angle() -> None:
     along, groups = measurements(np.random.default_rng(3))
     offset = along[:, :2] @ STEP[:2]
-    solved = fit(along, offset, np.full(300, 0.2), groups, True, UNIT)
+    solved = fit_displacement(along, offset, np.full(300, 0.2), groups, True, UNIT)
     assert solved is not None
     np.testing.assert_allclose(solved.step, [*STEP[:2], 0.0], atol=1e-9)
     assert solved.covariance[2, 2] == 0.0
@@ -68,17 +68,17 @@ def test_a_symmetric_object_keeps_its_angle() -> None:
 
 def test_edges_that_all_run_one_way_determine_nothing() -> None:
     along = np.tile([700.0, 0.0, 0.0], (100, 1))
-    assert fit(along, np.ones(100), np.ones(100), np.arange(100), False, UNIT) is None
+    assert fit_displacement(along, np.ones(100), np.ones(100), np.arange(100), False, UNIT) is None
     few = np.eye(3)
-    assert fit(few, np.ones(3), np.ones(3), np.arange(3), False, UNIT) is None
+    assert fit_displacement(few, np.ones(3), np.ones(3), np.arange(3), False, UNIT) is None
 
 
 def test_another_unknown_takes_what_it_explains() -> None:
     along, groups = measurements(np.random.default_rng(4))
     along = along[:100]  # a third of the circle: growing looks like moving
     offset = along @ STEP + 0.15
-    plain = fit(along, offset, np.full(100, 0.05), groups[:100], False, UNIT)
-    aware = fit(
+    plain = fit_displacement(along, offset, np.full(100, 0.05), groups[:100], False, UNIT)
+    aware = fit_displacement(
         along, offset, np.full(100, 0.05), groups[:100], False, UNIT, np.full((100, 1), 0.15)
     )
     assert plain is not None

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.placement_raster import Window, window_around
-from burg_drake.cameras.placement_shape import target_shape
-from burg_drake.cameras.placement_view import View
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.shape import target_shape
+from burg_drake.cameras.placement.alignment.window import Window, window_around
 from burg_drake.core.frames import make_pose, rot_z
 
 K = np.array([[500.0, 0.0, 31.5], [0.0, 480.0, 23.5], [0.0, 0.0, 1.0]])
@@ -18,7 +18,7 @@ def buffer(p_CV: np.ndarray, faces: np.ndarray, window: Window) -> np.ndarray:
     """Depth by the code, of a mesh given in the camera frame, for a camera anywhere."""
     X_SC = make_pose(rot_z(0.4), (0.2, -0.1, 0.3))
     shape = target_shape(p_CV, faces, X_SC)
-    return View(K, (64, 48), X_SC).buffer(shape, np.zeros(3), window)
+    return PinholeView(K, (64, 48), X_SC).buffer(shape, np.zeros(3), window)
 
 
 def rays(window: Window) -> np.ndarray:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.placement_shape import scene_shapes, target_shape
+from burg_drake.cameras.placement.alignment.shape import target_shape, target_shapes
 from burg_drake.core.frames import make_pose, rot_z, transform_points
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 
 X_SO = make_pose(rot_z(0.7), (0.2, 0.1, 0.05))
 
@@ -46,7 +46,7 @@ def test_round_objects_are_told(mesh: trimesh.Trimesh, round_about_z: bool) -> N
 
 
 def test_of_the_household_objects_bowl_and_cans_are_round() -> None:
-    shapes = scene_shapes(load_scene("tabletop_twelve"))
+    shapes = target_shapes(load_scene("tabletop_twelve"))
     assert {name for name, shape in shapes.items() if shape.symmetric} == {"bowl", "can", "can_2"}
 
 

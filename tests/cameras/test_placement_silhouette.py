@@ -6,34 +6,34 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_board import empty_board
-from burg_drake.cameras.placement_locate import locate
-from burg_drake.cameras.placement_search import find
-from burg_drake.cameras.placement_shape import Shape, target_shape
-from burg_drake.cameras.placement_silhouette import SilhouetteAligner
-from burg_drake.cameras.placement_view import View
-from burg_drake.cameras.synthetic import Look, board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.alignment.background import empty_board
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shape
+from burg_drake.cameras.placement.alignment.silhouette_aligner import SilhouetteAligner
+from burg_drake.cameras.placement.localization import locate_objects
+from burg_drake.cameras.placement.search import find_places
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.scene import Board
 from tests.cameras.placement_views import looking
+from tests.cameras.synthetic import ImageDegradation, board_image
 
 BOARD = Board()
 INTRINSICS = Intrinsics(width=320, height=240, focal=(600.0, 600.0), center=(159.5, 119.5))
 X_SC = looking(np.array([0.85, 0.62, 0.58]), np.array([0.32, 0.2, 0.0]))
-VIEW = View(INTRINSICS.K, (320, 240), X_SC)
+VIEW = PinholeView(INTRINSICS.K, (320, 240), X_SC)
 TARGET = (0.30, 0.19, 0.3)
 Q = np.array([0.018, -0.012, np.deg2rad(14.0)])
 
 
-def plate(size: tuple[float, float], place: tuple[float, float, float]) -> Shape:
+def plate(size: tuple[float, float], place: tuple[float, float, float]) -> TargetShape:
     """A plate as thin as its drawing."""
     mesh = trimesh.creation.box((*size, 1e-6))
     X_SO = make_pose(rot_z(place[2]), (place[0], place[1], 5e-7))
     return target_shape(mesh.vertices, mesh.faces, X_SO)
 
 
-def drawing(plates: list[tuple[float, ...]], look: Look) -> np.ndarray:
+def drawing(plates: list[tuple[float, ...]], look: ImageDegradation) -> np.ndarray:
     covers = np.array(plates).reshape(-1, 5)
     rng = np.random.default_rng(0)
     return board_image(BOARD, INTRINSICS, X_SC, covers=covers, look=look, rng=rng)
@@ -50,14 +50,16 @@ def aligner(image: np.ndarray) -> SilhouetteAligner:
     return SilhouetteAligner(VIEW, image, picture)
 
 
-@pytest.mark.parametrize("look", [Look(noise=2.0), Look(blur=1.0, noise=4.0, gain=0.7)])
-def test_a_plate_is_found_and_measured(look: Look) -> None:
+@pytest.mark.parametrize(
+    "look", [ImageDegradation(noise=2.0), ImageDegradation(blur=1.0, noise=4.0, gain=0.7)]
+)
+def test_a_plate_is_found_and_measured(look: ImageDegradation) -> None:
     size = (0.12, 0.07)
     there = aligner(drawing([cover(size, TARGET, Q)], look))
     shape = plate(size, TARGET)
-    near = [f.q - Q for f in find(VIEW, shape, there.evidence)]
+    near = [f.q - Q for f in find_places(VIEW, shape, there.evidence)]
     assert min(np.hypot(x, y) for x, y, turn in near if abs(turn) < np.deg2rad(8.0)) < 0.006
-    found = locate(there, {"plate": shape})["plate"].alignment
+    found = locate_objects(there, {"plate": shape})["plate"].alignment
     assert found is not None
     assert np.abs(found.q - Q)[:2].max() < 2e-4
     assert abs(found.q[2] - Q[2]) < np.deg2rad(0.2)
@@ -76,7 +78,7 @@ def test_a_scaled_print_is_an_empty_board_only_to_who_knows_its_scale() -> None:
 
 
 def test_an_empty_board_in_uneven_light_is_empty() -> None:
-    image = drawing([], Look(blur=0.8, noise=3.0, gain=0.8, gradient=0.4))
+    image = drawing([], ImageDegradation(blur=0.8, noise=3.0, gain=0.8, gradient=0.4))
     picture = empty_board(BOARD, image.astype(float), INTRINSICS.K, X_SC)
     assert picture is not None
     here = picture.sheet
@@ -88,8 +90,8 @@ def test_an_empty_board_in_uneven_light_is_empty() -> None:
 
 def test_a_plate_that_is_not_there_is_not_found_in_its_neighbour() -> None:
     size, other = (0.12, 0.07), (0.38, 0.21, 0.3)
-    there = aligner(drawing([cover(size, other, np.zeros(3))], Look(noise=2.0)))
-    found = locate(there, {"here": plate(size, TARGET), "other": plate(size, other)})
+    there = aligner(drawing([cover(size, other, np.zeros(3))], ImageDegradation(noise=2.0)))
+    found = locate_objects(there, {"here": plate(size, TARGET), "other": plate(size, other)})
     assert found["here"].alignment is None
     other_one = found["other"].alignment
     assert other_one is not None

@@ -10,8 +10,8 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.pose_filter import PoseFilter, Track
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.systems.pose_filter import PoseFilter, Track
 from burg_drake.core.errors import InvalidInputError
 from tests.cameras.board_views import error, view
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.quadrilaterals import LEAST_CONTRAST, dark_quadrilaterals, read_cells
+from burg_drake.cameras.pose.quadrilaterals import LEAST_CONTRAST, dark_quadrilaterals, read_cells
 
 CORNERS = np.array([[90.0, 60.0], [210.0, 80.0], [230.0, 190.0], [70.0, 170.0]])
 CELLS = 6

@@ -12,15 +12,15 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.placement_document import CheckedScene
-from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.recording import Recording, RecordingDocument
+from burg_drake.cameras.live.recording import Recording, RecordingDocument
+from burg_drake.cameras.live.recording_table import read_poses
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.document import CheckedScene
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.core.documents.schema import load_document
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.schema import load_document
 
 CAMERA = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))
 SCENE = CheckedScene(name="two", content="abc")
@@ -166,11 +166,11 @@ def test_what_cannot_be_begun_leaves_nothing(tmp_path: Path) -> None:
 
 QUIET = """\
 import sys
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.placement_document import CheckedScene
-from burg_drake.cameras.recording import Recording
-from burg_drake.cameras.sources import open_source
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.cameras.placement.document import CheckedScene
+from burg_drake.cameras.live.recording import Recording
+from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError
 
 camera = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))

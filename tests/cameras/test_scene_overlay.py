@@ -11,15 +11,15 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageRgba8U
 
 import burg_drake as burg
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_document import (
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.document import (
     CheckedImage,
     CheckedScene,
     Placement,
     PlacementCheck,
 )
-from burg_drake.cameras.scene_overlay import SceneOverlay
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.systems.scene_overlay import SceneOverlay
 from burg_drake.core.errors import InvalidInputError
 
 INTRINSICS = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))

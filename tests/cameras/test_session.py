@@ -7,11 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.frame_source import Frame
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.session import (
-    Session,
+from burg_drake.cameras.live.frame_processing import (
+    FrameProcessor,
     ViewSettings,
     changed_settings,
     checked_settings,
@@ -19,11 +16,14 @@ from burg_drake.cameras.session import (
     pose_line,
     position_sd,
 )
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.sources.frame import Frame
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Board, Scene, load_scene
+from burg_drake.scene.document.scene import Board, Scene, load_scene
+from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
 TIMEOUT = 30.0
@@ -40,8 +40,8 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def session(scene: Scene) -> Session:
-    return Session(scene, CAMERA)
+def session(scene: Scene) -> FrameProcessor:
+    return FrameProcessor(scene, CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def image(scene: Scene) -> np.ndarray:
     return board_image(scene.board, CAMERA, camera_at(0.3))
 
 
-def test_looks_and_draws(session: Session, image: np.ndarray) -> None:
+def test_looks_and_draws(session: FrameProcessor, image: np.ndarray) -> None:
     sight = session.look(Frame(image, None, 0.0, "a"))
     assert sight.estimate.valid
     assert np.linalg.norm(sight.estimate.X_SC[:3, 3] - camera_at(0.3)[:3, 3]) < 1e-3
@@ -65,7 +65,7 @@ def test_looks_and_draws(session: Session, image: np.ndarray) -> None:
     assert rows.min() - 5 < v < rows.max() + 5 and columns.min() - 5 < u < columns.max() + 5
 
 
-def test_steady(session: Session, scene: Scene, image: np.ndarray) -> None:
+def test_steady(session: FrameProcessor, scene: Scene, image: np.ndarray) -> None:
     """With noise, the poses of a camera at rest that are drawn at differ less than the estimates;
     that of a moved camera follows within two frames."""
     rng = np.random.default_rng(0)
@@ -84,7 +84,7 @@ def test_steady(session: Session, scene: Scene, image: np.ndarray) -> None:
     assert session.look(noisy(image)).X_SC[0, 3] == pytest.approx(0.3, abs=2e-3)
 
 
-def test_without_a_board_the_picture_says_so(session: Session) -> None:
+def test_without_a_board_the_picture_says_so(session: FrameProcessor) -> None:
     empty = np.full((240, 320, 3), 90, dtype=np.uint8)
     sight = session.look(Frame(empty, None, 0.0, "a"))
     assert not sight.estimate.valid
@@ -95,7 +95,7 @@ def test_without_a_board_the_picture_says_so(session: Session) -> None:
 def test_print_scale(scene: Scene) -> None:
     """A board printed at 97 %, and told so, is seen where it is."""
     picture = board_image(scene.board, CAMERA, camera_at(0.3), scale=(0.97, 0.97))
-    told = Session(scene, CAMERA, print_scale=(0.97, 0.97))
+    told = FrameProcessor(scene, CAMERA, print_scale=(0.97, 0.97))
     estimate = told.look(Frame(picture, None, 0.0, "a")).estimate
     assert np.linalg.norm(estimate.X_SC[:3, 3] - camera_at(0.3)[:3, 3]) < 1e-3
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.silhouette import MeshOutline
+from burg_drake.cameras.projection.mesh_outline import MeshOutline
 from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
 
 RNG_SEED = 5

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.intrinsics_file import load_intrinsics
-from burg_drake.cameras.snapshot import (
+from burg_drake.cameras.live.snapshot import (
     Snapshot,
     describe_snapshot,
     load_snapshot,
     numbered,
     save_snapshot,
 )
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics_file import load_intrinsics
+from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 
 LENS = Intrinsics(
     width=64,

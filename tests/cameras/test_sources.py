@@ -14,19 +14,19 @@ import numpy as np
 import pytest
 from PIL import Image as PilImage
 
-from burg_drake.cameras import sources_device
-from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
-from burg_drake.cameras.image_file import read_image, write_image
-from burg_drake.cameras.intrinsics import of_camera
-from burg_drake.cameras.opencv_log import quiet
-from burg_drake.cameras.sources import open_source
-from burg_drake.cameras.sources_device import DeviceSource, open_device
-from burg_drake.cameras.sources_simulated import SimulatedSource
-from burg_drake.cameras.sources_video import VideoSource
+from burg_drake.cameras.optics.intrinsics import of_camera
+from burg_drake.cameras.sources import device
+from burg_drake.cameras.sources.device import DeviceSource, open_device
+from burg_drake.cameras.sources.frame import CameraLost, FrameSource, Image
+from burg_drake.cameras.sources.image_file import read_image, write_image
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.cameras.sources.opening import open_source
+from burg_drake.cameras.sources.simulated import SimulatedSource
+from burg_drake.cameras.sources.video import VideoSource
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 
 def picture(number: int = 0, size: tuple[int, int] = (64, 48)) -> Image:
@@ -258,9 +258,9 @@ class Stream(http.server.BaseHTTPRequestHandler):
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A source that waits less than for real cameras."""
-    monkeypatch.setattr(sources_device, "PATIENCE", 0.3)
-    monkeypatch.setattr(sources_device, "FIRST_WAIT", 0.05)
-    monkeypatch.setattr(sources_device, "LONGEST_WAIT", 0.2)
+    monkeypatch.setattr(device, "PATIENCE", 0.3)
+    monkeypatch.setattr(device, "FIRST_WAIT", 0.05)
+    monkeypatch.setattr(device, "LONGEST_WAIT", 0.2)
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import COLORS, Look, board_depth, board_image, covers_of
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.markers import Markers
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.markers import Markers
+from burg_drake.scene.document.scene import Board
+from tests.cameras.synthetic import COLORS, ImageDegradation, board_depth, board_image, covers_of
 
 CAMERA = Intrinsics(width=160, height=120, focal=(200.0, 200.0), center=(79.5, 59.5))
 BOARD = Board(size=(0.2, 0.14), markers=Markers(count=(1, 1)))
@@ -81,12 +81,12 @@ def test_blur_noise_and_light_do_what_they_say() -> None:
     X_SC = above(0.1, 0.07, 0.4)
     clean = board_image(BOARD, CAMERA, X_SC).astype(float)
     noisy = board_image(
-        BOARD, CAMERA, X_SC, look=Look(noise=3.0), rng=np.random.default_rng(0)
+        BOARD, CAMERA, X_SC, look=ImageDegradation(noise=3.0), rng=np.random.default_rng(0)
     ).astype(float)
     assert (noisy - clean)[:, 60:90].std() == pytest.approx(3.0, rel=0.05)
-    dark = board_image(BOARD, CAMERA, X_SC, look=Look(gain=0.5)).astype(float)
+    dark = board_image(BOARD, CAMERA, X_SC, look=ImageDegradation(gain=0.5)).astype(float)
     assert np.abs(dark - 0.5 * clean).max() <= 1.0
-    blurred = board_image(BOARD, CAMERA, X_SC, look=Look(blur=1.0)).astype(float)
+    blurred = board_image(BOARD, CAMERA, X_SC, look=ImageDegradation(blur=1.0)).astype(float)
     assert blurred.mean() == pytest.approx(clean.mean(), rel=1e-3)
     assert np.abs(np.diff(blurred, axis=1)).max() < 0.6 * np.abs(np.diff(clean, axis=1)).max()
 
@@ -112,6 +112,6 @@ def test_depth_of_a_camera_that_looks_straight_down_is_its_height() -> None:
 
 def test_bad_input() -> None:
     with pytest.raises(InvalidInputError, match="noise needs a random generator"):
-        board_image(BOARD, CAMERA, above(0.1, 0.07, 0.4), look=Look(noise=1.0))
+        board_image(BOARD, CAMERA, above(0.1, 0.07, 0.4), look=ImageDegradation(noise=1.0))
     with pytest.raises(InvalidInputError, match="above the table and look down"):
         board_image(BOARD, CAMERA, np.eye(4))

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.cameras.event_log import EventLog
-from burg_drake.cameras.frame_source import FrameSource
-from burg_drake.cameras.live_session import LiveSession
-from burg_drake.cameras.recorded_poses import read_poses
-from burg_drake.cameras.recording import Recording
-from burg_drake.cameras.session import (
-    Session,
+from burg_drake.cameras.live.actions import ViewActions
+from burg_drake.cameras.live.event_log import EventLog
+from burg_drake.cameras.live.frame_processing import (
+    FrameProcessor,
 )
-from burg_drake.cameras.snapshot import load_snapshot
-from burg_drake.cameras.synthetic import board_image
-from burg_drake.cameras.view_actions import ViewActions
+from burg_drake.cameras.live.recording import Recording
+from burg_drake.cameras.live.recording_table import read_poses
+from burg_drake.cameras.live.session import LiveSession
+from burg_drake.cameras.live.snapshot import load_snapshot
+from burg_drake.cameras.sources.frame import FrameSource
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene, load_scene
 from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines
+from tests.cameras.synthetic import board_image
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +32,8 @@ def scene() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def session(scene: Scene) -> Session:
-    return Session(scene, CAMERA)
+def session(scene: Scene) -> FrameProcessor:
+    return FrameProcessor(scene, CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def image(scene: Scene) -> np.ndarray:
 
 
 @pytest.fixture
-def live(session: Session) -> Iterator[Callable[..., LiveSession]]:
+def live(session: FrameProcessor) -> Iterator[Callable[..., LiveSession]]:
     """Makes sessions, which are closed in the end."""
     made: list[LiveSession] = []
 
@@ -83,7 +83,7 @@ def test_snapshot_of_the_picture(
 def test_check_of_an_empty_board(scene: Scene, image: np.ndarray, tmp_path: Path) -> None:
     """No object stands where it should; the check says so, and the view shows it."""
     two = replace(scene.document, instances=scene.document.instances[:2])
-    session = Session(Scene(two, scene.library, scene.path), CAMERA)
+    session = FrameProcessor(Scene(two, scene.library, scene.path), CAMERA)
     running = LiveSession(session, Pictures(image), events=EventLog())
     actions = ViewActions(running, tmp_path)
     running.start()

@@ -9,7 +9,7 @@ import pytest
 
 from burg_drake import load_station
 from burg_drake.compose import ComposeSession
-from burg_drake.station.station import Station
+from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture(scope="session")

@@ -31,9 +31,9 @@ from burg_drake.compose import (
     Turn,
     board_size,
 )
-from burg_drake.compose.command import Command
+from burg_drake.compose.commands.command import Command
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.scene import Board
 
 Make = Callable[[Sequence[str]], Command]
 """Makes a command of the names of all instances."""

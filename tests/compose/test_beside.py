@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 from burg_drake.compose import AddObject, ComposeSession, Delete, Move
-from burg_drake.compose.checker import known_scene
-from burg_drake.compose.settling import Proposal
-from burg_drake.compose.view import View
-from burg_drake.compose.worker import Cancelled
+from burg_drake.compose.background.process import Cancelled
+from burg_drake.compose.background.settling import SettlingProposal
+from burg_drake.compose.document.checker import known_scene
+from burg_drake.compose.editing.view import SessionView
 from burg_drake.core.errors import InvalidInputError, SimulationError, UnknownNameError
-from burg_drake.core.resources import resolve
-from burg_drake.objects.library import LIBRARY_FILE, load_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import Station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.objects.library.document import LIBRARY_FILE, load_library
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import Station
 
 PATIENCE = 120.0
 """For a worker process on a busy machine [s]."""
@@ -32,7 +32,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     X_SO = session.view.X_SO("box")
     X_SO[2, 3] += 0.03
     hovering = session.do(Move({"box": X_SO}))
-    views: list[View] = []
+    views: list[SessionView] = []
     session.on_change(views.append)
     proposal = session.settle().wait(PATIENCE)
     assert session.view.proposal is proposal and session.view.document == hovering.document
@@ -104,7 +104,7 @@ def test_a_library_that_loses_an_object_is_told(station: Station, library: Path)
         known = known_scene(session.view.state, saved).document
         assert [instance.object for instance in known.instances] == ["can", "can"]
         settled = replace(known, instances=known.instances[:1])  # as if the other one had fallen
-        kept = session.accept(Proposal(known, settled, {}, {}, ("can_2",), 1.0))
+        kept = session.accept(SettlingProposal(known, settled, {}, {}, ("can_2",), 1.0))
         assert list(kept.instances) == ["can", "marble"]
         file.write_text("nonsense")
         assert "cannot be read any more" in session.refresh().notices[-1]
@@ -157,7 +157,7 @@ def test_the_printout_has_what_is_on_the_board(session: ComposeSession) -> None:
 def test_of_many_moves_at_once_the_last_one_counts(session: ComposeSession) -> None:
     start = session.do(AddObject("can", position=(0.05, 0.15))).X_SO("can")
     drag = session.drag(["can"])
-    views: list[View] = []
+    views: list[SessionView] = []
 
     def move(i: int) -> None:
         views.append(drag.move_by((0.01 * i, 0.0, 0.0)))

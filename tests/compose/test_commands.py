@@ -25,23 +25,23 @@ from burg_drake.compose import (
     Turn,
     board_size,
 )
-from burg_drake.compose.view import View
+from burg_drake.compose.editing.view import SessionView
 from burg_drake.core.errors import BurgError
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.scene import Board
 
 ROUNDED = 2e-6
 """Of poses as people read them [m]."""
 
 
-def span(view: View, name: str) -> Array:
+def span(view: SessionView, name: str) -> Array:
     """(2, 3) bounds of an instance's surface in the scene [m]."""
     mesh = view.library.surface(view.instances[name].object)
     mesh.apply_transform(view.X_SO(name))
     return np.asarray(mesh.bounds)
 
 
-def center_of_mass(view: View, name: str) -> Array:
+def center_of_mass(view: SessionView, name: str) -> Array:
     p_OOcm = view.state.entry(name).mass_properties.center_of_mass
     return np.asarray((view.X_SO(name) @ (*p_OOcm, 1.0))[:3])
 

@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from burg_drake.compose import ComposeSession
-from burg_drake.compose.journal import journal_path, recover
+from burg_drake.compose.storage.journal import journal_path, recover
 from burg_drake.core.errors import BurgError
-from burg_drake.scene.scene import SceneDocument
-from burg_drake.station.station import Station
+from burg_drake.scene.document.scene import SceneDocument
+from burg_drake.station.document.station_document import Station
 from tests.compose.random_commands import adding, commands
 
 UNDO, REDO, SAVE = "undo", "redo", "save"

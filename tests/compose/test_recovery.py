@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from burg_drake.compose import AddObject, ComposeSession
-from burg_drake.compose.scene_file import FileChanged
-from burg_drake.compose.scene_lock import SceneInUse
-from burg_drake.core.resources import resolve
-from burg_drake.station.station import Station
+from burg_drake.compose.storage.scene_file import FileChanged
+from burg_drake.compose.storage.scene_lock import SceneInUse
+from burg_drake.core.paths.resources import resolve
+from burg_drake.station.document.station_document import Station
 
 SCRIPT = Path(__file__).with_name("scripted_session.py")
 

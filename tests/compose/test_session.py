@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename, amending
-from burg_drake.compose.journal import journal_path, recover
-from burg_drake.compose.scene_file import FileChanged, UnsavedChanges
+from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename
+from burg_drake.compose.document import amending
+from burg_drake.compose.storage.journal import journal_path, recover
+from burg_drake.compose.storage.scene_file import FileChanged, UnsavedChanges
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.generation.sample import sample_scene
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.scene.scene import save_scene
-from burg_drake.station.station import Station
+from burg_drake.scene.document.recipe import SceneRecipe
+from burg_drake.scene.document.scene import save_scene
+from burg_drake.station.document.station_document import Station
 
 
 def test_steps_are_undone_and_redone(session: ComposeSession) -> None:

@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.core.columns import FAMILIES, GROUPS, describe
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.columns import FAMILIES, GROUPS, describe
+from burg_drake.core.grasps.grasp_set import GraspSet
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "results.md"
 
@@ -68,7 +68,7 @@ def test_datasets_of_grasps_say_their_units(tmp_path: Path) -> None:
 
 
 def test_metrics_are_described() -> None:
-    from burg_drake.evaluation.scored_set import SCENE_COLUMNS
-    from burg_drake.grasping.quality import METRICS
+    from burg_drake.evaluation.grasp_sets.scored import SCENE_COLUMNS
+    from burg_drake.grasping.quality.metrics import METRICS
 
     assert all(map(describe, (*METRICS, *SCENE_COLUMNS)))

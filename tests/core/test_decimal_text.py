@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.decimal_text import PLACES, on_grid, row_texts
+from burg_drake.core.files.decimal_text import PLACES, on_grid, row_texts
 
 
 def values() -> np.ndarray:

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.document_text import DOCUMENT, read_bytes, read_rows, read_text
+from burg_drake.core.documents.json_text import parse_json
+from burg_drake.core.documents.plain_yaml import parse_plain_yaml
+from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import DocumentError, quoted
-from burg_drake.core.json_text import parse_json
-from burg_drake.core.yaml_nodes import parse_nodes
-from burg_drake.core.yaml_texts import parse_texts
+from burg_drake.core.files.bounded_text import DOCUMENT, read_bytes, read_rows, read_text
 
 DEEP = DOCUMENT.depth
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -22,7 +22,7 @@ BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 CHAIN = "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 300))
 
 
-@pytest.mark.parametrize("parse", [parse_nodes, parse_texts])
+@pytest.mark.parametrize("parse", [parse_nodes, parse_plain_yaml])
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -44,7 +44,7 @@ def test_yaml_beyond_its_bounds(parse: Callable[[str, str], Any], text: str, sai
     assert len(str(raised.value)) < 200
 
 
-@pytest.mark.parametrize("parse", [parse_nodes, parse_texts])
+@pytest.mark.parametrize("parse", [parse_nodes, parse_plain_yaml])
 def test_yaml_within_its_bounds(parse: Callable[[str, str], Any]) -> None:
     parse("[" * DEEP + "]" * DEEP, "d")
     parse("a: &a !!str 1\nb: [*a, *a]\nc: ! d\n", "d")

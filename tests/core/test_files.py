@@ -6,7 +6,12 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write, atomic_write_all, require_writable, writable_folder
+from burg_drake.core.files.atomic import (
+    atomic_write,
+    atomic_write_all,
+    require_writable,
+    writable_folder,
+)
 
 
 def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 
 COLUMNS = ("X_OG", "width", "id", "object", "score")
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.hdf5 import open_hdf5
-from burg_drake.core.stored_array import NUMBERS
+from burg_drake.core.files.hdf5 import open_hdf5
+from burg_drake.core.files.stored_array import NUMBERS
 
 
 def external_storage(file: Any, other: Path) -> None:
@@ -99,7 +99,7 @@ def long_fixed_text(file: Any) -> None:
 def test_bombs_are_refused_before_they_take_memory(
     tmp_path: Path, make: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.core.stored_array.MOST_BYTES", 50_000_000)
+    monkeypatch.setattr("burg_drake.core.files.stored_array.MOST_BYTES", 50_000_000)
     path = tmp_path / "bomb.h5"
     with h5py.File(path, "w", libver="latest") as file:
         make(file)

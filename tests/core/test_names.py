@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.names import name_from, require_name
-from burg_drake.core.resources import data_root
-from burg_drake.objects.library import load_library
+from burg_drake.core.paths.names import name_from, require_name
+from burg_drake.core.paths.resources import data_root
+from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline.recipe import load_recipe
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import load_station
 
 RECIPE = "version: 1\nname: mine\nobjects:\n  a: {mesh: a.obj}\n"
 

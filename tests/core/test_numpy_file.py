@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.damaged import reading
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.numpy_file import npy_shape, open_npy, open_npz, write_npy
+from burg_drake.core.files.numpy_file import npy_shape, open_npy, open_npz, write_npy
+from burg_drake.core.files.read_errors import reading
 
 
 def header(shape: tuple[int, ...], dtype: str = "<f8") -> bytes:
@@ -54,7 +54,7 @@ def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
 def test_entries_are_looked_at_before_they_are_unpacked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.core.stored_array.MOST_BYTES", 10_000_000)
+    monkeypatch.setattr("burg_drake.core.files.stored_array.MOST_BYTES", 10_000_000)
     path = tmp_path / "a.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("bomb.npy", header((2_000_000,)) + bytes(16_000_000))

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.grasps.outcome import Outcome, Stage
 
 
 def test_stored_values_never_change():

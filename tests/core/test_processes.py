@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.processes import (
+from burg_drake.core.workers.processes import (
     cause_of_death,
     default_workers,
     start_worker,
@@ -74,7 +74,7 @@ def main(handle):
     print("left alone", file=sys.stderr, flush=True)
 """
 PARENT = """
-from burg_drake.core.processes import start_worker
+from burg_drake.core.workers.processes import start_worker
 start_worker("busy_worker")[0].wait()
 """
 

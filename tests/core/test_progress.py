@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.progress import Pace, Progress, Reporter
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.terminal.progress import Pace, Progress, Reporter
 
 Capture = pytest.CaptureFixture[str]
 

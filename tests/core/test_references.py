@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.references import (
-    is_found,
-    told_reference,
-    with_found_references,
-    with_told_references,
+from burg_drake.core.paths.references import (
+    is_resolved,
+    shareable_reference,
+    with_resolved_references,
+    with_shareable_references,
 )
-from burg_drake.core.resources import data_root
+from burg_drake.core.paths.resources import data_root
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_nothing_above_what_is_shared_is_told(
     path: str, folder: str, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", "/home/ann")
-    assert told_reference(Path(path), Path(folder)) == expected
+    assert shareable_reference(Path(path), Path(folder)) == expected
 
 
 def test_references_are_found_again_where_all_has_moved(tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_references_are_found_again_where_all_has_moved(tmp_path: Path) -> None:
             "name": "/is/no/path",
         }
 
-    told = with_told_references(values(here), here / "out")
+    told = with_shareable_references(values(here), here / "out")
     assert told == {
         "scene": "../scenes/a.yaml",
         "station": "package://burg_drake/stations/panda_tabletop.yaml",
@@ -64,15 +64,15 @@ def test_references_are_found_again_where_all_has_moved(tmp_path: Path) -> None:
     }
     shutil.copytree(here, there)
     (there / "out").mkdir()
-    assert with_found_references(told, there / "out") == values(there.resolve())
+    assert with_resolved_references(told, there / "out") == values(there.resolve())
     shutil.rmtree(here)
     (here / "out").mkdir(parents=True)
-    assert with_found_references(told, here / "out") == {**told, "station": str(station)}
+    assert with_resolved_references(told, here / "out") == {**told, "station": str(station)}
 
 
 @pytest.mark.parametrize("text", ["", "~nosuchuser/x", "a\0b", "x" * 5000, "package://x/y", "a\nb"])
 def test_what_is_no_path_stays(tmp_path: Path, text: str) -> None:
-    assert with_found_references({"scene": text}, tmp_path) == {"scene": text}
+    assert with_resolved_references({"scene": text}, tmp_path) == {"scene": text}
 
 
 def test_what_was_not_found_is_not_looked_for_elsewhere(
@@ -80,7 +80,7 @@ def test_what_was_not_found_is_not_looked_for_elsewhere(
 ) -> None:
     (tmp_path / "lib").mkdir()
     monkeypatch.chdir(tmp_path)
-    (told,) = with_found_references({"library": "lib"}, tmp_path / "elsewhere").values()
-    assert not is_found(told, "models")
-    assert is_found(str(tmp_path / "lib")) and is_found("household", "models")
-    assert is_found("package://burg_drake/scenes/tabletop_six.yaml")
+    (told,) = with_resolved_references({"library": "lib"}, tmp_path / "elsewhere").values()
+    assert not is_resolved(told, "models")
+    assert is_resolved(str(tmp_path / "lib")) and is_resolved("household", "models")
+    assert is_resolved("package://burg_drake/scenes/tabletop_six.yaml")

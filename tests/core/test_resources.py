@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core import resources
 from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.resources import resolve
+from burg_drake.core.paths import resources
+from burg_drake.core.paths.resources import resolve
 
 
 @pytest.fixture

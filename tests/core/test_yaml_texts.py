@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from burg_drake.core.documents.plain_yaml import load_plain_yaml
 from burg_drake.core.errors import DocumentError
-from burg_drake.core.yaml_texts import load_texts
 
 
 def random_tree(rng: np.random.Generator, depth: int) -> Any:
@@ -32,7 +32,7 @@ def test_texts_are_those_of_pyyaml(tmp_path: Path, flow: bool | None) -> None:
         tree = {"top": random_tree(rng, 4)}
         tree["again"] = tree["top"]  # an anchor, where it is a structure
         path.write_text(yaml.safe_dump(tree, default_flow_style=flow), encoding="utf-8")
-        assert load_texts(path) == yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
+        assert load_plain_yaml(path) == yaml.load(path.read_text(encoding="utf-8"), yaml.BaseLoader)
 
 
 @pytest.mark.parametrize(
@@ -54,9 +54,9 @@ def test_errors_name_file_and_line(tmp_path: Path, text: str, said: str) -> None
     path = tmp_path / "a.yaml"
     path.write_text(text)
     with pytest.raises(DocumentError, match=said):
-        load_texts(path)
+        load_plain_yaml(path)
 
 
 def test_files_that_are_not_there_or_not_text(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="cannot read"):
-        load_texts(tmp_path / "none.yaml")
+        load_plain_yaml(tmp_path / "none.yaml")

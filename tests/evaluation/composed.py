@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
+from burg_drake.core.documents.schema import Pose
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 
 
 def composed(*placed: tuple[str, str, float, float, float]) -> Scene:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.evaluation.campaign import Campaign
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station, load_station
+from burg_drake.evaluation.store.campaign_folder import Campaign
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station, load_station
 
 # Worker processes and scripts import the judges by name.
 sys.path.insert(0, str(Path(__file__).parent))

@@ -7,9 +7,9 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 
 from burg_drake.core.errors import BurgError
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.job import Job, JobFailed, OnFailure
-from burg_drake.evaluation.judge import Verdict, judge_grasp
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
+from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 
 
 @dataclass

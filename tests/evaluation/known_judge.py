@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import Decide, Decision, Screen
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.stages.judge import Decide, Decision, Screen
 
 
 def number(id: str) -> int:
@@ -245,6 +245,6 @@ def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause:
     setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     setattr("burg_drake.evaluation.cascade._require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this
-    setattr("burg_drake.evaluation.scene_crew.preparers", lambda workers: 0)
+    setattr("burg_drake.evaluation.run.scene_processes.preparers", lambda workers: 0)
     # the chart of the arm's reach takes longer than all else
     setattr("burg_drake.evaluation.report.page.reachability_section", lambda *_: None)

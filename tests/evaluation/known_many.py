@@ -11,13 +11,13 @@ import numpy as np
 from inline_executor import Inline
 from known_scene import write_scene
 
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.campaign import Campaign
+from burg_drake.core.documents.schema import Pose
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import TEXT, Columns
-from burg_drake.scene.scene import save_scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.records.table import TEXT, Columns
+from burg_drake.evaluation.store.campaign_folder import Campaign
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.scene import save_scene
+from burg_drake.station.document.station_document import Station
 
 OPTIONS: dict[str, Any] = {"grasps_per_object": 5, "blind": True, "progress": False}
 
@@ -52,9 +52,9 @@ def same(a: Columns, b: Columns) -> bool:
 
 def empty_pages(setattr: Callable[[str, Any], None]) -> None:
     """Reports are written without anything in them, which takes no time."""
-    setattr("burg_drake.evaluation.preparation.write_report", _write_nothing)
-    setattr("burg_drake.evaluation.many_scenes.renew_report", lambda campaign: None)
-    setattr("burg_drake.evaluation.merge_finish.write_campaign_report", _write_nothing)
+    setattr("burg_drake.evaluation.run.preparation.write_report", _write_nothing)
+    setattr("burg_drake.evaluation.run.many_scenes.renew_report", lambda campaign: None)
+    setattr("burg_drake.evaluation.merge.finishing.write_campaign_report", _write_nothing)
 
 
 def _write_nothing(run: Run | Campaign) -> None:

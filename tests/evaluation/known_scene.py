@@ -6,10 +6,10 @@ from pathlib import Path
 
 import trimesh
 
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.core.documents.schema import Pose
+from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
+from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 
 
 def write_library(folder: Path) -> ObjectLibrary:

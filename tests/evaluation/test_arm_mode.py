@@ -9,19 +9,19 @@ import pytest
 from rich.console import Console
 
 from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.origin import read_origin
-from burg_drake.evaluation.rerun import as_result, decisive_mode, differences, rerun
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import Pushes, pushes, summarize
-from burg_drake.evaluation.summary_tables import summary_view
-from burg_drake.evaluation.table import table_row
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.evaluation.trial import read_trial
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.table import table_row
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.records.trial import read_trial
+from burg_drake.evaluation.replay import as_result, decisive_mode, differences, rerun
+from burg_drake.evaluation.results.summary import Pushes, pushes, summarize
+from burg_drake.evaluation.results.summary_tables import summary_view
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.best_grasps import best_of_each, index_of, ranked_set, shown_ids
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.results.best_grasps import best_of_each, index_of, ranked_set, shown_ids
 
 HOLDER = np.array(["mug", "box", "mug", "mug", "box", "mug"])
 ALL = np.ones(6, dtype=bool)

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.resources import data_root
-from burg_drake.evaluation.cluster.bundle import load_bundle, make_bundle, require_content
-from burg_drake.evaluation.cluster.unpacked import FOLDER, bundle_folder, unpack
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
-from burg_drake.station.world_content import world_content
+from burg_drake.core.paths.resources import data_root
+from burg_drake.evaluation.cluster.bundles.bundle import load_bundle, make_bundle, require_content
+from burg_drake.evaluation.cluster.bundles.unpacked import FOLDER, bundle_folder, unpack
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.content import world_content
+from burg_drake.station.document.station_document import load_station
 
 SCENE = """version: 1
 name: two

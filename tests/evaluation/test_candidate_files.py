@@ -13,18 +13,18 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, inverse, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidate_files import NoSceneIdsError, read_grasps
-from burg_drake.evaluation.candidate_sampling import sample_candidates
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.sampling import sample_candidates
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.candidates.scene_frame import in_frame
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.placement import in_frame
-from burg_drake.evaluation.run_grasps import run_grasps
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.evaluation.table_file import read_table
+from burg_drake.evaluation.grasp_sets.candidate_files import NoSceneIdsError, read_grasps
+from burg_drake.evaluation.grasp_sets.run_set import run_grasps
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 DOWN = (0.0, 0.0, -1.0)
 LEFT, RIGHT = (0.1, 0.2, 0.025), (0.3, 0.2, 0.025)

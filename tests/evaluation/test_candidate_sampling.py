@@ -7,21 +7,21 @@ import dataclasses
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidate_sampling import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.sampling import (
     sample_candidates,
     sample_library,
     sample_scene,
 )
-from burg_drake.evaluation.sampled_set import sampled_set
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.grasping.clearance import HandClearance, hand_clearance_alone
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station, load_station
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.grasp_sets.sampled import sampled_set
+from burg_drake.grasping.clearance.hand_clearance import HandClearance, hand_clearance_alone
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Station, load_station
 
 BLIND = SamplingSettings(blind=True)
 

@@ -16,17 +16,17 @@ from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.progress import Progress
-from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import read_journal
-from burg_drake.evaluation.report.provenance import reproduce_command
-from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table import TEXT
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
+from burg_drake.evaluation.records.journal import read_journal
+from burg_drake.evaluation.records.table import TEXT
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.report.sections.reproduction import reproduce_command
+from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 
 def same_results(a: Run, b: Run) -> bool:
@@ -331,7 +331,7 @@ def test_a_run_that_is_killed_at_its_start_goes_on(
 
     options = {"grasps_per_object": 2, "blind": True, "workers": 1, "progress": False}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"burg_drake.evaluation.run_store.{write}", die)
+        patch.setattr(f"burg_drake.evaluation.store.run_folder.{write}", die)
         with pytest.raises(KeyboardInterrupt):
             evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
     run = evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
@@ -407,7 +407,7 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
         raise InvalidInputError("'left' and 'right' overlap")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.station.check.require_sound_scene", refuse)
+        patch.setattr("burg_drake.station.checks.scene_issues.require_sound_scene", refuse)
         with pytest.raises(InvalidInputError, match="overlap"):
             evaluate(scene, station, tmp_path / "run", progress=False)
     assert not (tmp_path / "run").exists()
@@ -416,8 +416,8 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
 def test_judges_are_pickled_with_all_they_need(scene: Scene, station: Station) -> None:
     import pickle
 
-    from burg_drake.evaluation.station_judge import StationJudgeFactory
-    from burg_drake.station.engine import ENGINES
+    from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
+    from burg_drake.station.document.engine import ENGINES
 
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "reach")
     assert pickle.loads(pickle.dumps(factory)).scene.content == scene.content

@@ -18,28 +18,28 @@ from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, expected, 
 
 import burg_drake
 from burg_drake.core.errors import ClusterError, InvalidInputError
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.processes import start_worker
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executor import Job, JobFailed
-from burg_drake.evaluation.limits import Limits
-from burg_drake.evaluation.station_judge import StationJudgeFactory
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.workers.processes import start_worker
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
+from burg_drake.evaluation.workers.executor import Job, JobFailed
+from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.crew import Crew, threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
 from burg_drake.evaluation.cluster.delivery import deliver_bundle  # noqa: E402
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
+from burg_drake.evaluation.cluster.members import ClusterWorkers, threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.node import NO_WEB  # noqa: E402
 from burg_drake.evaluation.cluster.sent_job import SentJob  # noqa: E402
 
-LIMITS = Limits(cpu=0.5, wall=2.0)
+LIMITS = WorkerLimits(cpu=0.5, wall=2.0)
 
 
 class Cluster:
@@ -219,9 +219,9 @@ sys.path.insert(0, {tests!r})
 from pathlib import Path
 import numpy as np
 from known_judge import KnownJudge, MakeAndTell
-from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.executor import Job
+from burg_drake.evaluation.workers.executor import Job
 grasps = [Candidate(str(k), "cube", np.eye(4)) for k in range(400)]
 with connect_cluster("local:1") as executor:
     job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps)
@@ -281,16 +281,16 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 ) -> None:
     """After the first look at the workers."""
     nodes = LocalNodes(0)
-    look = Crew.look
+    look = ClusterWorkers.look
 
-    def look_and_kill(self: Crew) -> list[Any]:
+    def look_and_kill(self: ClusterWorkers) -> list[Any]:
         lost = look(self)
         self._client.rpc.timeout = 0.2
         nodes.scheduler.kill()
         nodes.scheduler.wait()
         return lost
 
-    monkeypatch.setattr(Crew, "look", look_and_kill)
+    monkeypatch.setattr(ClusterWorkers, "look", look_and_kill)
     try:
         lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:

@@ -15,22 +15,22 @@ import pytest
 from known_judge import KnownJudge, Make, expected
 
 from burg_drake.core.errors import ClusterError, InvalidInputError
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executor import Job
-from burg_drake.evaluation.judge import judge_grasp
-from burg_drake.evaluation.limits import Limits
-from burg_drake.evaluation.station_judge import StationJudgeFactory
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.stages.judge import judge_grasp
+from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
+from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.crew import threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
+from burg_drake.evaluation.cluster.members import threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.remote import Answers, Supervisor  # noqa: E402
 
 
@@ -53,7 +53,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Supervisor, "judge", judge_here)
 
 
-def judge_here(self: Supervisor, job: Job, limits: Limits) -> Answers:
+def judge_here(self: Supervisor, job: Job, limits: WorkerLimits) -> Answers:
     judge = KnownJudge()
     return Answers([(k, judge_grasp(judge, grasp)) for k, grasp in enumerate(job.candidates)])
 
@@ -126,7 +126,7 @@ def test_grasps_that_are_not_answered_are_asked_again(monkeypatch: pytest.Monkey
     job, silent = Job("job", Make(KnownJudge()), grasps(12)), "cube-0005"
     asked: list[int] = []
 
-    def judge_some(self: Supervisor, job: Job, limits: Limits) -> Answers:
+    def judge_some(self: Supervisor, job: Job, limits: WorkerLimits) -> Answers:
         """Forgets the last one of several, and always a certain one."""
         answers = judge_here(self, job, limits)
         asked.append(len(job.candidates))

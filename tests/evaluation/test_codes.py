@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.codes import member_codes
-from burg_drake.evaluation.rows import CLEARANCE_STEP, best_rows
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.records.rows import CLEARANCE_STEP, best_rows
+from burg_drake.evaluation.store.text_codes import member_codes
 
 
 def test_codes_are_places_among_the_members() -> None:

@@ -14,9 +14,9 @@ from inline_executor import Inline
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import SimulationError
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import Job, OnFailure
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.workers.executor import Job, OnFailure
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 OPTIONS = {"grasps_per_object": 5, "blind": True, "progress": False}
 

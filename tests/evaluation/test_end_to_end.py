@@ -13,17 +13,17 @@ import pytest
 import trimesh
 
 from burg_drake.apps.cli import main
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import grasp_from_axes, inverse
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.schema import Pose
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.table_file import read_table
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.pipeline.build import ObjectSource, build_library
-from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram import instance_pose
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.station.document.station_document import load_station
 
 SCENE, STATION = "tabletop_six", "panda_tabletop"
 BOX = (0.06, 0.158, 0.21)
@@ -110,7 +110,7 @@ def test_a_lifted_grasp_has_its_margins_and_arm_configurations(run: Run) -> None
 
 
 def test_the_arm_stands_at_the_grasp(run: Run) -> None:
-    from burg_drake.station.diagram import build_station_diagram
+    from burg_drake.station.diagram.builder import build_station_diagram
 
     scene, station = run.scene(), run.station()
     built = build_station_diagram(scene, station, robot="arm")

@@ -22,10 +22,10 @@ from known_judge import (
 )
 
 from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.limits import Limits
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.evaluation.workers.single_job import judge_all
 
 
 def grasps(n: int) -> list[Candidate]:
@@ -117,7 +117,7 @@ def test_deaths_without_end_end_the_run() -> None:
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
     judged = []
     with pytest.raises(SimulationError, match=r"^5 grasps in a row could not .*: .*SIGSEGV"):
-        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=Limits(hopeless=5)):
+        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=WorkerLimits(hopeless=5)):
             judged.append(candidate.id)
     assert len(set(judged)) == len(judged) == 5  # none of them is lost
 
@@ -147,7 +147,7 @@ def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
 def test_a_grasp_that_takes_too_long_is_settled(workers: int) -> None:
     # 20 grasps of 50 ms each: a whole task is not a grasp
     judge = CrashingJudge(pause=0.05, how=(("cube-0003", "hang"), ("cube-0012", "spin")))
-    limits = Limits(cpu=0.4, wall=4.0)
+    limits = WorkerLimits(cpu=0.4, wall=4.0)
     judged = {
         c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=workers, limits=limits)
     }
@@ -170,7 +170,9 @@ def test_a_slow_grasp_is_not_one_that_takes_too_long() -> None:
     judge = KnownJudge(pause=0.6)
     ids = {c.id for c in grasps(20) if expected(c.id).stage is Stage.EXECUTED}
     few = [c for c in grasps(20) if c.id in ids][:2]
-    judged = {c.id: v for c, v in judge_all(few, Make(judge), workers=2, limits=Limits(cpu=0.3))}
+    judged = {
+        c.id: v for c, v in judge_all(few, Make(judge), workers=2, limits=WorkerLimits(cpu=0.3))
+    }
     assert {id: v.outcome for id, v in judged.items()} == {c.id: expected(c.id) for c in few}
 
 

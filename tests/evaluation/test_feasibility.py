@@ -15,20 +15,20 @@ import numpy as np
 import pytest
 from known_judge import refuse
 
-from burg_drake.core.columns import describe
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.progress import Progress
+from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.feasibility import reach, reach_columns
-from burg_drake.evaluation.journal import encode
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.table_file import read_table, write_table
-from burg_drake.motion.plan_file import load_plan
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station, load_station
+from burg_drake.evaluation.records.journal import encode
+from burg_drake.evaluation.records.table_file import read_table, write_table
+from burg_drake.evaluation.stages.judge import Verdict
+from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Station, load_station
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
@@ -189,7 +189,7 @@ def test_what_failed_is_asked_again_on_request(
 
 KILLED = """
 import sys
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.feasibility import reach
 grasps = GraspSet.load(sys.argv[1])
 reach("tabletop_six", "panda_tabletop", grasps, plans=sys.argv[2], plan_format="json", workers=1)

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.candidates import given_candidates
+from burg_drake.evaluation.candidates.single_object import object_grasps
 from burg_drake.evaluation.feasibility import ReachJudgeFactory
-from burg_drake.evaluation.grasp_counts import THE_ARM, GraspCount, count_grasps, grasp_counts
-from burg_drake.evaluation.object_grasps import object_grasps
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.scene.scene import Scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.evaluation.stages.counts import THE_ARM, GraspCount, count_grasps, grasp_counts
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 from tests.evaluation.composed import composed
 
 N = 12

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidate_files import read_grasps
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.exchange import read_in_frame
-from burg_drake.evaluation.grasp_input import hand_of, hand_reference, read_input
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.sampled_set import sample_grasps
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.formats.conversion import write_each_object
+from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
+from burg_drake.evaluation.grasp_sets.exchange import read_in_frame
+from burg_drake.evaluation.grasp_sets.input import hand_of, hand_reference, read_input
+from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.formats.common.conversion import write_each_object
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS, format_of
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.scene.scene import Scene
-from burg_drake.station.hand import locate_hand
-from burg_drake.station.station import Station, load_station
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.gripper_document import locate_hand
+from burg_drake.station.document.station_document import Station, load_station
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.inputs import find_inputs
-from burg_drake.evaluation.run_document import origin_of
-from burg_drake.evaluation.run_store import Run
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.records.run_document import origin_of
+from burg_drake.evaluation.store.inputs import find_inputs
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ import pytest
 from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expected, refuse
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executor import Job, JobFailed, LocalExecutor
-from burg_drake.evaluation.limits import Limits
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.workers.executor import Job, JobFailed, LocalExecutor
+from burg_drake.evaluation.workers.limits import WorkerLimits
 
 
 def grasps(scene: str, n: int) -> list[Candidate]:
@@ -67,7 +67,7 @@ def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
         Job("fine", Make(KnownJudge()), grasps("fine", 6)),
     ]
     failed: list[JobFailed] = []
-    executor = LocalExecutor(2, Limits(hopeless=3))
+    executor = LocalExecutor(2, WorkerLimits(hopeless=3))
     judged = list(executor.judge(jobs, failed.append))
     whole = {g.id: expected(g.id) for name in ("good", "fine") for g in grasps(name, 6)}
     found = {grasp.id: verdict.outcome for job, grasp, verdict in judged}

@@ -9,23 +9,23 @@ from functools import partial
 import numpy as np
 import pytest
 
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.candidate_sampling import sample_candidates
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.judge import (
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.candidates.sampling import sample_candidates
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.stages.judge import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
     MARGINS,
     Decision,
     Screen,
-    Screened,
+    ScreenAnswers,
     judge_grasp,
     screen_grasps,
 )
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
 
 GRASP = Candidate("cube-1", "cube", np.eye(4))
 
@@ -90,13 +90,13 @@ def test_an_error_is_the_outcome_of_the_stage_it_came_from() -> None:
 def test_what_was_screened_before_is_not_asked_again() -> None:
     judge = Scripted([ValueError("asked"), Decision(), Decision(), Decision(Outcome.LIFTED)])
     asked: list[Stage] = []
-    passed = Screened().then(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
+    passed = ScreenAnswers().then(Stage.CLEAR, Decision(margins={"overlap": 0.0}), 2.5e-5)
     verdict = judge_grasp(judge, GRASP, asked.append, passed)
     assert asked == list(Stage)[1:]
     assert verdict.outcome is Outcome.LIFTED and verdict.margins == {"overlap": 0.0}
     assert list(verdict.cpu) == list(Stage) and verdict.cpu[Stage.CLEAR] == 2.5e-5
 
-    rejected = Screened().then(Stage.CLEAR, Decision(Outcome.COLLISION_TABLE, "table"), 2.5e-5)
+    rejected = ScreenAnswers().then(Stage.CLEAR, Decision(Outcome.COLLISION_TABLE, "table"), 2.5e-5)
     verdict = judge_grasp(judge, GRASP, asked.append, rejected)
     assert (verdict.outcome, verdict.stage) == (Outcome.COLLISION_TABLE, Stage.CLEAR)
     assert verdict.blocker == "table" and verdict.cpu == {Stage.CLEAR: 2.5e-5}
@@ -144,7 +144,7 @@ class Picky(Scripted):
 
 def test_an_error_while_screening_is_that_of_one_grasp() -> None:
     ids = ("cube-0", "cube-1", "cube-2")
-    grasps = [(Candidate(id, "cube", np.eye(4)), Screened()) for id in ids]
+    grasps = [(Candidate(id, "cube", np.eye(4)), ScreenAnswers()) for id in ids]
     screened = screen_grasps(Picky([]), grasps)
     assert [s.outcome for s in screened] == [None, Outcome.SIMULATION_FAILED, None]
     verdict = screened[1].verdict()
@@ -155,8 +155,8 @@ def test_an_error_while_screening_is_that_of_one_grasp() -> None:
 
 def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
     """To the last bit, and on instances in any order: the trial asks about its grasp again."""
-    from burg_drake.evaluation.station_judge import StationJudge
-    from burg_drake.simulation.hand_trial import HandTrial
+    from burg_drake.evaluation.stages.station_judge import StationJudge
+    from burg_drake.simulation.trials.hand_trial import HandTrial
 
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
     judge = StationJudge(scene, station, engine=ENGINES["standard"], mode="hand")
@@ -182,7 +182,7 @@ def test_a_judge_without_a_last_word_is_a_mistake() -> None:
 
 
 def test_margins_are_those_of_the_trial() -> None:
-    from burg_drake.simulation.result import Margins
+    from burg_drake.simulation.trials.result import Margins
 
     of_trials = {field.name for field in fields(Margins)}
     assert of_trials == {*MARGINS} - {*ARM_SCREEN_MARGINS, "duration", LIFT_HEIGHT}

@@ -15,18 +15,18 @@ from page_reading import read_page
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.campaign import Campaign, load_campaign
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.table import TEXT
 from burg_drake.evaluation.report import campaign_page
-from burg_drake.evaluation.results import load_runs, read_results
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import summarize
-from burg_drake.evaluation.table import TEXT
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.scene.scene_files import scene_references
-from burg_drake.station.station import Station
+from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
+from burg_drake.evaluation.store.loading import load_runs, read_results
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.files import scene_references
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.station_document import Station
 
 pytest.importorskip("pyarrow")
 pytestmark = pytest.mark.usefixtures("pages")
@@ -164,14 +164,15 @@ def test_of_many_scenes_only_who_asks_gets_reports(
     def reports() -> list[bool]:
         return [run.report_path.exists() for run in campaign.runs]
 
-    monkeypatch.setattr("burg_drake.evaluation.campaign_document.FEW_SCENES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.records.campaign_document.FEW_SCENES", 2)
     campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
     assert campaign.complete and reports() == [False] * 3
     assert all(run.table_path.exists() for run in campaign.runs)
     dates = {run.table_path: run.table_path.stat().st_mtime_ns for run in campaign.runs}
     prepared: list[str] = []
     monkeypatch.setattr(
-        "burg_drake.evaluation.scene_work.open_run", lambda folder, *_: prepared.append(folder.name)
+        "burg_drake.evaluation.run.scene_tasks.open_run",
+        lambda folder, *_: prepared.append(folder.name),
     )
     run_all(scenes, station, tmp_path / "all", grasps_per_object=1)  # has nothing to do
     assert not prepared and all(p.stat().st_mtime_ns == date for p, date in dates.items())
@@ -246,7 +247,7 @@ def test_fewer_grasps_than_asked_are_explained(
     def shortfall(name: str, asked: int, part: object, found: int) -> str:
         return f"{name}: {found} of 6" if name == "bar" else ""
 
-    monkeypatch.setattr("burg_drake.evaluation.run_notes.shortfall", shortfall)
+    monkeypatch.setattr("burg_drake.evaluation.results.notes.shortfall", shortfall)
     campaign = run_all(scenes, station, tmp_path / "all")
     assert summarize(load_campaign(campaign.path)).notes == (
         "scene moved: bar: 5 of 6",

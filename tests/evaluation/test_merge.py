@@ -11,18 +11,18 @@ from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import UNFINISHED
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation import merge
-from burg_drake.evaluation.campaign import Campaign
+from burg_drake.core.files.atomic import UNFINISHED
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import JOURNAL_FILE, decode, encode
-from burg_drake.evaluation.merge import unite
+from burg_drake.evaluation.merge import runs
+from burg_drake.evaluation.merge.runs import unite
+from burg_drake.evaluation.records.journal import JOURNAL_FILE, decode, encode
+from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.report import report_page
-from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.evaluation.shard import Shard
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.store.campaign_folder import Campaign
+from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 pytestmark = pytest.mark.usefixtures("pages")
 
@@ -194,7 +194,7 @@ def test_the_same_merge_finishes_what_was_killed(
         whole = unite(paths, tmp_path / f"whole_{where}")
         out = tmp_path / where
         with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            patch.setattr(f"burg_drake.evaluation.merge_finish.{where}", interrupt)
+            patch.setattr(f"burg_drake.evaluation.merge.finishing.{where}", interrupt)
             unite(paths, out)
         assert not (out / "report.html").exists()
         (note,) = out.glob(".merge.*")
@@ -238,9 +238,9 @@ def test_what_is_united_cannot_be_written_meanwhile(
                 call(given, station, out, grasps_per_object=1)
         return copytree(*arguments, **options)
 
-    choose, copytree = merge.choose, shutil.copytree
+    choose, copytree = runs.choose, shutil.copytree
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(merge, "choose", look)
+        patch.setattr(runs, "choose", look)
         unite([one.path], tmp_path / "a")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.apps.arguments import Parser
-from burg_drake.apps.motion_options import add_motion, chosen_motion
-from burg_drake.evaluation.motion_numbers import motion_in, motion_options, motion_text
-from burg_drake.evaluation.run_document import numbers
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station, load_station
+from burg_drake.apps.options.arguments import Parser
+from burg_drake.apps.options.hand_motion import add_motion, chosen_motion
+from burg_drake.evaluation.records.motion_numbers import motion_in, motion_options, motion_text
+from burg_drake.evaluation.records.run_document import numbers
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Station, load_station
 
 USUAL = GraspMotion()
 MOTIONS = (

@@ -10,21 +10,21 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import read_journal
-from burg_drake.evaluation.origin import read_origin
-from burg_drake.evaluation.report.provenance import reproduce_command
-from burg_drake.evaluation.rerun import differences, rerun
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import summarize
-from burg_drake.evaluation.table import table_row
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.evaluation.trial import read_trial
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import load_station
+from burg_drake.evaluation.records.journal import read_journal
+from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.table import table_row
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.records.trial import read_trial
+from burg_drake.evaluation.replay import differences, rerun
+from burg_drake.evaluation.report.sections.reproduction import reproduce_command
+from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import load_station
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

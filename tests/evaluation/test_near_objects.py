@@ -7,10 +7,10 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidate_files import by_names, read_grasps
-from burg_drake.evaluation.near_objects import FARTHEST, require_near
-from burg_drake.scene.scene import Scene
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.grasp_sets.candidate_files import by_names, read_grasps
+from burg_drake.evaluation.grasp_sets.near_objects import FARTHEST, require_near
+from burg_drake.scene.document.scene import Scene
 
 
 def at(*positions: tuple[float, float, float], object: str = "cube") -> GraspSet:

@@ -7,11 +7,11 @@ import dataclasses
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.origin import Origin, engine_label, read_origin
-from burg_drake.evaluation.run_document import numbers
-from burg_drake.simulation.trial_settings import TrialSettings
-from burg_drake.station.engine import ENGINES, Engine
-from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.evaluation.records.origin import TrialOrigin, engine_label, read_origin
+from burg_drake.evaluation.records.run_document import numbers
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.station.document.engine import ENGINES, Engine
+from burg_drake.station.document.grasp_motion import GraspMotion
 
 CUSTOM = Engine(
     name="mine",
@@ -23,8 +23,8 @@ CUSTOM = Engine(
 )
 
 
-def origin(engine: Engine) -> Origin:
-    return Origin(
+def origin(engine: Engine) -> TrialOrigin:
+    return TrialOrigin(
         scene="/a folder/scene, 1.yaml",
         scene_content="0123456789ab",
         station="panda_tabletop",
@@ -38,7 +38,7 @@ def origin(engine: Engine) -> Origin:
     )
 
 
-def row(made: Origin) -> dict[str, object]:
+def row(made: TrialOrigin) -> dict[str, object]:
     return {
         **made.cells(),
         "engine": engine_label(made.engine),

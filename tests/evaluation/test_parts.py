@@ -13,15 +13,15 @@ import pytest
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
-from burg_drake.evaluation import part_writer
-from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import JOURNAL_FILE
-from burg_drake.evaluation.part_writer import PartWriter
-from burg_drake.evaluation.results import read_results
-from burg_drake.evaluation.run_store import load_run
-from burg_drake.evaluation.table import Columns
-from burg_drake.station.station import Station
+from burg_drake.evaluation.records.journal import JOURNAL_FILE
+from burg_drake.evaluation.records.table import Columns
+from burg_drake.evaluation.store import part_writer
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
+from burg_drake.evaluation.store.loading import read_results
+from burg_drake.evaluation.store.part_writer import PartWriter
+from burg_drake.evaluation.store.run_folder import load_run
+from burg_drake.station.document.station_document import Station
 
 pytestmark = pytest.mark.usefixtures("pages")
 
@@ -131,7 +131,7 @@ def test_grown_journals_and_later_verdicts(campaign: Campaign) -> None:
 
 
 def test_an_edit_is_noticed_wherever_it_is(campaign: Campaign, monkeypatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.segments.TAIL", 64)
+    monkeypatch.setattr("burg_drake.evaluation.store.part_segments.TAIL", 64)
     journal = campaign.folder("moved") / JOURNAL_FILE
     data = journal.read_bytes()
     lines = data.splitlines(keepends=True)
@@ -154,9 +154,9 @@ def test_an_edit_is_noticed_wherever_it_is(campaign: Campaign, monkeypatch) -> N
 
 
 def test_what_nobody_touched_is_not_read(campaign: Campaign, monkeypatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.segments.TAIL", 64)
+    monkeypatch.setattr("burg_drake.evaluation.store.part_segments.TAIL", 64)
     read = []
-    segments = importlib.import_module("burg_drake.evaluation.segments")
+    segments = importlib.import_module("burg_drake.evaluation.store.part_segments")
     hashed = segments._hash
     monkeypatch.setattr(segments, "_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1])
     load_campaign(campaign.path).columns(["slip"])

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, swap_fingers
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidate_sampling import sample_candidates
-from burg_drake.evaluation.placement import by_instance, held_instances, in_frame
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.scene.scene import Instance, Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.candidates.sampling import sample_candidates
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.candidates.scene_frame import by_instance, held_instances, in_frame
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.scene.document.scene import Instance, Scene
+from burg_drake.station.document.station_document import Station
 
 DOWN = (0.0, 0.0, -1.0)
 

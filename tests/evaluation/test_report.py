@@ -11,15 +11,15 @@ import pytest
 from known_judge import CrashingJudge, Make
 from page_reading import part, read_page
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import report_page
-from burg_drake.evaluation.report.charts import Series, histogram, nice_step
-from burg_drake.evaluation.report.markup import Html, element, join
-from burg_drake.evaluation.report.outcomes import STOPPED
-from burg_drake.evaluation.report.style import STYLES, style_sheet
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import summarize
+from burg_drake.evaluation.report.elements.blocks import Html, element, join
+from burg_drake.evaluation.report.elements.charts import Series, histogram, nice_step
+from burg_drake.evaluation.report.elements.style import STYLES, style_sheet
+from burg_drake.evaluation.report.sections.outcomes import STOPPED
+from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture

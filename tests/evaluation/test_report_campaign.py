@@ -15,20 +15,20 @@ from known_judge import expected
 from known_scene import write_scene
 from page_reading import Node, part, read_page
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.statistics import clustered_interval, wilson_interval
-from burg_drake.evaluation.campaign import Campaign, load_campaign
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.part_store import Rows
 from burg_drake.evaluation.report import campaign_page, write_campaign_report
-from burg_drake.evaluation.report.causes import causes_of, rows_of_run
-from burg_drake.evaluation.report.outcomes import worst_first
-from burg_drake.evaluation.report.scenes import ranked_chart
-from burg_drake.evaluation.report.style import STYLES
-from burg_drake.evaluation.summary import Group, summarize
-from burg_drake.scene.scene import Scene
-from burg_drake.visualization.palette import group_of
+from burg_drake.evaluation.report.elements.style import STYLES
+from burg_drake.evaluation.report.sections.causes import causes_of, rows_of_run
+from burg_drake.evaluation.report.sections.outcomes import worst_first
+from burg_drake.evaluation.report.sections.scenes import ranked_chart
+from burg_drake.evaluation.results.summary import OutcomeCounts, summarize
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
+from burg_drake.evaluation.store.part_store import StoredRows
+from burg_drake.scene.document.scene import Scene
+from burg_drake.visualization.style.palette import group_of
 
 pytest.importorskip("pyarrow")
 PER_OBJECT = 8
@@ -173,10 +173,10 @@ def test_a_thousand_scenes_stay_a_readable_page(
     many = Campaign(campaign.path, dataclasses.replace(campaign.document, scenes=tuple(entries)))
     counts, rows_of_three = np.resize(each, scenes), Campaign.rows
 
-    def rows(self: Campaign, names=None) -> Rows:
+    def rows(self: Campaign, names=None) -> StoredRows:
         once = rows_of_three(campaign, names).table
         tables = [once] * (scenes // 3) + [once.slice(0, int(each[: scenes % 3].sum()))]
-        return Rows(pyarrow.concat_tables(tables).combine_chunks(), counts)
+        return StoredRows(pyarrow.concat_tables(tables).combine_chunks(), counts)
 
     monkeypatch.setattr(Campaign, "rows", rows)
     monkeypatch.setattr(Campaign, "complete", True)
@@ -201,7 +201,9 @@ def test_nothing_judged_and_shares_are_said(
     monkeypatch.setattr(
         Campaign,
         "rows",
-        lambda self, names=None: Rows(rows(self, names).table.slice(0, 0), np.zeros(3, dtype=int)),
+        lambda self, names=None: StoredRows(
+            rows(self, names).table.slice(0, 0), np.zeros(3, dtype=int)
+        ),
     )
     document = dataclasses.replace(campaign.document, shard="1/1")
     empty = Campaign(campaign.path, document)
@@ -219,10 +221,10 @@ def test_the_report_is_written_where_it_belongs(campaign: Campaign) -> None:
 
 
 def test_scenes_without_trials_come_first_and_have_no_dot() -> None:
-    def group(name: str, lifted: int, slipped: int, clear: int) -> Group:
+    def group(name: str, lifted: int, slipped: int, clear: int) -> OutcomeCounts:
         counts = {Outcome.LIFTED: lifted, Outcome.SLIPPED: slipped, Outcome.COLLISION_TABLE: clear}
         decided: Counter = Counter({"executed": lifted + slipped, "clear": clear})
-        return Group(name, sum(counts.values()), Counter(counts), decided, Counter())
+        return OutcomeCounts(name, sum(counts.values()), Counter(counts), decided, Counter())
 
     groups = [group("good", 9, 1, 0), group("none", 0, 0, 7), group("bad", 1, 9, 3)]
     ranked = worst_first(groups)

@@ -9,10 +9,10 @@ import pytest
 
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import report_page
-from burg_drake.evaluation.report.reachability import reachability_section
-from burg_drake.evaluation.run_store import Run
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.report.sections.reachability import reachability_section
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture

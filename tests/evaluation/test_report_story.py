@@ -16,16 +16,16 @@ from known_scene import write_scene
 from page_reading import Node, part, read_page
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report import report_page
-from burg_drake.evaluation.report.charts import Series
-from burg_drake.evaluation.report.mirrored import Limit, mirrored_histogram
-from burg_drake.evaluation.report.picture import GRASPS, INSTANCES, drawn_rows
-from burg_drake.evaluation.report.style import STYLES
-from burg_drake.evaluation.run_store import Run, load_run
-from burg_drake.station.station import load_station
-from burg_drake.visualization.palette import group_of
+from burg_drake.evaluation.report.elements.charts import Series
+from burg_drake.evaluation.report.elements.mirrored import Limit, mirrored_histogram
+from burg_drake.evaluation.report.elements.style import STYLES
+from burg_drake.evaluation.report.sections.pictures import GRASPS, INSTANCES, drawn_rows
+from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.station.document.station_document import load_station
+from burg_drake.visualization.style.palette import group_of
 
 PER_OBJECT = 20
 
@@ -201,7 +201,7 @@ def test_a_run_of_failures_alone(run: Run, tmp_path: Path) -> None:
 
 
 def _verdicts(journal: str, folder: Path) -> dict:
-    from burg_drake.evaluation.journal import read_journal
+    from burg_drake.evaluation.records.journal import read_journal
 
     path = folder / "journal.jsonl"
     path.write_text(journal)

@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.origin import Origin
-from burg_drake.evaluation.rerun import comparison, differences
-from burg_drake.evaluation.run_document import software_versions
-from burg_drake.station.engine import ENGINES
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.records.origin import TrialOrigin
+from burg_drake.evaluation.records.run_document import software_versions
+from burg_drake.evaluation.replay import comparison, differences
+from burg_drake.evaluation.stages.judge import Verdict
+from burg_drake.station.document.engine import ENGINES
 
 VERDICT = Verdict(
     Outcome.LIFTED,
@@ -22,7 +22,7 @@ VERDICT = Verdict(
     q_grasp=(1.0,),
     cpu={Stage.CLEAR: 1.0},
 )
-ORIGIN = Origin(
+ORIGIN = TrialOrigin(
     scene="s",
     scene_content="0",
     station="t",

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.rows import best_rows, rows_of
-from burg_drake.evaluation.table import Columns
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.records.rows import best_rows, rows_of
+from burg_drake.evaluation.records.table import Columns
 
 MILLIMETRE = 1e-3
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_grasps import run_grasps
-from burg_drake.evaluation.run_store import JOURNAL_FILE, Run, load_run
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.grasp_sets.run_set import run_grasps
+from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, load_run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture

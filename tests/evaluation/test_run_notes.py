@@ -10,19 +10,19 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from burg_drake.core.outcome import Outcome
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
+from burg_drake.evaluation.candidates.sampling_shortfall import shortfall
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import load_run
-from burg_drake.evaluation.sampled_set import sample_grasps
-from burg_drake.evaluation.sampling_settings import SamplingSettings
-from burg_drake.evaluation.scored_set import scored_set
-from burg_drake.evaluation.shortfall import shortfall
-from burg_drake.evaluation.summary import summarize
-from burg_drake.evaluation.summary_tables import summary_view
-from burg_drake.grasping import antipodal
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
+from burg_drake.evaluation.grasp_sets.scored import scored_set
+from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.results.summary_tables import summary_view
+from burg_drake.evaluation.store.run_folder import load_run
+from burg_drake.grasping.sampling import antipodal
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 
 def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(

@@ -9,17 +9,17 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.run_document import software_versions
-from burg_drake.evaluation.scored_set import SCENE_COLUMNS, scored_set
-from burg_drake.grasping.antipodal import sample_antipodal
-from burg_drake.grasping.clearances import CLEARANCE_VERSION
-from burg_drake.grasping.jaws import PANDA_JAWS
-from burg_drake.grasping.quality import METRICS, QUALITY_VERSION, Payload, grasp_quality
-from burg_drake.grasping.surface import Surface
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.station import Station, load_station
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.grasp_sets.scored import SCENE_COLUMNS, scored_set
+from burg_drake.evaluation.records.run_document import software_versions
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.clearance.verdict import CLEARANCE_VERSION
+from burg_drake.grasping.quality.jaws import PANDA_JAWS
+from burg_drake.grasping.quality.metrics import METRICS, QUALITY_VERSION, Payload, grasp_quality
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.station_document import Station, load_station
 
 SCENE = """\
 version: 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.evaluation.short_lifts import short_lifts
+from burg_drake.evaluation.results.shortened_lifts import short_lifts
 
 
 def test_only_shorter_lifts_are_told() -> None:

@@ -18,17 +18,17 @@ from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
 from burg_drake.apps.cli import main
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation import part_writer
-from burg_drake.evaluation.campaign import Campaign, load_campaign
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, decode, encode
-from burg_drake.evaluation.journal_tail import tails_of
-from burg_drake.evaluation.part_writer import PartWriter
-from burg_drake.evaluation.run_store import Run, save_run
-from burg_drake.evaluation.status import Watch, read_status
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.records.journal import JOURNAL_FILE, Journal, decode, encode
+from burg_drake.evaluation.results.status import Watch, read_status
+from burg_drake.evaluation.store import part_writer
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
+from burg_drake.evaluation.store.journal_tail import tails_of
+from burg_drake.evaluation.store.part_writer import PartWriter
+from burg_drake.evaluation.store.run_folder import Run, save_run
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 
 pytestmark = pytest.mark.usefixtures("pages")
 SCRIPT = """

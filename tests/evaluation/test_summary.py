@@ -12,16 +12,16 @@ import pytest
 from known_judge import CrashingJudge, Make, expected
 from rich.console import Console
 
-from burg_drake.core.figures import duration
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
+from burg_drake.core.terminal.number_text import duration
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import (
-    Group,
+from burg_drake.evaluation.results.summary import (
+    OutcomeCounts,
     summarize,
 )
-from burg_drake.evaluation.summary_tables import summary_view
+from burg_drake.evaluation.results.summary_tables import summary_view
+from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_names_of_objects_are_whole_at_80_columns(run: Run) -> None:
     summary = summarize(run)
     lifted = Counter({Outcome.LIFTED: 99_000, Outcome.DROPPED: 999})
     name = "screwdriver_14"
-    group = Group(name, 99_999, lifted, Counter({Stage.EXECUTED: 99_999}), Counter())
+    group = OutcomeCounts(name, 99_999, lifted, Counter({Stage.EXECUTED: 99_999}), Counter())
     objects = (*summary.objects, group)
     stream = io.StringIO()
     view = summary_view(dataclasses.replace(summary, objects=objects))

@@ -14,28 +14,28 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from burg_drake.core.document_text import Limits
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
+from burg_drake.core.files.bounded_text import Limits
 from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation import table_file
-from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.mode import MODES
-from burg_drake.evaluation.origin import Origin, read_origin
-from burg_drake.evaluation.table import Columns, make_columns, table_row, trial_columns
-from burg_drake.evaluation.table_file import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records import table_file
+from burg_drake.evaluation.records.origin import TrialOrigin, read_origin
+from burg_drake.evaluation.records.table import Columns, make_columns, table_row, trial_columns
+from burg_drake.evaluation.records.table_file import (
     METADATA_KEY,
     read_table,
     require_writer,
     write_table,
 )
-from burg_drake.evaluation.trial import Trial, read_trial
-from burg_drake.station.engine import ENGINES
+from burg_drake.evaluation.records.trial import RecordedTrial, read_trial
+from burg_drake.evaluation.stages.judge import Verdict
+from burg_drake.evaluation.stages.mode import MODES
+from burg_drake.station.document.engine import ENGINES
 
 INSTANCES = ("mug_1", "box", "bowl.2")
-ORIGIN = Origin(
+ORIGIN = TrialOrigin(
     scene="/some where/scene.yaml",
     scene_content="0123456789ab",
     station="panda_tabletop",
@@ -111,7 +111,7 @@ def test_each_mode_has_the_columns_of_what_it_asks() -> None:
     trial = {"duration", "tracking_error", "tracking_distance", "pushed", "touched", "cpu_plan"}
     trial |= {f"pushed_{name}" for name in INSTANCES}
     verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
-    one = [Trial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
+    one = [RecordedTrial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
     found = {
         mode: set(trial_columns(one, replace(ORIGIN, mode=mode), instances=INSTANCES))
         for mode in MODES
@@ -124,7 +124,7 @@ def test_each_mode_has_the_columns_of_what_it_asks() -> None:
 def test_every_column_has_its_unit_and_meaning_in_the_files(tmp_path: Path) -> None:
     pyarrow = pytest.importorskip("pyarrow.parquet")
     verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
-    one = [Trial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
+    one = [RecordedTrial(id="a", instance="box", X_OG=np.eye(4), verdict=verdict)]
     table = trial_columns(one, replace(ORIGIN, mode="arm"), instances=INSTANCES, joints=7)
     table |= {"given_label": np.array([1]), "tug_+x_g": np.array([math.inf])}
     for suffix in ("csv", "parquet"):
@@ -158,7 +158,7 @@ def test_a_row_of_an_arm_trial_gives_back_all_that_it_was(tmp_path: Path) -> Non
         pushed={"mug_1": 1 / 7, "box": 0.0},
         touched="panda_link5 vs box",
     )
-    trial = Trial(id="a", instance="box", X_OG=np.eye(4), width=0.1 / 3, verdict=verdict)
+    trial = RecordedTrial(id="a", instance="box", X_OG=np.eye(4), width=0.1 / 3, verdict=verdict)
     origin = replace(ORIGIN, mode="arm")
     table = trial_columns([trial], origin, instances=INSTANCES)
     write_table(tmp_path / "arm.csv", table)
@@ -196,7 +196,9 @@ def test_trials_with_another_friction_and_mass_share_the_format() -> None:
     verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED)
     X_OG = candidates().grasps.X_OG[0]
     trials = [
-        Trial(id="mug_1-a", instance="mug_1", X_OG=X_OG, friction=mu, mass=mass, verdict=verdict)
+        RecordedTrial(
+            id="mug_1-a", instance="mug_1", X_OG=X_OG, friction=mu, mass=mass, verdict=verdict
+        )
         for mu, mass in ((0.1, None), (0.0, 1 / 3))
     ]
     table = trial_columns(trials, ORIGIN, instances=INSTANCES)

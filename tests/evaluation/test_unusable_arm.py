@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.schema import Pose
+from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
-from burg_drake.motion.usable_arm import require_usable_arm
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.motion.workspace.usable_arm import require_usable_arm
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 NOTHING: dict[str, GraspSet] = {}
 

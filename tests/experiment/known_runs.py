@@ -8,15 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.journal import Journal
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.mode import Mode
-from burg_drake.evaluation.run_document import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records.journal import Journal
+from burg_drake.evaluation.records.run_document import (
     Grasps,
     Library,
     RunDocument,
@@ -24,10 +22,12 @@ from burg_drake.evaluation.run_document import (
     run_hash,
     software_versions,
 )
-from burg_drake.evaluation.run_store import JOURNAL_FILE, Run, create_run, load_run
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
+from burg_drake.evaluation.stages.judge import Verdict
+from burg_drake.evaluation.stages.mode import Mode
+from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, create_run, load_run
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
 
 OBJECTS = ("mug", "box")
 

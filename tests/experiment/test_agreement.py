@@ -6,23 +6,22 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from sklearn import metrics
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.inter_rater import cohens_kappa
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.experiment.comparison.agreement import (
+from burg_drake.experiment.statistics.confusion import (
     Agreement,
     agreement,
     agreements,
     grouped,
     matrix_of,
 )
-from burg_drake.experiment.comparison.measures import MEASURES
-from burg_drake.experiment.comparison.paired import paired, paired_counts
-from burg_drake.experiment.comparison.resampling import PRIOR, prior
+from burg_drake.experiment.statistics.estimates import MEASURES
+from burg_drake.experiment.statistics.mcnemar import paired, paired_counts
+from burg_drake.experiment.statistics.resampling import PRIOR, prior
 
 PAPER = (
     ((21, 9, 10, 20), "70.00", "67.74"),

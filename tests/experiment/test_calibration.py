@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.stats import mannwhitneyu
 from sklearn.isotonic import IsotonicRegression
 from sklearn.metrics import roc_auc_score
 
-from burg_drake.experiment.comparison import ordered
-from burg_drake.experiment.comparison.calibration import calibration, calibrations
-from burg_drake.experiment.comparison.ordered import Ordered
-from burg_drake.experiment.comparison.ranking import ranking
+from burg_drake.experiment.statistics import ordered
+from burg_drake.experiment.statistics.margin_calibration import calibration, calibrations
+from burg_drake.experiment.statistics.ordered import Ordered
+from burg_drake.experiment.statistics.rank_statistics import ranking
 
 
 def trials(count: int, seed: int = 0, digits: int = 9) -> tuple[np.ndarray, np.ndarray]:

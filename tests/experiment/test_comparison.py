@@ -14,22 +14,21 @@ from sklearn.metrics import confusion_matrix
 
 import burg_drake as burg
 from burg_drake.apps.cli import main
-from burg_drake.apps.compare import DEFAULT_LIMIT_MM
-from burg_drake.apps.compare import SUCCESSES as OFFERED
+from burg_drake.apps.comparison.compare import DEFAULT_LIMIT_MM, SUCCESSES as OFFERED
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.robustness_shares import lifted_shares
-from burg_drake.evaluation.run_store import Run
+from burg_drake.core.grasps.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.robustness.shares import lifted_shares
+from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
-from burg_drake.experiment.comparison.matching import CONTENT, match_rows
-from burg_drake.experiment.comparison.pairs import NAMES
-from burg_drake.experiment.comparison.placement import LIMIT_MM
+from burg_drake.experiment.comparison.placement_error import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
-from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.comparison.texts import Factor, Ids, text_keys
 from burg_drake.experiment.comparison.wording import headline
-from burg_drake.experiment.trials.plan import plan_trials
+from burg_drake.experiment.pairing.matching import CONTENT, match_rows
+from burg_drake.experiment.pairing.pairs import NAMES
+from burg_drake.experiment.pairing.result_table import ResultTable
+from burg_drake.experiment.pairing.text_codes import Factor, Ids, text_keys
+from burg_drake.experiment.planning.plan import plan_trials
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
@@ -206,7 +205,7 @@ def test_grasps_are_the_same_by_id_and_content(tmp_path: Path) -> None:
     b["x"] = b["x"].copy()
     b["x"][3] += 1e-3
     rows = np.array([5, 4, 3, 2, 1, 0])
-    tables = [Table.of_columns(columns, NAMES) for columns in (a, b)]
+    tables = [ResultTable.of_columns(columns, NAMES) for columns in (a, b)]
     found = match_rows(tables[0], tables[1].take(rows, CONTENT))
     assert found.other_content == 1 and found.only_first == 6 and found.only_second == 0
     assert (a["id"][found.first] == b["id"][rows][found.second]).all() and len(found.first) == 5

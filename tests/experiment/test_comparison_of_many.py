@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation import preparation
-from burg_drake.evaluation.campaign import Campaign
+from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.table_file import write_table
+from burg_drake.evaluation.records.table_file import write_table
+from burg_drake.evaluation.run import preparation
+from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.experiment.comparison.comparison import compare
-from burg_drake.scene.scene import save_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import save_scene
+from burg_drake.station.document.station_document import load_station
 from tests.evaluation import known_judge
 from tests.evaluation.inline_executor import Inline
 from tests.evaluation.known_scene import write_scene

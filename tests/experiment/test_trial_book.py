@@ -11,15 +11,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
+from burg_drake.core.documents.schema import Pose, parse_document, plain_data
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.outcome import RealOutcome
-from burg_drake.core.schema import Pose, parse_document, plain_data
+from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.trials.book import TrialBook, TrialChanged
 from burg_drake.experiment.trials.sheet import ObjectPlace, RobotReport, TrialSheet, load_trials
-from burg_drake.experiment.trials.trial_text import with_trial
+from burg_drake.experiment.trials.sheet_text import with_trial
 from tests.experiment.trial_sheets import make_sheet, write_sheet
 
 PLACE = ObjectPlace(

@@ -12,11 +12,11 @@ import pytest
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes
+from burg_drake.experiment.planning.plan import plan_trials
 from burg_drake.experiment.trials.export import export_trials
-from burg_drake.experiment.trials.plan import plan_trials
 from burg_drake.experiment.trials.sheet import save_trials
-from burg_drake.motion.plan_file import load_plan
-from burg_drake.station.diagram import instance_pose
+from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.station.diagram.builder import instance_pose
 from tests.experiment.known_runs import ended, make_run, make_scene
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))

@@ -9,7 +9,7 @@ import pytest
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.experiment.trials.power import (
+from burg_drake.experiment.planning.power import (
     difference_text,
     effective_trials,
     expected_figures,

@@ -7,17 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table_file import write_table
+from burg_drake.evaluation.records.table_file import write_table
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.experiment.planning.plan import plan_trials
+from burg_drake.experiment.planning.strata import allocate
 from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.plan import plan_trials
 from burg_drake.experiment.trials.sheet import TrialSheet, load_trials
 from burg_drake.experiment.trials.sources import grasp_content, load_sources, trial_rows
-from burg_drake.experiment.trials.strata import allocate
 from tests.experiment.known_runs import ended, failed, make_run, make_scene
 
 MUG = [

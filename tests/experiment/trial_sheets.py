@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.run_document import Input
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.evaluation.records.run_document import Input
 from burg_drake.experiment.trials.sheet import (
     RealTrial,
     Selection,

@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array
-from burg_drake.core.schema import Pose
-from burg_drake.export.export import FORMATS, Exported, export_scene
-from burg_drake.objects.entry import ContactGeometry
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.station.station import Station, load_station
+from burg_drake.export.scene_export import FORMATS, Exported, export_scene
+from burg_drake.objects.library.document import load_library
+from burg_drake.objects.library.entry import ContactGeometry
+from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station.document.station_document import Station, load_station
 
 INSTANCES = (
     Instance(object="mug", X_SO=Pose((0.12, 0.11, 0.0), rpy_deg=(0.0, 0.0, 140.0))),

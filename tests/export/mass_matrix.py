@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.core.frames import Array
-from burg_drake.objects.entry import Inertia
+from burg_drake.objects.library.entry import Inertia
 
 
 def inertia_matrix(inertia: Inertia) -> Array:

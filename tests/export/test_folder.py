@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from burg_drake.core.documents.schema import load_document
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import load_document
-from burg_drake.export.export import export_scene
 from burg_drake.export.folder import (
     ExportRecord,
     replaced_folder,
     require_own_folder,
     write_record,
 )
-from burg_drake.scene.scene import Scene
+from burg_drake.export.scene_export import export_scene
+from burg_drake.scene.document.scene import Scene
 
 RECORD = ExportRecord(format="sdf", scene="s", scene_content="", main="a", software="x")
 

@@ -9,9 +9,9 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from burg_drake.core.frames import Array
-from burg_drake.export.export import Exported
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.export.scene_export import Exported
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.station_document import Station
 from tests.export.mass_matrix import inertia_matrix
 
 

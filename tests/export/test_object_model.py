@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import BurgError
-from burg_drake.core.packages import NO_PACKAGES
-from burg_drake.export.object_model import object_model
-from burg_drake.objects.library import load_library
+from burg_drake.core.paths.packages import NO_PACKAGES
+from burg_drake.export.sdf_object import object_model
+from burg_drake.objects.library.document import load_library
 
 
 @pytest.mark.parametrize(

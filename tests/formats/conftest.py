@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 
 
 @pytest.fixture

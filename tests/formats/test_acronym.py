@@ -12,9 +12,9 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats import acronym
-from burg_drake.formats.grasp_format import PANDA
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.grasps import acronym
 
 MOTIONS = [
     "object_motion_during_closing_angular",

@@ -10,9 +10,9 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.burg_grasps import FORMAT
-from burg_drake.formats.grasp_format import PANDA
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.grasps.burg_toolkit import FORMAT
 
 FROM_ABOVE = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 """x, the closing direction, along y of the world; z up, where the hand comes from."""

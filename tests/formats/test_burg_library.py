@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import DocumentError
-from burg_drake.formats.burg_document import relocated
-from burg_drake.formats.burg_library import read_burg_library
+from burg_drake.formats.collections.burg_document import relocated
+from burg_drake.formats.collections.burg_library import read_burg_library
 
 # What `yaml.dump` makes of an ObjectLibrary: sorted keys, block lists, null for what is not known.
 WRITTEN = """\

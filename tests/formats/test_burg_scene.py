@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.formats.burg_scene import read_burg_scene
+from burg_drake.formats.collections.burg_scene import read_burg_scene
 
 # What `yaml.dump` makes of a Scene: sorted keys, block lists, null for what is not known.
 WRITTEN = """\

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.conversion import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.conversion import (
     with_objects_renamed,
     with_success,
     write_each_object,
 )
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
 
 
 @pytest.fixture

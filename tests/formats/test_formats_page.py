@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.formats.grasp_convention import convention_of
+from burg_drake.formats.common.convention import convention_of
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
 
 PAGE = Path(__file__).parents[2] / "docs" / "formats.md"
 

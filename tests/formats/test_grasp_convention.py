@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.formats.grasp_convention import (
+from burg_drake.formats.common.convention import (
     axis_along,
     convention_of,
     grouped,
     origin_in_words,
 )
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,9 @@ import pytest
 import burg_drake.formats
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, rotation_angle
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA, Gripper, GripperJoint
+from burg_drake.formats.common.one_object import description_of
 from burg_drake.formats.grasp_files import (
     FORMATS,
     format_by_suffix,
@@ -26,8 +28,6 @@ from burg_drake.formats.grasp_files import (
     read_grasp_file,
     write_grasp_file,
 )
-from burg_drake.formats.grasp_format import PANDA, Gripper, GripperJoint
-from burg_drake.formats.one_object import description_of
 
 SINGLE_PRECISION = ("graspnet", "burg")
 WITH_WIDTH = ("burg_drake", "acronym", "isaac_grasp", "vgn")

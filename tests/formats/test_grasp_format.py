@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.resources import resolve
-from burg_drake.formats.grasp_format import PANDA
+from burg_drake.core.paths.resources import resolve
+from burg_drake.formats.common.grasp_format import PANDA
 
 
 def test_the_panda_s_tips_are_where_its_finger_mesh_ends() -> None:

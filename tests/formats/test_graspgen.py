@@ -13,9 +13,9 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats import graspgen
-from burg_drake.formats.grasp_format import PANDA
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.grasps import graspgen
 
 # Straight down on a cube: the gripper's base 0.1034 m above the centre, its z down, x along y.
 DOWN = [

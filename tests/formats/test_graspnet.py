@@ -12,11 +12,11 @@ import trimesh
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA, Gripper
 from burg_drake.formats.grasp_files import read_grasp_file, write_grasp_file
-from burg_drake.formats.grasp_format import PANDA, Gripper
-from burg_drake.formats.graspnet import FORMAT, X_FG
-from burg_drake.grasping.antipodal import sample_antipodal
+from burg_drake.formats.grasps.graspnet import FORMAT, X_FG
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
 
 DOWN_THE_CAMERA = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
 """Approach along the camera's z, closing along its y: columns are x, y, z of their grasp frame."""

@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats import graspgen_yaml, isaac_grasp
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import read_grasp_file
-from burg_drake.formats.grasp_format import PANDA
+from burg_drake.formats.grasps import graspgen_yaml, isaac_grasp
 
 MANUAL = """\
 format: isaac_grasp

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.outcome import Outcome
-from burg_drake.formats.conversion import with_objects_renamed
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.formats.one_object import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.formats.common.conversion import with_objects_renamed
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.common.one_object import (
     LIBRARY_MESHES,
     check_hand,
     description_of,

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.formats.rigid import nearest_rigid
+from burg_drake.formats.common.rigid import nearest_rigid
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.formats.vgn import FORMAT
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.grasps.vgn import FORMAT
 
 HEADER = "scene_id,qx,qy,qz,qw,x,y,z,width,label"
 DOWN = "0.0,1.0,0.0,0.0"

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.formats.ycb import (
+from burg_drake.formats.collections.ycb import (
     MASS_SOURCE,
     NAMES,
     PUBLISHED_MASSES,

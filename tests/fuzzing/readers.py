@@ -13,40 +13,40 @@ import cv2
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.image_file import read_image
-from burg_drake.cameras.intrinsics_file import load_intrinsics
-from burg_drake.cameras.placement_depth_file import read_depth
-from burg_drake.cameras.placement_document import load_placement
-from burg_drake.cameras.recorded_poses import read_poses as read_recorded_poses
-from burg_drake.core.csv_web import METADATA_SUFFIX
+from burg_drake.cameras.live.recording_table import read_poses as read_recorded_poses
+from burg_drake.cameras.optics.intrinsics_file import load_intrinsics
+from burg_drake.cameras.placement.document import load_placement
+from burg_drake.cameras.sources.depth_file import read_depth
+from burg_drake.cameras.sources.image_file import read_image
+from burg_drake.core.documents.schema import load_document
 from burg_drake.core.errors import BurgError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.core.resources import data_root
-from burg_drake.core.schema import load_document
-from burg_drake.evaluation.grasp_input import hand_of
-from burg_drake.evaluation.journal import read_journal
-from burg_drake.evaluation.origin import read_origin
-from burg_drake.evaluation.run_document import RunDocument
-from burg_drake.evaluation.table import table_row
-from burg_drake.evaluation.table_file import is_table, read_table, write_table
-from burg_drake.evaluation.trial import read_trial
-from burg_drake.formats.burg_library import read_burg_library
-from burg_drake.formats.burg_scene import read_burg_scene
+from burg_drake.core.grasps.csv_metadata_file import METADATA_SUFFIX
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.paths.resources import data_root
+from burg_drake.evaluation.grasp_sets.input import hand_of
+from burg_drake.evaluation.records.journal import read_journal
+from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.run_document import RunDocument
+from burg_drake.evaluation.records.table import table_row
+from burg_drake.evaluation.records.table_file import is_table, read_table, write_table
+from burg_drake.evaluation.records.trial import read_trial
+from burg_drake.formats.collections.burg_library import read_burg_library
+from burg_drake.formats.collections.burg_scene import read_burg_scene
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.formats.common.one_object import description_of
+from burg_drake.formats.common.pose_file import read_poses
 from burg_drake.formats.grasp_files import FORMATS, format_of, read_grasp_file
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.formats.one_object import description_of
-from burg_drake.formats.pose_file import read_poses
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.plan_file import load_plan
-from burg_drake.motion.trajectory import Origin, Plan, Trajectory
-from burg_drake.objects.library import load_library
-from burg_drake.objects.mesh_file import read_mesh
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.plans.trajectory import Plan, PlanOrigin, Trajectory
+from burg_drake.objects.library.document import load_library
+from burg_drake.objects.meshes.mesh_file import read_mesh
 from burg_drake.pipeline.recipe import load_recipe
 from burg_drake.pipeline.record import read_record
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import load_station
 
 EXAMPLES = Path(__file__).parent / "examples"
 
@@ -138,7 +138,7 @@ def _plan(path: Path) -> Path:
     """Beside a CSV is what it is for."""
     parts = [Trajectory.rest(np.array([0.1, -0.2]), 0.01, 500.0) for _ in range(3)]
     limits = ArmLimits(*(np.full(2, x) for x in (-3.0, 3.0, 1.0, 4.0, 80.0, np.inf)))
-    origin = Origin(("a", "b"), limits, "st", "12", "sc", "34", "mug", np.eye(4))
+    origin = PlanOrigin(("a", "b"), limits, "st", "12", "sc", "34", "mug", np.eye(4))
     plan = Plan(*parts, close_time=0.01, opening=0.08, width=0.03, origin=origin)
     (plan.to_csv if path.suffix == ".csv" else plan.to_json)(path)
     return path

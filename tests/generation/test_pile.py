@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.schema import Pose
-from burg_drake.generation.pile import pile
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.board import Board
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.stillness import stillness
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import Station
+from burg_drake.core.documents.schema import Pose
+from burg_drake.generation.heap import pile
+from burg_drake.objects.library.document import ObjectLibrary
+from burg_drake.scene.arrangement.object_shapes import ObjectShapes
+from burg_drake.scene.document.board import Board
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.rest.still_check import stillness
+from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.document.station_document import Station
 
 BESIDE = -3.0
 """x in S of what hangs beside the table [m]."""

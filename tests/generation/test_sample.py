@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.schema import Pose
 from burg_drake.generation import rules
-from burg_drake.generation.again import sample_again
+from burg_drake.generation.reproduction import sample_again
 from burg_drake.generation.sample import SceneSampler, sample_scene
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.board import Board
-from burg_drake.scene.recipe import SceneRecipe
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.check import check_scene
-from burg_drake.station.station import Station, load_station
+from burg_drake.objects.library.document import ObjectLibrary
+from burg_drake.scene.document.board import Board
+from burg_drake.scene.document.recipe import SceneRecipe
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.document.station_document import Station, load_station
 
 A3 = Board(size=(0.42, 0.297))
 SMALL = ("can", "marble", "mug")

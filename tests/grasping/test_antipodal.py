@@ -19,9 +19,9 @@ from trimesh import creation
 
 from burg_drake.core.errors import InvalidInputError, MeshError
 from burg_drake.core.frames import check_pose, swap_fingers
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.antipodal import PATIENCE, sample_antipodal
-from burg_drake.grasping.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.sampling.antipodal import PATIENCE, sample_antipodal
+from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
 
 MU = 0.24
 CONE = np.arctan(MU)

@@ -10,9 +10,9 @@ from scipy.stats import chisquare
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import pregrasp
-from burg_drake.grasping import antipodal
-from burg_drake.grasping.antipodal import PATIENCE, TEST_PATIENCE
-from burg_drake.grasping.surface import Surface
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.sampling import antipodal
+from burg_drake.grasping.sampling.antipodal import PATIENCE, TEST_PATIENCE
 
 # --- weights of faces -----------------------------------------------------------------------------
 

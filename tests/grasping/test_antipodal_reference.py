@@ -11,8 +11,8 @@ import trimesh
 from sampled import box, center, closing, contacts, grasp
 from trimesh import creation
 
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
 
 POINTS = 8000  # on all faces together, alike on each
 RINGS, AZIMUTHS = 3, 6  # of lines through each point

@@ -11,8 +11,8 @@ from trimesh import creation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import check_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.approach import ApproachCone
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.sampling.approach import ApproachCone
 
 DOWN = (0.0, 0.0, -1.0)
 

@@ -11,6 +11,7 @@ import trimesh
 from pydrake.geometry import Capsule, GeometryInstance, SceneGraph
 from pydrake.math import RigidTransform
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import (
     grasp_from_axes,
@@ -20,17 +21,16 @@ from burg_drake.core.frames import (
     swap_fingers,
     transform_points,
 )
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.grasping.collision_geometry import shape_of
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.paths.resources import resolve
+from burg_drake.grasping.clearance.collision_geometry import shape_of
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import Station, StationDocument, Table
+from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import Station, StationDocument, Table
 
 SIZES = {"box": (0.05, 0.08, 0.10), "plate": (0.2, 0.2, 0.02)}
 PLACES = {"box": (0.2, 0.2), "plate": (0.38, 0.2)}

@@ -9,11 +9,16 @@ import pytest
 from grasp_samples import about, crowded_grasps
 
 from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.comparison import QUANTILES, compare_grasps, distribution, summarize
-from burg_drake.grasping.coverage import Share, coverage, precision
-from burg_drake.grasping.pose_search import Tolerance
-from burg_drake.grasping.similarity import DISTANCE_VERSION
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.comparison.matching import Share, coverage, precision
+from burg_drake.grasping.comparison.summary import (
+    QUANTILES,
+    compare_grasps,
+    distribution,
+    summarize,
+)
+from burg_drake.grasping.similarity.neighbour_search import Tolerance
+from burg_drake.grasping.similarity.pose_distance import DISTANCE_VERSION
 
 NAN = math.nan
 

@@ -12,11 +12,11 @@ from scipy.optimize import minimize
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.grasping.contacts import Contacts, grasp_contacts
-from burg_drake.grasping.indentation import RESISTANCE, indentation
-from burg_drake.grasping.jaws import PANDA_JAWS, jaws_of
-from burg_drake.grasping.surface import Surface
-from burg_drake.station.hand import locate_hand
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.quality.contacts import Contacts, grasp_contacts
+from burg_drake.grasping.quality.jaws import PANDA_JAWS, jaws_of
+from burg_drake.grasping.quality.pad_indentation import RESISTANCE, indentation
+from burg_drake.station.document.gripper_document import locate_hand
 
 JAWS = PANDA_JAWS
 CENTER = np.eye(4)[None]

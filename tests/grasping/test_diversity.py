@@ -11,9 +11,13 @@ from grasp_samples import about, crowded_grasps, random_grasps
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, swap_fingers
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.diversity import covering_radius, farthest_points, neighbour_distances
-from burg_drake.grasping.similarity import LEVER, pose_distances
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.similarity.diversity import (
+    covering_radius,
+    farthest_points,
+    neighbour_distances,
+)
+from burg_drake.grasping.similarity.pose_distance import LEVER, pose_distances
 
 
 def on_a_line(n: int) -> Array:

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, check_pose, make_pose, swap_fingers
-from burg_drake.grasping import pose_search
-from burg_drake.grasping.pose_search import Tolerance, find_nearest, find_within
-from burg_drake.grasping.similarity import components, pose_distances
+from burg_drake.grasping.similarity import neighbour_search
+from burg_drake.grasping.similarity.neighbour_search import Tolerance, find_nearest, find_within
+from burg_drake.grasping.similarity.pose_distance import components, pose_distances
 
 TOLERANCES = [
     Tolerance(),
@@ -53,9 +53,9 @@ def assert_nearest(index: Array, distance: Array, d: Array) -> None:
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many trees, and few pairs at a time."""
-    monkeypatch.setattr(pose_search, "TREE", 70)
-    monkeypatch.setattr(pose_search, "PAIRS", 300)
-    monkeypatch.setattr(pose_search, "CANDIDATES", 1)
+    monkeypatch.setattr(neighbour_search, "TREE", 70)
+    monkeypatch.setattr(neighbour_search, "PAIRS", 300)
+    monkeypatch.setattr(neighbour_search, "CANDIDATES", 1)
 
 
 @pytest.mark.parametrize("name", SETS)

@@ -10,10 +10,10 @@ import trimesh
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.antipodal import sample_antipodal
-from burg_drake.grasping.jaws import PANDA_JAWS
-from burg_drake.grasping.quality import (
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.quality.jaws import PANDA_JAWS
+from burg_drake.grasping.quality.metrics import (
     GRAVITY,
     METRICS,
     QUALITY_VERSION,
@@ -22,7 +22,7 @@ from burg_drake.grasping.quality import (
     grasp_quality,
     score_grasps,
 )
-from burg_drake.grasping.surface import Surface
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
 
 BOX = Surface.of(trimesh.creation.box((0.04, 0.1, 0.1)))
 MIDDLE = float(np.mean(PANDA_JAWS.z))

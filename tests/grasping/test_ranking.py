@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.grasping.average_precision import graspnet_ap
-from burg_drake.grasping.ranking import rank_by
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.grasping.comparison.average_precision import graspnet_ap
+from burg_drake.grasping.comparison.score_ranking import rank_by
 
 
 def with_column(score: ArrayLike, **column: ArrayLike) -> GraspSet:

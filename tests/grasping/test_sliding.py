@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.grasping.contacts import Contacts, friction_needed, grasp_contacts
-from burg_drake.grasping.jaws import PANDA_JAWS
-from burg_drake.grasping.quality import Payload, grasp_quality
-from burg_drake.grasping.sliding import STEPS, slide_to_rest
-from burg_drake.grasping.surface import Surface
+from burg_drake.geometry.surface import Surface
+from burg_drake.grasping.quality.contacts import Contacts, friction_needed, grasp_contacts
+from burg_drake.grasping.quality.jaws import PANDA_JAWS
+from burg_drake.grasping.quality.metrics import Payload, grasp_quality
+from burg_drake.grasping.quality.sliding import STEPS, slide_to_rest
 
 MU = 0.3
 STEP = min(np.ptp(PANDA_JAWS.y), np.ptp(PANDA_JAWS.z)) / STEPS

@@ -8,16 +8,16 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
 from burg_drake.core.frames import Array
-from burg_drake.grasping.ball import ball
-from burg_drake.grasping.contacts import Contacts
-from burg_drake.grasping.wrench_margins import (
+from burg_drake.grasping.quality.contacts import Contacts
+from burg_drake.grasping.quality.triangulation import triangulated_ball
+from burg_drake.grasping.quality.wrench_margins import (
     ANY_FORCE,
     ANY_WRENCH,
     epsilon_bracket,
     force_along,
     reaches,
 )
-from burg_drake.grasping.wrench_space import WrenchSpace, hull_volume
+from burg_drake.grasping.quality.wrench_space import WrenchSpace, hull_volume
 
 
 def random_contacts(n: int, seed: int = 0, spread: float = 0.2) -> Contacts:
@@ -59,7 +59,7 @@ def hull(space: WrenchSpace, i: int, vertices: Array) -> ConvexHull:
 
 @pytest.mark.parametrize("subdivisions", [0, 1])
 def test_facets_in_closed_form_are_those_of_qhull(subdivisions: int) -> None:
-    space, polytope = random_space(6), ball(subdivisions)
+    space, polytope = random_space(6), triangulated_ball(subdivisions)
     volume = hull_volume(space, polytope)
     lower, _ = epsilon_bracket(space, subdivisions)
     for i in range(6):
@@ -70,7 +70,7 @@ def test_facets_in_closed_form_are_those_of_qhull(subdivisions: int) -> None:
 
 def test_symmetric_grasps_have_the_same_facets_too() -> None:
     """Many facets lie in one plane here, which a rounding could count twice, or not at all."""
-    space, polytope = symmetric_space(0.5, 0.008, 0.04, 0.05), ball(1)
+    space, polytope = symmetric_space(0.5, 0.008, 0.04, 0.05), triangulated_ball(1)
     expected = hull(space, 0, polytope.vertices)
     assert hull_volume(space, polytope)[0] == pytest.approx(expected.volume, rel=1e-9)
     assert epsilon_bracket(space, 1)[0][0] == pytest.approx(-expected.equations[:, -1].max())
@@ -78,9 +78,11 @@ def test_symmetric_grasps_have_the_same_facets_too() -> None:
 
 def test_volume_is_within_its_stated_error() -> None:
     space = random_space(8, seed=1)
-    fine = hull_volume(space, ball(3, of_volume=True))
-    np.testing.assert_allclose(hull_volume(space, ball(1, of_volume=True)), fine, rtol=0.025)
-    inscribed = hull_volume(space, ball(2))
+    fine = hull_volume(space, triangulated_ball(3, of_volume=True))
+    np.testing.assert_allclose(
+        hull_volume(space, triangulated_ball(1, of_volume=True)), fine, rtol=0.025
+    )
+    inscribed = hull_volume(space, triangulated_ball(2))
     assert (inscribed < fine).all() and (inscribed > 0.9 * fine).all()
 
 
@@ -161,7 +163,7 @@ def test_lever_limits_a_narrow_grasp() -> None:
 
 
 def test_batches_do_not_matter() -> None:
-    space, polytope = random_space(40, seed=4), ball(1)
+    space, polytope = random_space(40, seed=4), triangulated_ball(1)
     goals = [ANY_WRENCH, ANY_FORCE]
     together = [*reaches(space, goals), hull_volume(space, polytope)]
     for i in (0, 7, 39):
@@ -173,4 +175,4 @@ def test_batches_do_not_matter() -> None:
 def test_no_grasps() -> None:
     none = random_space(2).select(slice(0, 0))
     assert all(len(v) == 0 for v in reaches(none, [ANY_WRENCH, ANY_FORCE]))
-    assert len(hull_volume(none, ball(1))) == 0
+    assert len(hull_volume(none, triangulated_ball(1))) == 0

@@ -13,7 +13,7 @@ import pytest
 import trimesh
 from scipy import ndimage
 
-from burg_drake.objects.library import load_library
+from burg_drake.objects.library.document import load_library
 
 pytest.importorskip("manifold3d")
 

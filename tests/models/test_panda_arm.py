@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import BodyIndex, JointActuatorIndex
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.resources import resolve
+from burg_drake.core.paths.resources import resolve
 from tools.panda_model.hand_document import hand_yaml
 from tools.panda_model.sdf import arm_sdf, hand_sdf
 from tools.robot_model.obj import mtl_text

@@ -31,8 +31,8 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.resources import resolve
-from burg_drake.station.hand import Hand, load_hand
+from burg_drake.core.paths.resources import resolve
+from burg_drake.station.document.gripper_document import Hand, load_hand
 
 FORCE = 40.0
 """Force limit of each finger in the tests [N]."""

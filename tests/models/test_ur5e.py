@@ -11,7 +11,7 @@ from pydrake.geometry import Cylinder, Role
 from pydrake.multibody.tree import BodyIndex
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.resources import resolve
+from burg_drake.core.paths.resources import resolve
 from tools.ur5e_model.__main__ import model_texts
 
 # Universal Robots, "DH Parameters for calculations of kinematics and dynamics", UR5e: a, d, alpha

@@ -10,9 +10,9 @@ from pydrake.geometry import Box, Role, VolumeMesh
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
-from burg_drake.core.resources import resolve
-from burg_drake.station.hand import Hand, load_hand
-from burg_drake.station.hand_check import check_hand
+from burg_drake.core.paths.resources import resolve
+from burg_drake.station.document.gripper_document import Hand, load_hand
+from burg_drake.station.world.hand_check import check_hand
 from tools.wsg_model.__main__ import model_texts
 
 FINGERS = ("wsg_left_finger", "wsg_right_finger")

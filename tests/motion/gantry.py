@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.schema import Pose
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.edges import Edges
-from burg_drake.motion.proximity import ArmProximity
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Arm, Obstacle, load_station
+from burg_drake.core.documents.schema import Pose
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.collision.edge_checker import EdgeChecker
+from burg_drake.motion.proximity.clearance_bounds import ArmProximity
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import Arm, Obstacle, load_station
 
 LOWER = np.array([0.1, -0.5, 0.15])
 UPPER = np.array([0.9, 0.5, 0.9])
@@ -33,10 +33,10 @@ BLOCK = """<collision name="block"><pose>0 0 0.1 0 0 0</pose><geometry><box>
 
 def gantry_edges(
     folder: Path, *instances: Instance, exact: bool = True, **background: Obstacle
-) -> Edges:
+) -> EdgeChecker:
     """Edges of the gantry over a table with some boxes and objects; fingers open along y."""
     diagram = gantry_diagram(folder, *instances, **background)
-    return Edges(ArmProximity(diagram), ArmCollision(diagram), exact=exact)
+    return EdgeChecker(ArmProximity(diagram), ArmCollision(diagram), exact=exact)
 
 
 def gantry_diagram(

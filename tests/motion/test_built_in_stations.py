@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.resources import builtin_names
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.reachability import ReachabilitySettings, map_reachability
-from burg_drake.motion.station_check import empty_scene
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import builtin_names
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.motion.workspace.reachability import ReachabilitySettings, map_reachability
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.station.document.station_document import load_station
 
 WITH_ARM = [n for n in builtin_names("stations") if load_station(n).document.arm is not None]
 COARSE = ReachabilitySettings(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion import arm_shape
-from burg_drake.motion.reach import ArmReach
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import instance_pose
-from burg_drake.station.station import load_station
+from burg_drake.motion.proximity import arm_shape
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.station.document.station_document import load_station
 
 KINDS = {"distances", "postures", "roadmap", "robot"}
 

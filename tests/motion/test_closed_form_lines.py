@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import Array, grasp_from_axes, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.closed_form_lines import ClosedFormLines
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.line_poses import LinePoses
-from burg_drake.motion.line_search import Lines
-from burg_drake.motion.panda_ik import PandaIk, panda_forward
-from burg_drake.motion.proximity import ArmProximity
-from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.ik.panda import PandaIk, panda_forward
+from burg_drake.motion.lines.closed_form import ClosedFormLineSearch
+from burg_drake.motion.lines.line_poses import LinePoses
+from burg_drake.motion.lines.line_search import LineSearchBatch
+from burg_drake.motion.lines.reach_settings import ReachSettings
+from burg_drake.motion.proximity.clearance_bounds import ArmProximity
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import load_station
 
 DOWN = (0.0, 0.0, -1.0)
 STATION = load_station("panda_tabletop")
@@ -29,7 +29,7 @@ FAR = grasp_from_axes((0.0, 1.0, 0.0), DOWN, (1.1, 0.0, 0.2))
 
 
 @pytest.fixture(scope="module")
-def search() -> ClosedFormLines:
+def search() -> ClosedFormLineSearch:
     diagram = build_station_diagram(
         load_scene("tabletop_six"), STATION, robot="arm", weld_objects=True
     )
@@ -39,15 +39,15 @@ def search() -> ClosedFormLines:
     lines = LinePoses.of(STATION.hand.X_HG.matrix(), np.eye(3), GraspMotion())
     home = np.array(STATION.document.arm.home)
     settings = ReachSettings()
-    return ClosedFormLines(arm, ik.within(0.01), lines, ArmProximity(diagram), home, settings)
+    return ClosedFormLineSearch(arm, ik.within(0.01), lines, ArmProximity(diagram), home, settings)
 
 
-def begin(search: ClosedFormLines, *grasps: Array) -> Lines:
+def begin(search: ClosedFormLineSearch, *grasps: Array) -> LineSearchBatch:
     X_AG = np.array([[X, swap_fingers(X)] for X in grasps])
     return search.begin(X_AG, np.full((len(grasps), 2), 1e-3))
 
 
-def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormLines) -> None:
+def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormLineSearch) -> None:
     (chain,) = begin(search, ABOVE).propose([0])
     assert chain is not None
     X = panda_forward(chain.q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
@@ -64,7 +64,7 @@ def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormL
 
 
 def test_a_refused_chain_does_not_come_back_and_at_last_there_is_none(
-    search: ClosedFormLines,
+    search: ClosedFormLineSearch,
 ) -> None:
     lines = begin(search, ABOVE)
     starts: list[Array] = []
@@ -80,7 +80,7 @@ def test_a_refused_chain_does_not_come_back_and_at_last_there_is_none(
     assert len(starts) > 5
 
 
-def test_refusing_one_grasp_leaves_the_others_alone(search: ClosedFormLines) -> None:
+def test_refusing_one_grasp_leaves_the_others_alone(search: ClosedFormLineSearch) -> None:
     lines = begin(search, ABOVE, ABOVE)
     first, second = lines.propose([0, 1])
     assert first is not None and second is not None
@@ -91,18 +91,18 @@ def test_refusing_one_grasp_leaves_the_others_alone(search: ClosedFormLines) -> 
     assert other.q.shape != first.q.shape or not np.array_equal(other.q, first.q)
 
 
-def test_beyond_the_arm_there_is_no_ik(search: ClosedFormLines) -> None:
+def test_beyond_the_arm_there_is_no_ik(search: ClosedFormLineSearch) -> None:
     lines = begin(search, FAR, ABOVE)
     assert lines.propose([0, 1])[0] is None
     assert lines.failure(0).outcome is Outcome.NO_IK
 
 
 def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_posture(
-    search: ClosedFormLines,
+    search: ClosedFormLineSearch,
 ) -> None:
     """Postures with a joint beyond its limit; where no other posture is within, that is said."""
     still = replace(search.lines, standoff=0.0, lift=0.0)
-    ends = ClosedFormLines(
+    ends = ClosedFormLineSearch(
         search.arm, search.ik, still, search.proximity, search.home, search.settings
     )
     rng = np.random.default_rng(5)
@@ -119,13 +119,13 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
         assert 0.0 < failures[k].excess < excess[k] + 0.07  # the redundant joint has a grid
 
 
-def test_where_the_lift_leads_out_of_reach_the_line_fails(search: ClosedFormLines) -> None:
+def test_where_the_lift_leads_out_of_reach_the_line_fails(search: ClosedFormLineSearch) -> None:
     lines = begin(search, HIGH)
     assert lines.propose([0]) == [None]
     assert lines.failure(0).outcome is Outcome.LIFT_LINE
 
 
-def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLines) -> None:
+def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLineSearch) -> None:
     other = grasp_from_axes((1.0, 0.3, 0.0), (0.3, -0.2, -1.0), (0.42, -0.2, 0.3))
     together = begin(search, FAR, other, ABOVE).propose([0, 1, 2])[1]
     (alone,) = begin(search, other).propose([0])
@@ -134,7 +134,7 @@ def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLines) -> None:
     np.testing.assert_array_equal(together.lower, alone.lower)
 
 
-def test_a_way_that_is_closed_is_not_proposed(search: ClosedFormLines) -> None:
+def test_a_way_that_is_closed_is_not_proposed(search: ClosedFormLineSearch) -> None:
     lines = begin(search, ABOVE, ABOVE)
     first, second = lines.propose([0, 1])
     assert first is not None and second is not None

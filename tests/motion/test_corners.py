@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from burg_drake.motion.corners import distance_to_polyline, time_polyline
-from burg_drake.motion.cubics import Cubics
-from burg_drake.motion.limits import ArmLimits
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.timing.corners import distance_to_polyline, time_polyline
+from burg_drake.motion.timing.cubics import Cubics
 
 
 def anything(q: np.ndarray) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.motion.cubics import Cubics, DoubleS, smoothed
+from burg_drake.motion.timing.cubics import Cubics, DoubleS, smoothed
 
 
 def checked(profile: DoubleS, v: float, a: float, j: float) -> Cubics:

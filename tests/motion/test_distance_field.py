@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.grasping.shape import Shape
-from burg_drake.motion.distance_field import CELL, DistanceField
-from burg_drake.motion.solids import HullSolid, Solid, solid_of
+from burg_drake.geometry.shape import Shape
+from burg_drake.motion.proximity.distance_field import CELL, DistanceField
+from burg_drake.motion.proximity.solids import HullSolid, Solid, solid_of
 
 X_WP = make_pose(rotation_from_rpy((0.3, -0.5, 0.8)), (0.4, 0.1, 0.2))
 HALF = np.array((0.03, 0.05, 0.02))

@@ -10,12 +10,12 @@ import pytest
 from gantry import FINGERTIP, HALF_PAD, HOME, LOWER, UPPER, box, gantry_edges
 from numpy.typing import ArrayLike
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import inverse
-from burg_drake.core.schema import Pose
-from burg_drake.motion.edge_screen import FINE, screen_edges
-from burg_drake.motion.edges import ROWS, Edges
-from burg_drake.scene.scene import Instance
-from burg_drake.station.station import load_station
+from burg_drake.motion.collision.edge_checker import ROWS, EdgeChecker
+from burg_drake.motion.collision.edge_screen import FINE, screen_edges
+from burg_drake.scene.document.scene import Instance
+from burg_drake.station.document.station_document import load_station
 
 AHEAD = np.array([1.0, 0.0, 0.0])
 WALL = box((0.5, -0.6, 0.0), (0.502, 0.6, 0.5))
@@ -23,12 +23,12 @@ WALL = box((0.5, -0.6, 0.0), (0.502, 0.6, 0.5))
 
 
 @pytest.fixture(scope="module")
-def walled(tmp_path_factory: pytest.TempPathFactory) -> Edges:
+def walled(tmp_path_factory: pytest.TempPathFactory) -> EdgeChecker:
     return gantry_edges(tmp_path_factory.mktemp("gantry"), wall=WALL)
 
 
 @pytest.fixture(scope="module")
-def posts(tmp_path_factory: pytest.TempPathFactory) -> Edges:
+def posts(tmp_path_factory: pytest.TempPathFactory) -> EdgeChecker:
     """Some boxes to miss or to hit."""
     return gantry_edges(
         tmp_path_factory.mktemp("posts"),
@@ -38,7 +38,7 @@ def posts(tmp_path_factory: pytest.TempPathFactory) -> Edges:
     )
 
 
-def drake_says(edges: Edges, q_a: np.ndarray, q_b: np.ndarray, step: float = 0.001) -> bool:
+def drake_says(edges: EdgeChecker, q_a: np.ndarray, q_b: np.ndarray, step: float = 0.001) -> bool:
     """Free at every millimetre. Nothing but the hand moves, and it does not turn."""
     rows = max(2, int(np.linalg.norm(q_b - q_a) / step) + 2)
     return all(edges.collision.is_free(q) for q in np.linspace(q_a, q_b, rows))
@@ -50,14 +50,14 @@ def random_segments(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return q_a, q_b
 
 
-def test_a_thin_wall_is_not_stepped_over(walled: Edges) -> None:
+def test_a_thin_wall_is_not_stepped_over(walled: EdgeChecker) -> None:
     over = np.array([0.2, 0.0, 0.85])
     assert walled.is_free(HOME, over)
     assert walled.is_free(over, over + 0.6 * AHEAD)
     assert not walled.is_free(HOME, HOME + 0.6 * AHEAD)
 
 
-def test_where_a_line_meets_the_wall(walled: Edges) -> None:
+def test_where_a_line_meets_the_wall(walled: EdgeChecker) -> None:
     """Rows 1 mm apart: Drake's own first collision, up to the stretch in which bounds find one."""
     q = np.linspace(HOME, HOME + 0.4 * AHEAD, 401)
     expected = next(k for k, row in enumerate(q) if not walled.collision.is_free(row))
@@ -79,7 +79,7 @@ def test_a_millimetre_beside_a_post(tmp_path: Path, gap: float, free: bool) -> N
     assert edges.is_free(HOME - [0.05, 0.0, 0.015], np.array([before, y, z - 0.015])) is free
 
 
-def test_random_segments_against_fine_steps(posts: Edges) -> None:
+def test_random_segments_against_fine_steps(posts: EdgeChecker) -> None:
     """No yes is wrong, and a no is wrong for none but grazing segments, of which there are none."""
     q_a, q_b = random_segments(60, seed=3)
     verdicts = [posts.is_free(a, b) for a, b in zip(q_a, q_b, strict=True)]
@@ -87,7 +87,7 @@ def test_random_segments_against_fine_steps(posts: Edges) -> None:
     assert 10 < sum(verdicts) < 50
 
 
-def test_proofs_of_the_screen_hold(posts: Edges) -> None:
+def test_proofs_of_the_screen_hold(posts: EdgeChecker) -> None:
     """Nor does any of a batch depend on the others."""
     q_a, q_b = random_segments(60, seed=4)
     together = screen_edges(posts.proximity, q_a, q_b)
@@ -103,12 +103,12 @@ def test_proofs_of_the_screen_hold(posts: Edges) -> None:
     assert (stretch <= FINE * (1.0 + 1e-9)).all()
 
 
-def test_how_often_drake_is_asked(walled: Edges) -> None:
+def test_how_often_drake_is_asked(walled: EdgeChecker) -> None:
     """In free space at rows no further apart than stated, whatever the corners are."""
     q = np.array([[0.2, 0.0, 0.85], [0.2, 0.3, 0.85], [0.2, 0.31, 0.85], [0.2, 0.32, 0.85]])
     for corners in (q, q[:2], q[1:], np.linspace(q[0], q[1], 100)):
         asked: list[np.ndarray] = []
-        judge = Edges(walled.proximity, Recorder(walled, asked))  # type: ignore[arg-type]
+        judge = EdgeChecker(walled.proximity, Recorder(walled, asked))  # type: ignore[arg-type]
         assert judge.first_blocked(corners) is None
         rows = np.array(asked)
         assert judge.checks == len(rows)
@@ -117,7 +117,7 @@ def test_how_often_drake_is_asked(walled: Edges) -> None:
         length = np.abs(np.diff(corners, axis=0)).sum()
         assert gaps.max() <= ROWS * (1.0 + 1e-9)
         assert len(rows) <= 2 * length / ROWS + 3
-    quick = Edges(walled.proximity, walled.collision, exact=False)
+    quick = EdgeChecker(walled.proximity, walled.collision, exact=False)
     assert quick.first_blocked(q) is None and quick.checks == 0
     assert not quick.is_free(HOME, HOME + 0.6 * AHEAD) and quick.checks == 0
 
@@ -125,7 +125,7 @@ def test_how_often_drake_is_asked(walled: Edges) -> None:
 class Recorder:
     """Drake's checker that notes what it is asked."""
 
-    def __init__(self, edges: Edges, asked: list[np.ndarray]) -> None:
+    def __init__(self, edges: EdgeChecker, asked: list[np.ndarray]) -> None:
         self._collision = edges.collision
         self._asked = asked
 
@@ -161,19 +161,19 @@ def test_what_is_carried_counts_against_the_links_alone(tmp_path: Path) -> None:
     assert free.index(False) <= found <= free.index(False) + ROWS / 0.01
 
 
-def test_several_paths_at_once(posts: Edges) -> None:
+def test_several_paths_at_once(posts: EdgeChecker) -> None:
     """As one by one, in exact mode and by the fast tier alone."""
     q_a, q_b = random_segments(12, seed=6)
     paths = [np.linspace(a, b, 2 + k) for k, (a, b) in enumerate(zip(q_a, q_b, strict=True))]
     paths.append(HOME[None])
-    for edges in (posts, Edges(posts.proximity, posts.collision, exact=False)):
+    for edges in (posts, EdgeChecker(posts.proximity, posts.collision, exact=False)):
         alone = [edges.first_blocked(path) for path in paths]
         assert edges.first_blocked_each(paths) == alone
         assert any(a is None for a in alone) and any(a is not None for a in alone)
     assert posts.first_blocked_each([]) == []
 
 
-def test_bounds_that_are_known_need_not_be_found_again(posts: Edges) -> None:
+def test_bounds_that_are_known_need_not_be_found_again(posts: EdgeChecker) -> None:
     q_a, q_b = random_segments(40, 12)
     paths = [np.linspace(a, b, 12) for a, b in zip(q_a, q_b, strict=True)]
     paths.append(HOME[None])

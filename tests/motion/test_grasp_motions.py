@@ -13,18 +13,18 @@ import pytest
 from gantry import UPPER, box, gantry_diagram
 
 from burg_drake.core.content import rng_from
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose, rot_z, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.antipodal import sample_antipodal
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.motion.plan import Planner
-from burg_drake.motion.plan_file import load_plan
-from burg_drake.motion.reach import ArmReach, Reach, ReachSettings
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.motion.planner import Planner
+from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 DOWN = (0.0, 0.0, -1.0)
 Z, TCP = 0.3, 0.1034

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, pregrasp, swap_fingers
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.motion.hand_sweep import HandSweep, Sweep
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.motion.sweep.hand_sweep import HandSweep, Sweep
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 MOTION = GraspMotion()
 STANDOFF, LIFT = MOTION.standoff, MOTION.lift_height

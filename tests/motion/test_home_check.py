@@ -8,14 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import Pose
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.home_check import base_overlaps, home_clearance, require_free_home
-from burg_drake.motion.station_check import empty_scene
-from burg_drake.scene.scene import Instance, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.collision.home_posture import (
+    base_overlaps,
+    home_clearance,
+    require_free_home,
+)
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.scene.document.scene import Instance, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 TIP = 0.487
 """Roughly the height of the lowest points of the fingers at home [m]."""

@@ -12,16 +12,16 @@ import pytest
 from gantry import HOME, LOWER, UPPER, box, gantry_edges
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.edges import Edges
-from burg_drake.motion.focus import postures_over_objects
-from burg_drake.motion.home_tree import HomeTree
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.panda_ik import PandaIk
-from burg_drake.motion.proximity import ArmProximity
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.collision.edge_checker import EdgeChecker
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.ik.panda import PandaIk
+from burg_drake.motion.proximity.clearance_bounds import ArmProximity
+from burg_drake.motion.transit.focus import postures_over_objects
+from burg_drake.motion.transit.home_tree import HomeTree
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 GOALS = 14
 """Poses of the hand that are to be reached in each station."""
@@ -48,7 +48,7 @@ SHELF = {
 class Panda:
     """The Panda in a scene, and postures to reach."""
 
-    edges: Edges
+    edges: EdgeChecker
     tree: HomeTree
     goals: list[np.ndarray]
 
@@ -60,7 +60,7 @@ def panda(background: dict[str, Obstacle]) -> Panda:
     few = tuple(i for i in scene.document.instances if i.object in ("mug", "bottle", "bowl"))
     scene = replace(scene, document=replace(scene.document, instances=few))
     diagram = build_station_diagram(scene, station, weld_objects=True)
-    edges = Edges(ArmProximity(diagram), ArmCollision(diagram))
+    edges = EdgeChecker(ArmProximity(diagram), ArmCollision(diagram))
     arm = station.document.arm
     assert arm is not None
     plant = diagram.plant
@@ -76,7 +76,7 @@ def panda(background: dict[str, Obstacle]) -> Panda:
     return Panda(edges, tree, pregrasps(station, edges, kinematics))
 
 
-def pregrasps(station: Station, edges: Edges, kinematics: ArmKinematics) -> list[np.ndarray]:
+def pregrasps(station: Station, edges: EdgeChecker, kinematics: ArmKinematics) -> list[np.ndarray]:
     """Free postures of the hand over the board, 10 to 30 cm high, tilted by up to 45 degrees; up to
     four for each pose."""
     rng = np.random.default_rng(5)
@@ -106,7 +106,7 @@ def station_case(request: pytest.FixtureRequest, table: Panda) -> Panda:
     return table if request.param == "table" else panda({"bin": BIN, "shelf": SHELF}[request.param])
 
 
-def audit(edges: Edges, path: np.ndarray, levers: np.ndarray) -> bool:
+def audit(edges: EdgeChecker, path: np.ndarray, levers: np.ndarray) -> bool:
     """Whether Drake finds all of a way free in steps of at most `AUDIT`."""
     for a, b in pairwise(path):
         rows = 2 + int((np.abs(b - a) * levers).sum() / AUDIT)

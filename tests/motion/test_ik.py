@@ -21,11 +21,11 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.resources import resolve
-from burg_drake.motion.ik import ArmKinematics, rotation_vector, solve_ik
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.motion.ik.numeric import ArmKinematics, rotation_vector, solve_ik
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
 DH = [

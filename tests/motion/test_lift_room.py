@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.lift_room import as_high_as_there_is_room, heights
-from burg_drake.motion.verdict import Reach
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.reach.lift_height import lift_heights, raise_lifts
+from burg_drake.motion.reach.verdict import Reach
 
-TRIED = heights(0.02, 0.30)
+TRIED = lift_heights(0.02, 0.30)
 HAND, ARM = Reach(Outcome.HAND_COLLISION_LIFT, "roof"), Reach(Outcome.LIFT_LINE, "link vs roof")
 
 
@@ -35,13 +35,13 @@ class MadeUp:
 
     def found(self) -> list[Reach]:
         whole = self.judge(TRIED[-1], np.arange(len(self.hand)))
-        return as_high_as_there_is_room(whole, TRIED, self.judge, self.hand_is_free)
+        return raise_lifts(whole, TRIED, self.judge, self.hand_is_free)
 
 
 def test_heights_lie_a_centimetre_apart_between_the_least_and_the_whole() -> None:
     np.testing.assert_allclose(TRIED, np.arange(2, 31) / 100.0)
-    np.testing.assert_allclose(heights(0.0, 0.025), [0.0, 0.01, 0.02, 0.025])
-    np.testing.assert_array_equal(heights(0.3, 0.3), [0.3])
+    np.testing.assert_allclose(lift_heights(0.0, 0.025), [0.0, 0.01, 0.02, 0.025])
+    np.testing.assert_array_equal(lift_heights(0.3, 0.3), [0.3])
 
 
 def test_the_largest_height_is_found() -> None:
@@ -60,7 +60,7 @@ def test_the_largest_height_is_found() -> None:
 def test_what_no_lift_changes_is_not_asked_again() -> None:
     made_up = MadeUp(np.empty(0), np.empty(0))
     whole = [Reach(Outcome.NO_IK), Reach(Outcome.HAND_COLLISION_RETREAT, "table"), Reach(None)]
-    found = as_high_as_there_is_room(whole, TRIED, made_up.judge, made_up.hand_is_free)
+    found = raise_lifts(whole, TRIED, made_up.judge, made_up.hand_is_free)
     assert found == whole and made_up.asked == 0
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.resources import resolve
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station, load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Station, load_station
 
 
 def limits(station: Station) -> ArmLimits:

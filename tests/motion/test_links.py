@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.motion.links import ArmLinks
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.motion.ik.links import ArmLinks
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 from tests.motion.gantry import gantry_diagram
 
 

@@ -11,20 +11,20 @@ import ur_ik
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.closed_form_lines import ClosedFormLines
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.ik_routine import IkRoutine, RoutineSolutions
-from burg_drake.motion.line_poses import LinePoses
-from burg_drake.motion.line_search import Chain, LineSearch
-from burg_drake.motion.numeric_lines import NumericLines
-from burg_drake.motion.panda_ik import PandaIk
-from burg_drake.motion.proximity import ArmProximity
-from burg_drake.motion.reach_settings import ReachSettings
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.ik.panda import PandaIk
+from burg_drake.motion.ik.routine import IkRoutine, RoutineSolutions
+from burg_drake.motion.lines.closed_form import ClosedFormLineSearch
+from burg_drake.motion.lines.line_poses import LinePoses
+from burg_drake.motion.lines.line_search import Chain, LineSearch
+from burg_drake.motion.lines.numeric_search import NumericLineSearch
+from burg_drake.motion.lines.reach_settings import ReachSettings
+from burg_drake.motion.proximity.clearance_bounds import ArmProximity
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import load_station
 
 SETTINGS = ReachSettings()
 MOTION = GraspMotion()
@@ -50,19 +50,19 @@ class Arm:
         self.lines = LinePoses.of(self.X_HG, self.X_WA[:3, :3], MOTION)
         self.proximity = ArmProximity(self.diagram)
 
-    def numeric(self, kinematics: ArmKinematics | None = None) -> NumericLines:
+    def numeric(self, kinematics: ArmKinematics | None = None) -> NumericLineSearch:
         """The search."""
-        return NumericLines(
+        return NumericLineSearch(
             kinematics or self.kinematics, self.lines, self.proximity, self.home, SETTINGS
         )
 
-    def by_routine(self, routine: IkRoutine) -> NumericLines:
+    def by_routine(self, routine: IkRoutine) -> NumericLineSearch:
         """The search with an inverse kinematics that somebody brought along."""
         solutions, beyond = (
             RoutineSolutions(self.kinematics, routine, SETTINGS.limit_margin, limited=limited)
             for limited in (True, False)
         )
-        return NumericLines(
+        return NumericLineSearch(
             self.kinematics,
             self.lines,
             self.proximity,
@@ -171,7 +171,7 @@ def test_verdicts_are_those_of_the_closed_form(panda: Arm) -> None:
     ik = PandaIk.of(panda.kinematics)
     assert ik is not None
     ik = ik.within(SETTINGS.limit_margin)
-    swept = ClosedFormLines(
+    swept = ClosedFormLineSearch(
         panda.kinematics, ik, panda.lines, panda.proximity, panda.home, SETTINGS
     )
     expected, found = outcomes(swept, X_AG), outcomes(panda.numeric(), X_AG)

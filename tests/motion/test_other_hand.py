@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.reach import ArmReach
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 OWN, OTHER = "panda_tabletop", "panda_wsg"
 

@@ -11,9 +11,9 @@ from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, make_pose, rot_z
-from burg_drake.core.resources import resolve
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.panda_ik import PandaIk, Postures, panda_forward
+from burg_drake.core.paths.resources import resolve
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.ik.panda import PandaIk, Postures, panda_forward
 
 FINE = 1e-9
 """What the closed form promises [m and of matrix entries]."""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.panda_ik import PandaIk
-from burg_drake.motion.posture_grid import DEEP, Place, PostureGrid
+from burg_drake.motion.ik.panda import PandaIk
+from burg_drake.motion.lines.posture_grid import DEEP, GridChain, PostureGrid
 
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
@@ -68,7 +68,7 @@ def doubts(grid: PostureGrid) -> np.ndarray:
     return DOUBT * np.interp(grid.lower, (0.0, 0.01), (1.0, 0.0))
 
 
-def cost_of(grid: PostureGrid, i: int, place: Place) -> float:
+def cost_of(grid: PostureGrid, i: int, place: GridChain) -> float:
     places = [
         (p, i, place.way, place.branch[p], place.parameter[p]) for p in range(len(place.branch))
     ]

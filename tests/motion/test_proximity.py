@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import Pose
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.proximity import ArmProximity
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.proximity.clearance_bounds import ArmProximity
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 BIN = {
     "near": Obstacle(X_WB=Pose((0.22, 0.0, 0.06)), size=(0.02, 0.66, 0.12)),

@@ -10,6 +10,7 @@ from math import pi
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import (
     grasp_from_axes,
@@ -19,14 +20,13 @@ from burg_drake.core.frames import (
     rotation_from_rpy,
     swap_fingers,
 )
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.motion.reach import ArmReach, Reach, ReachSettings
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Obstacle, Station, load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
 DH = [

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rot_z, rotation_from_rpy, transform_points
-from burg_drake.core.schema import Pose
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.reach_layer import ReachLayer, asked_where_needed, reach_from_above
-from burg_drake.motion.station_check import empty_scene
-from burg_drake.scene.scene import Board
-from burg_drake.station.station import Station, load_station
-from burg_drake.visualization.color_map import map_colors
-from burg_drake.visualization.reach_image import reach_image
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.motion.workspace.reach_layer import ReachLayer, asked_where_needed, reach_from_above
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.scene.document.scene import Board
+from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.visualization.pictures.reach_raster import reach_image
+from burg_drake.visualization.style.color_map import map_colors
 
 BOARD = Board(size=(0.5, 0.3))
 

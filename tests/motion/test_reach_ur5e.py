@@ -11,12 +11,12 @@ import pytest
 import ur_ik
 
 from burg_drake.core.frames import inverse, make_pose, rot_z
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.reach import ArmReach, Reach
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram, instance_pose
-from burg_drake.station.station import Station, load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.reach.arm_reach import ArmReach, Reach
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram, instance_pose
+from burg_drake.station.document.station_document import Station, load_station
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 

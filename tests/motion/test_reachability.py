@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, make_pose, swap_fingers, transform_points
-from burg_drake.core.schema import Pose
-from burg_drake.motion.arm_span import ArmSpan
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.ik import ArmKinematics, solve_ik
-from burg_drake.motion.reachability import (
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.ik.numeric import ArmKinematics, solve_ik
+from burg_drake.motion.workspace.arm_span import ArmSpan
+from burg_drake.motion.workspace.reachability import (
     ReachabilityMap,
     ReachabilitySettings,
     cleared,
     map_reachability,
 )
-from burg_drake.motion.station_check import empty_scene
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Station, load_station
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Station, load_station
 
 COARSE = ReachabilitySettings(
     spacing=0.2, heights=(0.06, 0.2), tilts_deg=(0.0, 50.0), headings=(1, 3), yaws=2

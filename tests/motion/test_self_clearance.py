@@ -11,15 +11,15 @@ import pytest
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core.frames import Array
-from burg_drake.motion.arm_shape import ArmShape
-from burg_drake.motion.balls import BallTrees, BodyBalls
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.motion.link_distance import LinkDistance
-from burg_drake.motion.pair_table import Grid, PairTable, may_meet
-from burg_drake.motion.self_clearance import counted_pairs
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.motion.proximity.arm_shape import ArmShape
+from burg_drake.motion.proximity.ball_tree import BallTrees, BodyBalls
+from burg_drake.motion.proximity.link_distance import LinkDistance
+from burg_drake.motion.proximity.pair_table import JointGrid, PairTable, may_meet
+from burg_drake.motion.proximity.self_clearance import counted_pairs
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import load_station
 from tests.motion.gantry import gantry_diagram
 
 
@@ -97,10 +97,10 @@ def oracle(built: StationDiagram, a: BodyIndex, b: BodyIndex, q: Array) -> Array
 
 def pair(
     built: StationDiagram, shape: ArmShape, first: str, second: str
-) -> tuple[BodyBalls, BodyBalls, Grid, LinkDistance]:
+) -> tuple[BodyBalls, BodyBalls, JointGrid, LinkDistance]:
     known = names(built, shape.trees)
     a, b = (shape.trees.bodies[known.index(name)] for name in (first, second))
-    grid = Grid.over(shape.links, a, [b], shape.limits)
+    grid = JointGrid.over(shape.links, a, [b], shape.limits)
     assert grid is not None
     return a, b, grid, LinkDistance(built, shape.links, a.body, [b.body])
 
@@ -184,4 +184,4 @@ def test_no_table_of_too_many_joints() -> None:
     shape = ArmShape.of(diagram("panda_tabletop"))
     known = names(diagram("panda_tabletop"), shape.trees)
     a, b = (shape.trees.bodies[known.index(name)] for name in ("panda_link4", "panda_hand"))
-    assert Grid.over(shape.links, a, [b], shape.limits) is None
+    assert JointGrid.over(shape.links, a, [b], shape.limits) is None

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.reach import ArmReach
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.motion.ik.numeric import ArmKinematics
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "reach_audit.py"
 GRASPS = [

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.line_poses import LinePoses
-from burg_drake.motion.panda_ik import PandaIk, panda_forward
-from burg_drake.motion.straight_rows import ClosedFormFiller, Rows, straighten
-from burg_drake.station.grasp_motion import GraspMotion
+from burg_drake.motion.ik.panda import PandaIk, panda_forward
+from burg_drake.motion.lines.dense_rows import ClosedFormFiller, DenseRows, straighten
+from burg_drake.motion.lines.line_poses import LinePoses
+from burg_drake.station.document.grasp_motion import GraspMotion
 
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
@@ -28,11 +28,11 @@ def corners(change: float) -> np.ndarray:
     return np.array([q])
 
 
-def rows(tolerance: float, change: float) -> Rows:
+def rows(tolerance: float, change: float) -> DenseRows:
     return filled(corners(change), tolerance)
 
 
-def filled(q: np.ndarray, tolerance: float) -> Rows:
+def filled(q: np.ndarray, tolerance: float) -> DenseRows:
     filler = ClosedFormFiller(LINES, X_AG[None], q, LAYERS, IK)
     return straighten(filler, np.linspace(0.0, 4.0, 9), np.array([tolerance]))
 

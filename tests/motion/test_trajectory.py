@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.motion.cubics import DoubleS
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.plan_file import load_plan
-from burg_drake.motion.trajectory import PHASES, Origin, Plan, Trajectory
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.plans.trajectory import PHASES, Plan, PlanOrigin, Trajectory
+from burg_drake.motion.timing.cubics import DoubleS
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 
 LIMITS = ArmLimits(
     np.full(2, -3.0),
@@ -26,7 +26,7 @@ LIMITS = ArmLimits(
     *(np.full(2, x) for x in (1.0, 4.0, 80.0)),
     np.array([9.0, np.inf]),
 )
-ORIGIN = Origin(("a", "b"), LIMITS, "st", "12ab", "sc", "34cd", "mug", np.eye(4))
+ORIGIN = PlanOrigin(("a", "b"), LIMITS, "st", "12ab", "sc", "34cd", "mug", np.eye(4))
 
 
 def motion(start: list[float], end: list[float]) -> Trajectory:
@@ -145,7 +145,7 @@ def test_files_bring_it_back_bit_by_bit(
         assert back.origin is None
         return
     assert back.origin is not None
-    for field in fields(Origin):
+    for field in fields(PlanOrigin):
         a, b = getattr(plan.origin, field.name), getattr(back.origin, field.name)
         if field.name == "limits":
             for limit in fields(ArmLimits):

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.resources import data_root
-from burg_drake.motion.hand_sweep import HandSweep
-from burg_drake.motion.reach import ArmReach
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Station, load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.paths.resources import data_root
+from burg_drake.motion.reach.arm_reach import ArmReach
+from burg_drake.motion.sweep.hand_sweep import HandSweep
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Station, load_station
 
 CAMERA = """
       <collision name="camera">

@@ -8,9 +8,9 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import MeshError
-from burg_drake.objects.contact import CONTACT_FILE, MESH_FACES, contact_geometry
-from burg_drake.objects.entry import ContactGeometry
-from burg_drake.objects.library import load_library
+from burg_drake.objects.collision.contact import CONTACT_FILE, MESH_FACES, contact_geometry
+from burg_drake.objects.library.document import load_library
+from burg_drake.objects.library.entry import ContactGeometry
 
 
 def cylinder() -> trimesh.Trimesh:

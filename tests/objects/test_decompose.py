@@ -7,9 +7,14 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import MeshError
-from burg_drake.objects import decompose
-from burg_drake.objects.coacd_process import DecompositionFailed, run_coacd
-from burg_drake.objects.decompose import Decomposition, convex_pieces, given_pieces, joined_parts
+from burg_drake.objects.collision import decomposition
+from burg_drake.objects.collision.coacd_process import DecompositionFailed, run_coacd
+from burg_drake.objects.collision.decomposition import (
+    Decomposition,
+    convex_pieces,
+    given_pieces,
+    joined_parts,
+)
 
 
 def _bar(size: tuple[float, float, float], at: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -45,29 +50,29 @@ def test_convex_things_are_their_hull() -> None:
 
 
 @pytest.fixture(scope="module")
-def corner_pieces() -> decompose.Pieces:
+def corner_pieces() -> decomposition.Pieces:
     return convex_pieces(_corner(), closed=True)
 
 
-def test_a_corner_is_two_bars(corner_pieces: decompose.Pieces) -> None:
+def test_a_corner_is_two_bars(corner_pieces: decomposition.Pieces) -> None:
     assert _corner().volume == pytest.approx(CORNER_VOLUME)
     assert len(corner_pieces.meshes) == 2
     total = sum(p.volume for p in corner_pieces.meshes)
     assert total == pytest.approx(CORNER_VOLUME, rel=0.05)
 
 
-def test_pieces_are_convex_and_wound_outward(corner_pieces: decompose.Pieces) -> None:
+def test_pieces_are_convex_and_wound_outward(corner_pieces: decomposition.Pieces) -> None:
     for piece in corner_pieces.meshes:
         assert piece.is_volume
         assert piece.volume == pytest.approx(piece.convex_hull.volume, rel=1e-9)
 
 
-def test_the_notch_stays_free(corner_pieces: decompose.Pieces) -> None:
+def test_the_notch_stays_free(corner_pieces: decomposition.Pieces) -> None:
     for piece in corner_pieces.meshes:
         assert not piece.contains([[0.06, 0.06, 0.01]])[0]
 
 
-def test_the_same_mesh_gives_the_same_pieces(corner_pieces: decompose.Pieces) -> None:
+def test_the_same_mesh_gives_the_same_pieces(corner_pieces: decomposition.Pieces) -> None:
     again = convex_pieces(_corner(), closed=True)
     for a, b in zip(corner_pieces.meshes, again.meshes, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
@@ -76,7 +81,7 @@ def test_the_same_mesh_gives_the_same_pieces(corner_pieces: decompose.Pieces) ->
 
 def test_open_surfaces_become_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     """A box without a lid stays open."""
-    monkeypatch.setitem(decompose.REMESHED, "preprocess_resolution", 15)
+    monkeypatch.setitem(decomposition.REMESHED, "preprocess_resolution", 15)
     box = trimesh.creation.box((0.1, 0.08, 0.06))
     box.update_faces(box.triangles_center[:, 2] < 0.029)
     pieces = convex_pieces(box, closed=False, parameters=Decomposition(threshold=0.3)).meshes

@@ -8,7 +8,7 @@ import trimesh
 
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.objects.fit import measure_fit, surface_distance, union_of
+from burg_drake.objects.collision.fit import measure_fit, surface_distance, union_of
 
 RADIUS = 0.03
 

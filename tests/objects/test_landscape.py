@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import Array
-from burg_drake.objects.landscape import Landscape
+from burg_drake.objects.physics.landscape import Landscape
 
 X, Y, Z = np.eye(3)
 SIZE = np.array([0.1, 0.08, 0.06])

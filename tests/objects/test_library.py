@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import DocumentError, InvalidInputError, MeshError, UnknownNameError
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
+from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
+from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
 
 
 @pytest.fixture

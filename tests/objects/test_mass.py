@@ -9,7 +9,7 @@ from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.multibody.tree import CalcSpatialInertia
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.mass import (
+from burg_drake.objects.physics.mass import (
     DEFAULT_DENSITY,
     implausible,
     inertia_matrix,

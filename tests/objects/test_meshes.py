@@ -12,14 +12,14 @@ import trimesh
 from PIL import Image
 
 from burg_drake.core.errors import MeshError, UnknownNameError
-from burg_drake.objects.meshes import (
+from burg_drake.objects.library.obj_file import write_visual
+from burg_drake.objects.meshes.surface import (
     Preparation,
     load_mesh,
     mesh_hash,
     texture_image,
     unit_scale,
 )
-from burg_drake.objects.obj_file import write_visual
 
 SIZE = (0.10, 0.06, 0.03)
 

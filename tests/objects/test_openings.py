@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.openings import close_openings
-from burg_drake.objects.repair import Repaired, repair
-from burg_drake.objects.solids import is_closed
+from burg_drake.objects.meshes.cleaning import Repaired, repair
+from burg_drake.objects.meshes.openings import close_openings
+from burg_drake.objects.meshes.solids import is_closed
 
 
 def _without(mesh: trimesh.Trimesh, drop: np.ndarray) -> trimesh.Trimesh:

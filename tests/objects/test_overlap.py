@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.overlap import SELF_OVERLAP, self_overlap
+from burg_drake.objects.meshes.overlap import SELF_OVERLAP, self_overlap
 
 
 def _torus(reach: float) -> trimesh.Trimesh:

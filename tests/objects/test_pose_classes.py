@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import Array
-from burg_drake.objects.landscape import Landscape
-from burg_drake.objects.pose_classes import PoseClasses, angle_between
-from burg_drake.objects.stable_poses import stable_poses
+from burg_drake.objects.physics.landscape import Landscape
+from burg_drake.objects.physics.pose_classes import PoseClasses, angle_between
+from burg_drake.objects.physics.stability import stable_poses
 
 X, Y, Z = np.eye(3)
 

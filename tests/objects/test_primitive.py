@@ -7,15 +7,15 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import inverse, make_pose, transform_points
-from burg_drake.objects.entry import Primitive
-from burg_drake.objects.fit import surface_distance
-from burg_drake.objects.library import load_library
-from burg_drake.objects.primitive import (
+from burg_drake.objects.collision.fit import surface_distance
+from burg_drake.objects.collision.primitive import (
     fit_primitive,
     nearest_primitive,
     primitive_mesh,
     primitive_volume,
 )
+from burg_drake.objects.library.document import load_library
+from burg_drake.objects.library.entry import Primitive
 
 
 def random_pose(seed: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.repair import bodies, boundary_loops, repair
+from burg_drake.objects.meshes.cleaning import bodies, boundary_loops, repair
 
 BOX = (0.1, 0.06, 0.04)
 VOLUME = 0.1 * 0.06 * 0.04

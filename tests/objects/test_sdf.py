@@ -26,12 +26,17 @@ from pydrake.multibody.plant import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import ContactGeometry, Primitive
-from burg_drake.objects.mass import mass_properties, solid_of_surface
-from burg_drake.objects.obj_file import write_piece, write_visual
-from burg_drake.objects.sdf import DEFAULT_CONTACT, Contact, model_sdf, resolution_hint
+from burg_drake.objects.library.entry import ContactGeometry, Primitive
+from burg_drake.objects.library.obj_file import write_piece, write_visual
+from burg_drake.objects.library.sdf import (
+    DEFAULT_CONTACT,
+    ContactParameters,
+    model_sdf,
+    resolution_hint,
+)
+from burg_drake.objects.physics.mass import mass_properties, solid_of_surface
 
 
 @pytest.fixture
@@ -46,7 +51,9 @@ def _box() -> trimesh.Trimesh:
     return trimesh.creation.box((0.1, 0.06, 0.03)).apply_translation([0.01, 0.02, 0.03])
 
 
-def _text(contact: ContactGeometry = ContactGeometry(), material: Contact = DEFAULT_CONTACT) -> str:
+def _text(
+    contact: ContactGeometry = ContactGeometry(), material: ContactParameters = DEFAULT_CONTACT
+) -> str:
     m = mass_properties(solid_of_surface(_box()), mass=0.2)
     return model_sdf("box", m, 0.31, "mesh.obj", ["pieces/000.obj"], contact, material)
 
@@ -133,7 +140,7 @@ def test_compliant_things_meet_the_pieces_by_a_surface(folder: Path) -> None:
 def test_compliant_pieces_yield_as_well(folder: Path) -> None:
     _, rigid = Parsed(_text(), folder).settled()
     compliant = ContactGeometry(kind="compliant_pieces")
-    _, soft = Parsed(_text(compliant, Contact(modulus=1e5)), folder).settled()
+    _, soft = Parsed(_text(compliant, ContactParameters(modulus=1e5)), folder).settled()
     assert soft > 2.0 * rigid
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.solids import decimated, farthest, is_closed, united
+from burg_drake.objects.meshes.solids import decimated, farthest, is_closed, united
 
 
 def _box(*corners: float) -> trimesh.Trimesh:

@@ -8,9 +8,9 @@ import trimesh
 from trimesh.poses import compute_stable_poses
 
 from burg_drake.core.frames import Array, rotation_angle, transform_points
-from burg_drake.objects.entry import StablePose
-from burg_drake.objects.landscape import Landscape
-from burg_drake.objects.stable_poses import resting_pose, stable_poses
+from burg_drake.objects.library.entry import StablePose
+from burg_drake.objects.physics.landscape import Landscape
+from burg_drake.objects.physics.stability import resting_pose, stable_poses
 
 
 def _poses(mesh: trimesh.Trimesh, p_OOcm: Array | None = None) -> tuple[StablePose, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.symmetry import SymmetryTest, sample_surface
+from burg_drake.objects.physics.symmetry import SymmetryTest, sample_surface
 
 X, Y, Z = np.eye(3)
 

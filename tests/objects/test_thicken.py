@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.solids import is_closed, united
-from burg_drake.objects.thicken import default_wall, separated, wall
+from burg_drake.objects.meshes.solids import is_closed, united
+from burg_drake.objects.meshes.walls import default_wall, separated, wall
 
 
 def _grid(height: np.ndarray, step: float) -> trimesh.Trimesh:

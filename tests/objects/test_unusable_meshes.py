@@ -16,9 +16,9 @@ import trimesh
 from PIL import Image
 
 from burg_drake.core.errors import MeshError
-from burg_drake.objects import mesh_bounds
-from burg_drake.objects.mesh_bounds import STL_HEADER, STL_TRIANGLE, announced_triangles
-from burg_drake.objects.meshes import load_mesh, texture_image
+from burg_drake.objects.meshes import size_limits
+from burg_drake.objects.meshes.size_limits import STL_HEADER, STL_TRIANGLE, announced_triangles
+from burg_drake.objects.meshes.surface import load_mesh, texture_image
 
 SIZE = np.array([0.1, 0.06, 0.04])
 
@@ -176,7 +176,7 @@ def test_triangles_are_counted_before_a_file_is_read(tmp_path: Path, name: str) 
 
 
 def test_meshes_of_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_bounds, "MOST_TRIANGLES", 100)
+    monkeypatch.setattr(size_limits, "MOST_TRIANGLES", 100)
     _box(2).export(tmp_path / "box.ply")
     with pytest.raises(MeshError, match=r"box\.ply: 192 triangles; a mesh may have 100: decimate"):
         load_mesh(tmp_path / "box.ply")
@@ -202,6 +202,6 @@ def test_textures_of_too_many_pixels(
 ) -> None:
     mesh = _with_texture(tmp_path, suffix)
     assert texture_image(load_mesh(mesh).visual) is not None
-    monkeypatch.setattr(mesh_bounds, "MOST_PIXELS", 1000)
+    monkeypatch.setattr(size_limits, "MOST_PIXELS", 1000)
     with pytest.raises(MeshError, match=": 40 x 30 pixels; a texture may have 31 x 31: scale it"):
         load_mesh(mesh)

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library import load_library
+from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline import cutting, geometry, keys
 from burg_drake.pipeline.build import BuildReport, build_library
 from burg_drake.pipeline.source import ObjectSource

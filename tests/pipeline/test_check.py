@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.schema import save_document
-from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.core.documents.schema import save_document
+from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.check import check_library
 from burg_drake.pipeline.source import ObjectSource

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.objects.entry import Decomposition
-from burg_drake.objects.fit import union_of
+from burg_drake.objects.collision.fit import union_of
+from burg_drake.objects.library.entry import Decomposition
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.check import check_library
 from burg_drake.pipeline.source import ObjectSource

@@ -9,14 +9,14 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.schema import Pose
-from burg_drake.formats.burg_library import BurgLibrary, BurgObject
-from burg_drake.formats.ycb import MASS_SOURCE, YcbObject
-from burg_drake.objects.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary
-from burg_drake.pipeline.imports import burg_sources, compare_poses, fixed_note, ycb_sources
+from burg_drake.formats.collections.burg_library import BurgLibrary, BurgObject
+from burg_drake.formats.collections.ycb import MASS_SOURCE, YcbObject
+from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
+from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.pipeline.object_imports import burg_sources, compare_poses, fixed_note, ycb_sources
 
 
 def burg(*objects: BurgObject) -> BurgLibrary:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from burg_drake.core.documents.schema import save_document
 from burg_drake.core.errors import DocumentError
-from burg_drake.core.schema import save_document
-from burg_drake.objects.entry import Decomposition
+from burg_drake.objects.library.entry import Decomposition
 from burg_drake.pipeline.recipe import Cutting, Defaults, RecipeDocument, RecipeObject, load_recipe
 from burg_drake.pipeline.source import ObjectSource, check_source
 

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library import load_library
+from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.target import LOCK_FILE, opened_for_build

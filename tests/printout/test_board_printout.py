@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import Pose
 from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
-from burg_drake.scene.markers import MarkerLayout, Markers, marker_dictionary
-from burg_drake.scene.scene import Board, Instance, Scene, load_scene
+from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
+from burg_drake.scene.document.scene import Board, Instance, Scene, load_scene
 from tests.printout.paper import rasterised, words
 
 BURG = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019, count=(7, 5)))

@@ -8,7 +8,7 @@ import pytest
 
 from burg_drake.printout.outlines import cell_outlines, mask_outlines
 from burg_drake.printout.projection import Grid, Layer
-from burg_drake.scene.markers import Markers, marker_layout
+from burg_drake.scene.document.markers import Markers, marker_layout
 
 
 def area(polygon: np.ndarray) -> float:

@@ -9,10 +9,10 @@ from scipy.spatial import Delaunay
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import transform_points
-from burg_drake.printout.height_map import height_map
 from burg_drake.printout.projection import Grid, Layer, lowest_of, lowest_surface
+from burg_drake.printout.relief import height_map
 from burg_drake.printout.tints import LUMA, luma_at
-from burg_drake.scene.scene import load_scene
+from burg_drake.scene.document.scene import load_scene
 
 GRID = Grid((0.2, 0.1), 1e-3)
 

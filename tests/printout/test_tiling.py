@@ -10,7 +10,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.printout.paper import PAPERS, orientations, paper_size
 from burg_drake.printout.tiling import BLEED, FLAP, cut_axis, tile_board
-from burg_drake.scene.markers import Markers, marker_layout
+from burg_drake.scene.document.markers import Markers, marker_layout
 
 A2 = (0.594, 0.420)
 

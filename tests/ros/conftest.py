@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.frames import Array, grasp_from_axes
 from burg_drake.ros.messages import MessageClasses
-from burg_drake.scene.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene, load_scene
+from tests.cameras.synthetic import board_image
 
 INTRINSICS = Intrinsics(
     width=640,

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.frames import Array
 from burg_drake.ros.board_node import BoardNode
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.document.scene import Scene
+from tests.cameras.synthetic import board_image
 
 Make = Callable[..., Any]
 

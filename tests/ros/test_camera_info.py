@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.ros.camera_info import intrinsics_of
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.ros.board_node import Sighting
 from burg_drake.ros.messages import (

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.overlay import Overlay
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.overlay.renderer import Overlay
 from burg_drake.core.frames import (
     Array,
     inverse,
@@ -29,7 +29,7 @@ from burg_drake.core.frames import (
     rotation_angle,
     rotation_from_quaternion,
 )
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.document.scene import Scene
 
 ROBOT = Path(__file__).with_name("robot.py")
 DEBIAN = "/usr/bin/python3"

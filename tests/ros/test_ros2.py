@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.errors import MissingDependencyError
 from burg_drake.core.frames import Array
 from burg_drake.ros.board_node import BoardNode
 from burg_drake.ros.distribution import connect
 from burg_drake.ros.link import Names, Parent
+from burg_drake.ros.loop import serve
 from burg_drake.ros.messages import MessageClasses
-from burg_drake.ros.serve import serve
 
 try:
     import rclpy as installed

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.board_estimate import BoardEstimate
+from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.ros.board_node import Sighting
-from burg_drake.ros.serve import HINT_AFTER, RATE_EVERY, REASON_AFTER, REASON_EVERY, Account
+from burg_drake.ros.loop import HINT_AFTER, RATE_EVERY, REASON_AFTER, REASON_EVERY, StatusLog
 
 SEEN = BoardEstimate(X_SC=np.eye(4), valid=True, reprojection_error=0.123, ids=tuple(range(52)))
 FOUND, LOST, BLURRED = (
@@ -19,21 +19,21 @@ FOUND, LOST, BLURRED = (
 )
 
 
-def told(account: Account, *looks: tuple[float, Sighting]) -> list[str]:
+def told(account: StatusLog, *looks: tuple[float, Sighting]) -> list[str]:
     lines = [account.looked(sighting, now) for now, sighting in looks]
     return [line[0] for line in lines if line]
 
 
 def test_a_change_is_told_once() -> None:
     looks = [(0.1 * i, FOUND) for i in range(5)] + [(1.0 + 0.1 * i, LOST) for i in range(99)]
-    assert told(Account(0.0), *looks) == [
+    assert told(StatusLog(0.0), *looks) == [
         "the board is in sight: 52 markers, 0.12 px",
         "no pose: no marker in sight",
     ]
 
 
 def test_warnings_are_marked() -> None:
-    account = Account(0.0)
+    account = StatusLog(0.0)
     assert account.looked(LOST, 0.0) is None
     news = account.looked(LOST, REASON_AFTER)
     assert news is not None and news[1]
@@ -43,16 +43,16 @@ def test_warnings_are_marked() -> None:
 
 def test_a_moment_is_not_told() -> None:
     looks = [(0.0, FOUND), (1.0, LOST), (1.0 + 0.9 * REASON_AFTER, LOST), (1.6, FOUND)]
-    assert told(Account(0.0), *looks) == ["the board is in sight: 52 markers, 0.12 px"]
+    assert told(StatusLog(0.0), *looks) == ["the board is in sight: 52 markers, 0.12 px"]
 
 
 def test_reasons_that_alternate_do_not_flood_the_log() -> None:
     looks = [(t, LOST if int(t) % 2 else BLURRED) for t in np.arange(0.0, 60.0, 0.25)]
-    assert 2 <= len(told(Account(0.0), *looks)) <= 60.0 / REASON_EVERY
+    assert 2 <= len(told(StatusLog(0.0), *looks)) <= 60.0 / REASON_EVERY
 
 
 def test_silence_is_told_once_and_again_after_images() -> None:
-    account = Account(0.0)
+    account = StatusLog(0.0)
     topics = {"/camera/image_raw": 0, "/camera/camera_info": 0}
     assert account.waited(topics, 0.9 * HINT_AFTER) is None
     assert account.waited(topics, 1.1 * HINT_AFTER) == (
@@ -68,7 +68,7 @@ def test_silence_is_told_once_and_again_after_images() -> None:
 
 
 def test_rate() -> None:
-    account = Account(0.0)
+    account = StatusLog(0.0)
     for number in range(60):
         account.looked(FOUND if number % 4 else LOST, 0.5 * number)
     assert account.rate(0.9 * RATE_EVERY) is None

@@ -12,12 +12,12 @@ from scipy.stats import chisquare, kstest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, transform_points
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.arrange import arrange, choose
-from burg_drake.scene.arrangement import Arrangement, Wanted, draw_pose
-from burg_drake.scene.layout import LAYOUTS, Layout, PoseChoice
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.scene import Board
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.arrangement.arranging import arrange, choose
+from burg_drake.scene.arrangement.object_shapes import ObjectShapes
+from burg_drake.scene.arrangement.occupancy import Arrangement, ObjectRequest, draw_pose
+from burg_drake.scene.document.layout import LAYOUTS, Layout, PoseChoice
+from burg_drake.scene.document.scene import Board
 
 BOARD = Board(size=(0.594, 0.42))
 
@@ -113,7 +113,7 @@ def hull_area(library: ObjectLibrary, arrangement: Arrangement) -> float:
 
 
 def test_packed_is_denser_than_all_random_ones(shapes: ObjectShapes) -> None:
-    wanted = [Wanted(name=f"box_{i}", object="box", pose=0) for i in range(4)]
+    wanted = [ObjectRequest(name=f"box_{i}", object="box", pose=0) for i in range(4)]
     areas: dict[Layout, list[float]] = {"packed": [], "close": []}
     for layout, found in areas.items():
         for seed in range(5):
@@ -129,7 +129,7 @@ def test_packed_is_denser_than_all_random_ones(shapes: ObjectShapes) -> None:
 def test_places_and_yaws_are_evenly_distributed(shapes: ObjectShapes) -> None:
     """Of a marble alone: Kolmogorov and Smirnov's test of x, y and yaw at a level of 1e-3."""
     rng = np.random.default_rng(0)
-    wanted = [Wanted(name="marble", object="marble")]
+    wanted = [ObjectRequest(name="marble", object="marble")]
     poses = np.array(
         [
             arrange(wanted, shapes, BOARD, rng, layout="random").instances[0].X_SO.matrix()
@@ -151,7 +151,7 @@ def test_poses_are_drawn_as_asked(shapes: ObjectShapes, how: PoseChoice) -> None
     """Chi-squared test at a level of 1e-3 of which side of a box is below."""
     rng = np.random.default_rng(1)
     poses = shapes.library.entry("box").stable_poses
-    wanted = Wanted(name="box", object="box")
+    wanted = ObjectRequest(name="box", object="box")
     drawn = [draw_pose(wanted, shapes, rng, how) for _ in range(2000)]
     share = np.array([pose.probability for pose in poses])
     expected = share / share.sum() if how == "probability" else np.full(len(poses), 1 / len(poses))
@@ -162,7 +162,7 @@ def test_poses_are_drawn_as_asked(shapes: ObjectShapes, how: PoseChoice) -> None
 def test_obstacles_and_roofs(shapes: ObjectShapes) -> None:
     """A wall across the board leaves one side; a roof above it leaves all that is low enough."""
     rng = np.random.default_rng(2)
-    can = [Wanted(name="can", object="can", pose=1)]
+    can = [ObjectRequest(name="can", object="can", pose=1)]
     corners = np.array(list(itertools.product((0.0, 0.45), (0.0, 0.42), (0.0, 0.3))))
     for _ in range(20):
         (one,) = arrange(can, shapes, BOARD, rng, obstacles=[corners]).instances
@@ -179,9 +179,9 @@ def test_what_cannot_be_laid_out(shapes: ObjectShapes) -> None:
     with pytest.raises(InvalidInputError, match="layout 'wild' does not exist; did you mean"):
         arrange([], shapes, BOARD, rng, layout="wild")  # type: ignore[arg-type]
     with pytest.raises(InvalidInputError, match=r"stable pose 9 does not exist; give 0 to 2"):
-        arrange([Wanted(name="box", object="box", pose=9)], shapes, BOARD, rng)
+        arrange([ObjectRequest(name="box", object="box", pose=9)], shapes, BOARD, rng)
     with pytest.raises(UnknownNameError, match=r"object 'cup' is not in library"):
-        arrange([Wanted(name="cup", object="cup")], shapes, BOARD, rng)
+        arrange([ObjectRequest(name="cup", object="cup")], shapes, BOARD, rng)
     names = [one.name for one in choose(shapes.library, 3, rng, only=["can"], repeat=True)]
     assert names == ["can", "can_2", "can_3"]
     taken = choose(shapes.library, 1, rng, only=["can"], taken=["can", "can_2"])

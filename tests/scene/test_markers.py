@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.markers import Markers, marker_dictionary, marker_layout
-from burg_drake.scene.scene import Board
+from burg_drake.scene.document.markers import Markers, marker_dictionary, marker_layout
+from burg_drake.scene.document.scene import Board
 
 A2 = (0.594, 0.420)
 

@@ -8,8 +8,8 @@ import scipy.optimize
 from scipy.spatial import ConvexHull
 
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, transform_points
-from burg_drake.objects.library import load_library
-from burg_drake.scene.sweep import ConvexShapes, ways_to_contact
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.arrangement.sweep import ConvexShapes, contact_distances
 
 UP = np.array([0.0, 0.0, 1.0])
 FLAT = np.zeros((3, 3))
@@ -37,7 +37,7 @@ def cylinder(radius: float, half_length: float) -> ConvexShapes:
 def way(a: ConvexShapes, b: ConvexShapes, direction: Array, limit: float = 10.0) -> float:
     """Of one shape to another."""
     one = np.array([0])
-    return float(ways_to_contact(a, b, (one, one), direction, limit)[0])
+    return float(contact_distances(a, b, (one, one), direction, limit)[0])
 
 
 def at(
@@ -138,7 +138,7 @@ def test_the_first_contact_of_many_is_the_least(rng: np.random.Generator) -> Non
     low, high = still.boxes()
     over = (low[j, :2] < high_m[i, :2]) & (low_m[i, :2] < high[j, :2])
     expected = np.where(over.all(axis=1), low[j, 2] - high_m[i, 2], np.inf).min()
-    found = ways_to_contact(moving, still, (i, j), UP, np.inf)
+    found = contact_distances(moving, still, (i, j), UP, np.inf)
     assert found.min() == pytest.approx(expected, abs=1e-6)
 
 
@@ -157,7 +157,7 @@ def test_what_is_enough_ends_the_search_and_changes_nothing_else(
         ahead = (aside < (2.0 * radius) ** 2) & (p[:, 2] > 0.0)
         ways = p[ahead, 2] - np.sqrt((2.0 * radius) ** 2 - aside[ahead])
         expected, enough = ways.min(initial=np.inf), rng.uniform(0.0, 0.3)
-        found = ways_to_contact(one, still, pairs, UP, np.inf, enough=enough).min()
+        found = contact_distances(one, still, pairs, UP, np.inf, enough=enough).min()
         if expected < enough:
             assert expected - 2e-6 < found < enough
             sooner += found > expected + 1e-3

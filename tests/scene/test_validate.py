@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.scene import Scene
-from burg_drake.scene.validate import read_vertices, require_sound, validate_scene
+from burg_drake.scene.document.scene import Scene
+from burg_drake.scene.document.validation import read_vertices, require_sound, validate_scene
 
 MakeScene = Callable[..., Scene]
 

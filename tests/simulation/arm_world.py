@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from trial_world import make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, inverse, make_pose, rot_z
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
-from burg_drake.motion.panda_ik import PandaIk
-from burg_drake.motion.trajectory import Plan, Trajectory
-from burg_drake.simulation.arm_trial import ArmTrial
-from burg_drake.station.station import Arm, Obstacle, Station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.motion.ik.panda import PandaIk
+from burg_drake.motion.plans.trajectory import Plan, Trajectory
+from burg_drake.simulation.trials.arm_trial import ArmTrial
+from burg_drake.station.document.station_document import Arm, Obstacle, Station
 
 HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
 PANDA = resolve("package://burg_drake/models/panda/panda_arm.sdf")

@@ -13,24 +13,24 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, POST, from_above
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.trajectory import Origin, Plan
-from burg_drake.scene.scene import Scene
-from burg_drake.simulation.arm_trial import ArmTrial
-from burg_drake.simulation.contacts import Contact
-from burg_drake.simulation.execution import Execution
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import TrialResult
-from burg_drake.simulation.touches import Touches
-from burg_drake.station.arm_control import ARM_STIFFNESS
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Obstacle
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.plans.trajectory import Plan, PlanOrigin
+from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.arm_trial import ArmTrial
+from burg_drake.simulation.trials.contacts import BodyContact
+from burg_drake.simulation.trials.execution import Execution
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.arm_control import ARM_STIFFNESS
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle
 
 WHOLE = replace(ENGINES["standard"], whole_trial=True)
 SWAP = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -352,8 +352,8 @@ def test_what_the_hand_touches_at_the_grasp_and_after(crowd: ArmTrial) -> None:
         (finger, free["box"], False, "panda_leftfinger vs box"),
     ):
         for pair in ((one, other), (other, one)):
-            touches = Touches(crowd.diagram, crowd.hand.links, free["box"])
-            assert touches.look([Contact(*pair, np.zeros(3))], arrived) == ""
+            touches = RobotContactWatch(crowd.diagram, crowd.hand.links, free["box"])
+            assert touches.look([BodyContact(*pair, np.zeros(3))], arrived) == ""
             assert touches.first == touched
 
 
@@ -449,7 +449,7 @@ def test_a_plan_for_something_else_is_refused(arm_trial: ArmTrial) -> None:
     with pytest.raises(InvalidInputError, match=r"lift moves 6 joints; the arm .* has 7"):
         arm_trial.run("box", CENTRE, replace(plan, lift=short))
     scene, station = arm_trial.diagram.scene, arm_trial.diagram.station
-    origin = Origin(
+    origin = PlanOrigin(
         joints=tuple(joint.name() for joint in arm_trial.diagram.arm_joints),
         limits=ArmLimits(*(np.full(7, limit) for limit in (-9.0, 9.0, 9.0, 9.0, 9.0, 9.0))),
         station=station.name,

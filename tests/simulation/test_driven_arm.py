@@ -15,17 +15,17 @@ from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.limits import ArmLimits
-from burg_drake.motion.trajectory import Origin, Plan, Trajectory
-from burg_drake.motion.verdict import Reach
-from burg_drake.scene.scene import Scene
-from burg_drake.simulation.arm_trial import ArmTrial
-from burg_drake.station.arm_control import ArmControl
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.mounted_hand import MountedHand
-from burg_drake.station.station import Station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.ik.limits import ArmLimits
+from burg_drake.motion.plans.trajectory import Plan, PlanOrigin, Trajectory
+from burg_drake.motion.reach.verdict import Reach
+from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.arm_trial import ArmTrial
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.mounted_hand import MountedHand
+from burg_drake.station.document.arm_control import ArmControl
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import Station
 
 MakeScene = Callable[..., Scene]
 ASIDE, BELOW = 0.015, 0.02
@@ -56,7 +56,7 @@ def plan(scene: Scene, station: Station) -> Plan:
     joints = tuple(joint.name() for joint in trial.diagram.arm_joints)
     ones = np.ones(7)
     limits = ArmLimits(-3.0 * ones, 3.0 * ones, ones, ones, ones, ones)
-    origin = Origin(
+    origin = PlanOrigin(
         joints, limits, station.name, station.content, scene.name, scene.content, "box", np.eye(4)
     )
     return replace(found, close_time=0.6, opening=0.08, origin=origin)

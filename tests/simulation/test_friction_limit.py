@@ -9,12 +9,12 @@ from trial_world import FORCE, GRAVITY, SLOW, from_above, make_station
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
-from burg_drake.simulation.friction_limit import (
+from burg_drake.simulation.robustness.friction_search import (
     FrictionSettings,
     friction_limit,
     friction_to_carry,
 )
-from burg_drake.simulation.hand_trial import HandTrial
+from burg_drake.simulation.trials.hand_trial import HandTrial
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

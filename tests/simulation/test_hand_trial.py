@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, from_above, lifting, make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance
-from burg_drake.simulation.execution import Execution
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import Obstacle
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Instance
+from burg_drake.simulation.trials.execution import Execution
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import Obstacle
 
 
 def margins(result) -> np.ndarray:

@@ -8,11 +8,11 @@ from pydrake.multibody.math import SpatialVelocity
 from trial_world import make_station
 
 from burg_drake.core.frames import Array
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.simulation.herd import Herd
-from burg_drake.simulation.land import land
-from burg_drake.simulation.relax import RELAXING, relax
-from burg_drake.station.diagram import build_station_diagram
+from burg_drake.scene.arrangement.object_shapes import ObjectShapes
+from burg_drake.simulation.rest.relaxation import RELAXING, relax
+from burg_drake.simulation.settling.board_edge import BoardEdgeGuard
+from burg_drake.simulation.settling.landing import drop_onto_scene
+from burg_drake.station.diagram.builder import build_station_diagram
 
 EDGE = 0.05
 """Of the block [m]."""
@@ -38,7 +38,7 @@ def velocity_after(
     built.plant.SetFreeBodySpatialVelocity(context, block, V_WOcm.Shift(p_OcmO))
     if locked:
         block.Lock(context)
-    herd = Herd(built, ObjectShapes(scene.library), margin=MARGIN, share=1.0)
+    herd = BoardEdgeGuard(built, ObjectShapes(scene.library), margin=MARGIN, share=1.0)
     herd.drive(context, [block.index()])
     V_WO = built.plant.EvalBodySpatialVelocityInWorld(context, block)
     assert V_WO.rotational() == pytest.approx(np.zeros(3) if locked else turning)
@@ -68,7 +68,7 @@ def test_what_is_locked_stays(make_scene) -> None:
 @pytest.mark.parametrize("beyond", [0.01, 0.05])
 def test_what_lands_too_far_out_slides_back_and_not_much_further(make_scene, beyond: float) -> None:
     scene = make_scene(("block", FARTHEST + beyond, 0.2, 0.0))
-    landed = land(scene, make_station(), ["block"], ObjectShapes(scene.library), MARGIN)
+    landed = drop_onto_scene(scene, make_station(), ["block"], ObjectShapes(scene.library), MARGIN)
     x, y, _ = landed.X_SO("block")[:3, 3]
     assert FARTHEST - 0.02 < x < FARTHEST + 0.002
     assert y == pytest.approx(0.2, abs=0.01)
@@ -77,7 +77,7 @@ def test_what_lands_too_far_out_slides_back_and_not_much_further(make_scene, bey
 def test_what_relaxes_beyond_the_edge_comes_back(make_scene) -> None:
     scene, station = make_scene(("block", WIDTH - EDGE / 2 + 0.02, 0.2, 0.0)), make_station()
     built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
-    herd = Herd(built, ObjectShapes(scene.library), margin=0.003, share=1.0)
+    herd = BoardEdgeGuard(built, ObjectShapes(scene.library), margin=0.003, share=1.0)
     relaxed = relax(built, ["block"], 1.0, before_window=herd.drive)
     X_SO = np.linalg.inv(station.document.X_WS.matrix()) @ relaxed.X_WO["block"]
     assert WIDTH - 0.02 < X_SO[0, 3] + EDGE / 2 < WIDTH

@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 from trial_world import FORCE, GRAVITY, from_above, make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance
-from burg_drake.simulation.grip import Grip, take_grip
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.hold_force import DIRECTIONS, HoldForces, LoadSettings, shake, tug
-from burg_drake.simulation.result import TrialResult
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Instance
+from burg_drake.simulation.robustness.grip import Grip, take_grip
+from burg_drake.simulation.robustness.hold_force import (
+    DIRECTIONS,
+    HoldForces,
+    LoadSettings,
+    shake,
+    tug,
+)
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

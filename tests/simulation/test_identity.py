@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from trial_world import from_above, make_station
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance, Scene
-from burg_drake.simulation.execution import Execution
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import TrialResult
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Instance, Scene
+from burg_drake.simulation.trials.execution import Execution
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
 
 GRASPS = {
     "lifted": ("box", from_above(0.065), None, None),
@@ -125,7 +125,7 @@ print(json.dumps({name: execute(trial, name) for name in reversed(GRASPS)}))
 
 def load_scene_trial(path: str) -> HandTrial:
     """For another process."""
-    from burg_drake.scene.scene import load_scene
+    from burg_drake.scene.document.scene import load_scene
 
     return HandTrial(load_scene(path), make_station())
 

@@ -10,18 +10,18 @@ import pytest
 import trimesh
 from trial_world import lifting
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.antipodal import sample_antipodal
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.paths.resources import resolve
+from burg_drake.grasping.sampling.antipodal import sample_antipodal
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.scene import Board, Instance, SceneDocument, load_scene, save_scene
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.trial_settings import TrialSettings
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import Station, StationDocument, Table
+from burg_drake.scene.document.scene import Board, Instance, SceneDocument, load_scene, save_scene
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import Station, StationDocument, Table
 
 BOX, WIDE = (0.06, 0.09, 0.08), (0.096, 0.15, 0.10)
 """Sizes of the boxes [m]. Of the narrow one the x extent fits between fingers that open to 80 mm,

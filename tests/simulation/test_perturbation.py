@@ -11,15 +11,15 @@ from trial_world import FORCE, GRAVITY, from_above, make_station
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, make_pose, rotation_angle
-from burg_drake.core.outcome import Outcome
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.perturbation import (
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.simulation.robustness.perturbation import (
     Noise,
     Perturbed,
     SuccessRate,
     perturb,
     success_rate,
 )
+from burg_drake.simulation.trials.hand_trial import HandTrial
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

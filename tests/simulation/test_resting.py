@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 import trimesh
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import ObjectEntry, Source, StablePose
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary
-from burg_drake.objects.mass import mass_properties, solid_of_surface
-from burg_drake.objects.obj_file import write_piece
-from burg_drake.objects.sdf import model_sdf
-from burg_drake.objects.stable_poses import resting_pose, stable_poses
-from burg_drake.simulation.drop import TILT
-from burg_drake.simulation.resting import Confirmation, confirm_poses
+from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
+from burg_drake.objects.library.entry import ObjectEntry, Source, StablePose
+from burg_drake.objects.library.obj_file import write_piece
+from burg_drake.objects.library.sdf import model_sdf
+from burg_drake.objects.physics.mass import mass_properties, solid_of_surface
+from burg_drake.objects.physics.stability import resting_pose, stable_poses
+from burg_drake.simulation.settling.drop_test import TILT
+from burg_drake.simulation.settling.resting_poses import Confirmation, confirm_poses
 
 X, Y, Z = np.eye(3)
 
@@ -215,7 +215,7 @@ def test_a_failure_of_the_simulator_is_a_note(
     def fail(*_: object) -> None:
         raise SystemExit("Failure at multibody/plant: condition 'x > 0' failed.")
 
-    monkeypatch.setattr("burg_drake.simulation.drop.DropTest.run", fail)
+    monkeypatch.setattr("burg_drake.simulation.settling.drop_test.DropTest.run", fail)
     found = confirm_poses(library, "thing")
     assert found.poses == poses
     assert found.notes == (

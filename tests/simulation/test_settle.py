@@ -8,12 +8,12 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.settle import settle
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.documents.schema import Pose
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.rest.criterion import settle
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 GRAVITY = 9.81
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from trial_world import GRAVITY, from_above, make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import load_library
-from burg_drake.scene.object_shapes import ObjectShapes
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.land import land
-from burg_drake.simulation.settle_scene import settle_scene
-from burg_drake.station.check import overlaps
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.arrangement.object_shapes import ObjectShapes
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.settling.landing import drop_onto_scene
+from burg_drake.simulation.settling.settled_scene import settle_scene
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.station.checks.scene_issues import overlaps
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
 
 EDGE = 0.05
 """Of the blocks [m]; they stand on their origins."""
@@ -127,7 +127,7 @@ def test_what_lands_is_kept_on_the_board(make_scene) -> None:
     )
     width = scene.board.size[0]
     assert settle_scene(scene, make_station()).scene.X_SO("ball")[0, 3] > width
-    landed = land(scene, make_station(), ["ball"], ObjectShapes(scene.library), 0.03)
+    landed = drop_onto_scene(scene, make_station(), ["ball"], ObjectShapes(scene.library), 0.03)
     center = (landed.X_SO("ball") @ (0.0, 0.0, 0.03, 1.0))[0]  # of the ball, whose radius is 30 mm
     assert 0.53 < center < width - 0.03 - 0.03 + 0.003
     assert landed.instances["block"] == scene.instances["block"]  # to the last digit

@@ -24,10 +24,10 @@ from trial_world import (
     make_station,
 )
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.scene.scene import Scene
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.station.engine import ENGINES
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.station.document.engine import ENGINES
 
 STIFFNESS = 1e7 / 0.0076
 """Modulus of the pads over their thickness from the middle to the front [N/m^3]."""

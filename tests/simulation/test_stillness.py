@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from trial_world import GRAVITY, make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.creep import creep
-from burg_drake.simulation.relax import RELAXING
-from burg_drake.simulation.settle_scene import settle_scene
-from burg_drake.simulation.slack import slacken
-from burg_drake.simulation.stillness import STILL_ANGLE, STILL_DURATION, is_still, stillness
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.rest.drift import predict_drift
+from burg_drake.simulation.rest.relaxation import RELAXING
+from burg_drake.simulation.rest.still_check import STILL_ANGLE, STILL_DURATION, is_still, stillness
+from burg_drake.simulation.settling.reduced_friction import reduce_friction
+from burg_drake.simulation.settling.settled_scene import settle_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 EDGE = 0.05
 """Of the blocks [m]."""
@@ -65,7 +65,7 @@ def test_what_will_not_stay_is_foretold(make_scene) -> None:
     tilted = Instance(name="tilted", object="block", X_SO=Pose((0.4, 0.2, 0), rpy_deg=(1.0, 0, 0)))
     scene = make_scene(placed("block", "block", 0.3, 0.0), tilted)
     built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
-    moving = creep(built).moving
+    moving = predict_drift(built).moving
     assert list(moving) == ["tilted"]
     assert moving["tilted"].turning > STILL_ANGLE / STILL_DURATION
 
@@ -78,13 +78,13 @@ def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
     other = Instance(name="other", object="block", X_SO=Pose((0.2, 0.2, 0.0), rpy_deg=tilt))
     scene = make_scene(one, other, placed("beside", "block", 0.4 + EDGE + 2e-4, 0.0))
     built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
-    foretold = creep(built, among=["one"])
+    foretold = predict_drift(built, among=["one"])
     assert list(foretold.moving) == ["one"]
     assert foretold.doubtful == {"one", "beside"}
     assert foretold.X_WO.keys() == scene.instances.keys()
     assert (foretold.X_WO["other"] == built.X_WO("other")).all()
     assert foretold.pace == pytest.approx(foretold.moving["one"].turning * 5.0 / STILL_ANGLE)
-    assert creep(built, among=["other"]).moving.keys() == {"other"}
+    assert predict_drift(built, among=["other"]).moving.keys() == {"other"}
 
 
 def test_what_rocks_until_it_rests_is_no_creep() -> None:
@@ -95,15 +95,15 @@ def test_what_rocks_until_it_rests_is_no_creep() -> None:
     scene = Scene(document, load_library("household"), Path("can.yaml"))
     station = load_station("panda_tabletop")
     built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
-    assert creep(built, once=True).moving  # as far as one can tell so soon
-    assert not creep(built).moving
+    assert predict_drift(built, once=True).moving  # as far as one can tell so soon
+    assert not predict_drift(built).moving
     assert is_still(stillness(scene, station, duration=1.0))
 
 
 def test_friction_is_slackened(make_scene) -> None:
     scene = make_scene(placed("block", "block", 0.3, 0.0))
     built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
-    slacken(built, 0.25)
+    reduce_friction(built, 0.25)
     inspector = built.scene_graph.model_inspector()
     body = built.plant.get_body(built.free["block"])
     for geometry in built.plant.GetCollisionGeometriesForBody(body):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from trial_world import CENTRE, from_above, make_station
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import TrialResult
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import Obstacle
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Instance
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import Obstacle
 
 UNDECIDED = 0.6
 """A trial in free air is decided before this [s]."""

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from trial_world import CENTRE, FORCE, GRAVITY, from_above, lifting, make_station
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rot_z
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.floating_hand import FloatingHand
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import Obstacle
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Instance
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.floating_hand import FloatingHand
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle
 
 WHOLE = replace(ENGINES["standard"], whole_trial=True)
 IN_THE_AIR = Instance(object="box", X_SO=Pose((0.3, 0.2, 0.6)))

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, grasp_from_axes
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import Pose
-from burg_drake.simulation.trial_settings import USUAL_LIFT, TrialSettings
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.hand import load_hand
-from burg_drake.station.station import Obstacle, Station, StationDocument, Table
+from burg_drake.core.paths.resources import resolve
+from burg_drake.simulation.trials.trial_settings import USUAL_LIFT, TrialSettings
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.gripper_document import load_hand
+from burg_drake.station.document.station_document import Obstacle, Station, StationDocument, Table
 
 GRAVITY = 9.81
 FORCE = 40.0

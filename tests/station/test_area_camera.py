@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from burg_drake.cameras.intrinsics import of_camera
+from burg_drake.cameras.optics.intrinsics import of_camera
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import FieldError
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.area_camera import finer
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Camera, Station, load_station
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Camera, Station, load_station
+from burg_drake.station.world.area_camera import finer
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(

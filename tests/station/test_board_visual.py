@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, Role
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import inverse
-from burg_drake.core.schema import Pose
-from burg_drake.scene.markers import Markers, marker_dictionary
-from burg_drake.scene.scene import Board, Scene, SceneDocument, load_scene
-from burg_drake.station.board_visual import board_meshes
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Camera, Station, load_station
+from burg_drake.scene.document.markers import Markers, marker_dictionary
+from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import Camera, Station, load_station
+from burg_drake.station.world.board_visual import board_meshes
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(

@@ -7,11 +7,11 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from burg_drake.core.frames import inverse, rotation_angle, transform_points
-from burg_drake.core.resources import builtin_names
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.check import check_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import builtin_names
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 SECONDS = 1.0
 MOVED = 1e-4

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import MissingDependencyError
 from burg_drake.core.frames import inverse
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.cameras import render_cameras
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import Camera, Obstacle, Station, load_station
-from burg_drake.station.surroundings import PAPER
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import Camera, Obstacle, Station, load_station
+from burg_drake.station.world.camera_sensors import render_cameras
+from burg_drake.station.world.surroundings import PAPER
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(
@@ -109,7 +109,7 @@ def test_every_camera_of_the_built_in_station(empty: Scene) -> None:
 
 def test_missing_libraries_are_named(empty: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "burg_drake.station.cameras.missing_render_libraries", lambda: ["libEGL.so.1"]
+        "burg_drake.station.world.camera_sensors.missing_render_libraries", lambda: ["libEGL.so.1"]
     )
     with pytest.raises(
         MissingDependencyError, match=r"cameras need the system libraries libEGL\.so\.1; run: "

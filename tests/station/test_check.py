@@ -8,16 +8,22 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse
-from burg_drake.core.schema import Pose
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.scene.validate import SceneIssue
-from burg_drake.station.check import check_scene, require_sound_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.scene.document.validation import SceneIssue
+from burg_drake.station.checks.scene_issues import check_scene, require_sound_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import (
+    Obstacle,
+    Station,
+    StationDocument,
+    Table,
+    load_station,
+)
 
 EDGE = 0.06
 HEIGHT = EDGE / 2

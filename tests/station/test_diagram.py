@@ -17,11 +17,16 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import MODEL_NAMES, Obstacle, Station, load_station
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import (
+    MODEL_NAMES,
+    Obstacle,
+    Station,
+    load_station,
+)
 
 GRAVITY = 9.81
 HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)

@@ -13,13 +13,13 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.mounted_hand import MountedHand
-from burg_drake.station.station import Arm, Obstacle, Station, load_station
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.mounted_hand import MountedHand
+from burg_drake.station.document.station_document import Arm, Obstacle, Station, load_station
 
 BLOCK = 0.04
 """Width of a fixed block between the pads at home [m]."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.station.engine import ENGINES, Engine, engine_preset
+from burg_drake.station.document.engine import ENGINES, Engine, engine_preset
 
 
 def test_presets_go_by_their_own_names_and_get_coarser() -> None:

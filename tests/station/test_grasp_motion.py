@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import DocumentError
-from burg_drake.core.resources import resolve
-from burg_drake.station.grasp_motion import GraspMotion
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import load_station
 
 
 def test_the_usual_motion_is_that_of_the_paper() -> None:

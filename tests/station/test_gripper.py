@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.station.gripper import gripper_of
-from burg_drake.station.hand import locate_hand
+from burg_drake.formats.common.grasp_format import PANDA
+from burg_drake.station.document.gripper_document import locate_hand
+from burg_drake.station.world.gripper import gripper_of
 
 
 def test_the_panda_is_the_built_in_hand() -> None:

@@ -10,15 +10,15 @@ import pytest
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.resources import builtin_names, resolve
-from burg_drake.core.schema import Pose
-from burg_drake.station.hand import Finger, Hand, load_hand, locate_hand
-from burg_drake.station.hand_check import check_hand
-from burg_drake.station.hand_model import add_hand
-from burg_drake.station.robot import add_robot
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.station.document.gripper_document import Finger, Hand, load_hand, locate_hand
+from burg_drake.station.document.station_document import load_station
+from burg_drake.station.world.hand_check import check_hand
+from burg_drake.station.world.hand_model import add_hand
+from burg_drake.station.world.robot import add_robot
 
 STUCK = Finger(body="a", joint="j", pad="pad", closed=0.02, open=0.02)
 MOVING = replace(STUCK, open=0.03)

@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose, rot_z, swap_fingers
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.schema import Pose
-from burg_drake.grasping.clearance import HandClearance
-from burg_drake.motion.collision import ArmCollision
-from burg_drake.objects.contact import contact_geometry
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.objects.sdf import model_sdf
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.check import check_scene, overlaps
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.grasping.clearance.hand_clearance import HandClearance
+from burg_drake.motion.collision.checker import ArmCollision
+from burg_drake.objects.collision.contact import contact_geometry
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.objects.library.sdf import model_sdf
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.station.checks.scene_issues import check_scene, overlaps
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 FLOOR = 0.0065
 """Just above the floor of the household mug [m]."""

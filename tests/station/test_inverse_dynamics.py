@@ -15,13 +15,13 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
+from burg_drake.core.documents.schema import load_document
 from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.schema import load_document
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.arm_control import ACCELERATION_KP, ArmControl
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.inverse_dynamics import controller_plant
-from burg_drake.station.station import Station, StationDocument, load_station
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.control.inverse_dynamics import controller_plant
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.arm_control import ACCELERATION_KP, ArmControl
+from burg_drake.station.document.station_document import Station, StationDocument, load_station
 
 GRAVITY = 9.81
 LIMITS = np.array([87.0] * 4 + [12.0] * 3)

@@ -10,11 +10,11 @@ from pydrake.geometry import Mesh
 from pydrake.multibody.parsing import PackageMap
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.resources import resolve
-from burg_drake.objects.library import load_library
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.objects.library.document import load_library
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 STATION = """\
 version: 1

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.station import Camera, Obstacle, load_station
-from burg_drake.station.surroundings import PAPER
+from burg_drake.core.documents.schema import Pose
+from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import Camera, Obstacle, load_station
+from burg_drake.station.world.surroundings import PAPER
 from burg_drake.system_libraries import missing_render_libraries
 
 CENTRE, SIZE = np.array([0.4, 0.0, 0.05]), np.array([0.2, 0.16, 0.1])

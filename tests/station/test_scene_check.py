@@ -14,14 +14,20 @@ import pytest
 import scipy.optimize
 from scipy.spatial import ConvexHull
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, transform_points
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.scene.validate import SceneIssue
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.scene.document.validation import SceneIssue
+from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.document.station_document import (
+    Obstacle,
+    Station,
+    StationDocument,
+    Table,
+    load_station,
+)
 
 CUT = ("mug", "bowl", "banana", "scissors", "screwdriver", "airplane")
 """Objects that touch others with convex pieces, which the linear program reads from their files."""

@@ -8,12 +8,18 @@ import cv2
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import inverse, transform_points
-from burg_drake.core.resources import builtin_names
-from burg_drake.core.schema import Pose
-from burg_drake.scene.scene import Board
-from burg_drake.station.sight import board_points, crosses, frustum, in_view, seen_share
-from burg_drake.station.station import Camera, Obstacle, load_station
+from burg_drake.core.paths.resources import builtin_names
+from burg_drake.scene.document.scene import Board
+from burg_drake.station.document.board_visibility import (
+    board_points,
+    crosses,
+    frustum,
+    in_view,
+    seen_share,
+)
+from burg_drake.station.document.station_document import Camera, Obstacle, load_station
 
 SKEW = Camera(
     X_WC=Pose((0.1, -0.3, 0.6), rpy_deg=(-140.0, 10.0, 20.0)),

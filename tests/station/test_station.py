@@ -10,8 +10,8 @@ import pytest
 
 from burg_drake.core.errors import DocumentError, UnknownNameError
 from burg_drake.core.frames import inverse
-from burg_drake.core.resources import builtin_names, resolve
-from burg_drake.station.station import Camera, Station, load_station
+from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.station.document.station_document import Camera, Station, load_station
 
 A2 = np.array([[0, 0, 0], [0.594, 0, 0], [0.594, 0.42, 0], [0, 0.42, 0]])
 """Corners of the sheet in the scene frame [m]."""

@@ -10,15 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.core.schema import Pose
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.scene import Instance, Scene, SceneDocument
-from burg_drake.station.check import overlaps
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.scene_check import SceneCheck
-from burg_drake.station.station import Obstacle, Station, StationDocument, Table, load_station
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.checks.scene_issues import overlaps
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.station_document import (
+    Obstacle,
+    Station,
+    StationDocument,
+    Table,
+    load_station,
+)
 
 DOWN, UP, RIGHT, LEFT, AHEAD = (0, 0, -1), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0)
 CAN, MARBLE = 0.034, 0.015

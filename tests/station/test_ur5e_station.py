@@ -10,10 +10,10 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.resources import resolve
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.station import load_station
+from burg_drake.core.paths.resources import resolve
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.document.station_document import load_station
 
 HOME = [0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]
 

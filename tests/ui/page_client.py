@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from burg_drake.ui.door import Door
+from burg_drake.ui.server.door import Door
 
 PATIENCE = 60.0
 """For what a page has to say, on a busy machine [s]."""

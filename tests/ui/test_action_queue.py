@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.ui.action_queue import ActionQueue
+from burg_drake.ui.widgets.action_queue import ActionQueue
 
 PATIENCE = 30.0
 

@@ -14,9 +14,9 @@ import pytest
 import viser
 
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.ui import admission
-from burg_drake.ui.door import Door, serve
-from burg_drake.ui.door_trial import require_guarded
+from burg_drake.ui.server import admission
+from burg_drake.ui.server.access_test import require_guarded
+from burg_drake.ui.server.door import Door, serve
 
 HANDSHAKE = {
     "Connection": "Upgrade",

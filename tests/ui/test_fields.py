@@ -13,11 +13,11 @@ import pytest
 viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 
 from burg_drake.compose import AddObject, ComposeSession  # noqa: E402
-from burg_drake.core.resources import resolve  # noqa: E402
-from burg_drake.station.station import load_station  # noqa: E402
-from burg_drake.ui.door import serve  # noqa: E402
+from burg_drake.core.paths.resources import resolve  # noqa: E402
+from burg_drake.station.document.station_document import load_station  # noqa: E402
+from burg_drake.ui.server.door import serve  # noqa: E402
 from burg_drake.ui.setup_page import SetupPage  # noqa: E402
-from burg_drake.ui.typed_field import TypedField  # noqa: E402
+from burg_drake.ui.widgets.typed_field import TypedField  # noqa: E402
 
 PATIENCE = 60.0
 

@@ -16,10 +16,10 @@ from viser._messages import FileTransferStartUpload, Message, ShareUrlRequest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from burg_drake.ui import guarded_viser
-from burg_drake.ui.door import Door, serve
-from burg_drake.ui.incoming import BURST, LARGEST_MESSAGE, RATE
-from burg_drake.ui.uploads import ALL_UPLOADS, LARGEST_UPLOAD
+from burg_drake.ui.server import guarded_viser
+from burg_drake.ui.server.door import Door, serve
+from burg_drake.ui.server.messages import BURST, LARGEST_MESSAGE, RATE
+from burg_drake.ui.server.uploads import ALL_UPLOADS, LARGEST_UPLOAD
 from tests.ui.page_client import CAMERA, coming_in, send, unpacked
 
 TIMEOUT = 60.0

@@ -8,12 +8,11 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.trials.entries import journal_path, read_entries
 from burg_drake.experiment.trials.sheet import load_trials, save_trials
 from tests.apps.test_lab_server import free_port, kill, serve_again, start
-from tests.experiment.pages.conftest import made as made
-from tests.experiment.pages.conftest import trials as trials
+from tests.experiment.pages.conftest import made as made, trials as trials
 
 
 def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> None:

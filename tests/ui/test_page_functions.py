@@ -15,14 +15,14 @@ from PIL import Image
 from burg_drake import load_scene
 from burg_drake.compose import AddObject, ComposeSession, Move, SetBoard
 from burg_drake.core.frames import make_pose, quaternion_from_rotation, rot_z
-from burg_drake.scene.scene import Board
-from burg_drake.scene.validate import validate_scene
-from burg_drake.station.station import load_station
-from burg_drake.ui.board_view import sheet_picture
-from burg_drake.ui.door import Door, serve
-from burg_drake.ui.object_pictures import ObjectPictures
+from burg_drake.scene.document.scene import Board
+from burg_drake.scene.document.validation import validate_scene
+from burg_drake.station.document.station_document import load_station
+from burg_drake.ui.server.door import Door, serve
 from burg_drake.ui.setup_page import SetupPage
-from burg_drake.ui.status_colors import LOOKS
+from burg_drake.ui.view.board import sheet_picture
+from burg_drake.ui.view.object_pictures import ObjectPictures
+from burg_drake.ui.widgets.status_colors import LOOKS
 from tests.ui.page_client import PATIENCE, PageClient, until
 
 FILL, BOARD, DISPLAY, GRASPS = "Random configuration", "Board", "Display", "Grasps"

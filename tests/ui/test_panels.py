@@ -9,17 +9,17 @@ import cv2
 import numpy as np
 
 from burg_drake import load_station
-from burg_drake.cameras.board_picture import BoardPicture
+from burg_drake.cameras.rectification.top_view import BoardPicture
 from burg_drake.compose import AddObject, ComposeSession
 from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.scene import Board
-from burg_drake.ui.board_view import sheet_picture
-from burg_drake.ui.check_panel import findings
-from burg_drake.ui.footprint import footprint
-from burg_drake.ui.live_picture import LivePicture
-from burg_drake.ui.panel_text import all_of, notice, table
-from burg_drake.ui.scene_files import scene_names
-from burg_drake.ui.shortcuts import SHORTCUTS, overlay_text
+from burg_drake.scene.document.scene import Board
+from burg_drake.ui.panels.check import findings
+from burg_drake.ui.view.board import sheet_picture
+from burg_drake.ui.view.live_picture import LivePicture
+from burg_drake.ui.view.outlines import footprint
+from burg_drake.ui.widgets.scene_files import scene_names
+from burg_drake.ui.widgets.shortcuts import SHORTCUTS, overlay_text
+from burg_drake.ui.widgets.texts import all_of, notice, table
 
 
 def test_a_footprint_is_the_outline_with_a_rounded_margin() -> None:

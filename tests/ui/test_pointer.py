@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
-from burg_drake.ui.pointer import Eye
+from burg_drake.ui.pointing.pointer import Eye
 
 WIDTH, HEIGHT = 1200.0, 800.0
 FOV = 0.8

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.compose.moving import Move
-from burg_drake.compose.placing import AddObject
+from burg_drake.compose.commands.moving import MoveObjects
+from burg_drake.compose.commands.placing import AddObject
+from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.session import ComposeSession
-from burg_drake.compose.view import View
-from burg_drake.station.station import load_station
-from burg_drake.ui.door import Door, serve
-from burg_drake.ui.pointer import Eye
+from burg_drake.station.document.station_document import load_station
+from burg_drake.ui.pointing.pointer import Eye
+from burg_drake.ui.server.door import Door, serve
 from burg_drake.ui.setup_page import SetupPage
 from tests.ui.page_client import until
 
@@ -35,7 +35,7 @@ class Setup:
     tab: Any
 
     @property
-    def view(self) -> View:
+    def view(self) -> SessionView:
         return self.session.view
 
     def open(self) -> None:
@@ -188,7 +188,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
     setup.session.restrict_movement(False)
     X_SO = setup.view.X_SO("box")
     X_SO[2, 3] += 0.05
-    setup.session.do(Move({"box": X_SO}))
+    setup.session.do(MoveObjects({"box": X_SO}))
     setup.tab_of("Check")
     setup.tab.get_by_text("hovers").wait_for()
     setup.click("Settle in physics")

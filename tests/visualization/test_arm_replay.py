@@ -6,14 +6,14 @@ import numpy as np
 from eye import VIEWS, in_view, messages
 
 from burg_drake.core.frames import grasp_from_axes, transform_points
-from burg_drake.core.outcome import Outcome
-from burg_drake.motion.plan import plan
-from burg_drake.motion.trajectory import Plan
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import load_station
-from burg_drake.visualization.arm_replay import record_arm_trial
-from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.motion.planner import plan
+from burg_drake.motion.plans.trajectory import Plan
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import load_station
+from burg_drake.visualization.scenes.arm_replay import record_arm_trial
+from burg_drake.visualization.scenes.scene import open_meshcat
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.visualization.color_map import CONTROL_POINTS, hex_color, linear_light, map_colors
+from burg_drake.visualization.style.color_map import (
+    CONTROL_POINTS,
+    hex_color,
+    linear_light,
+    map_colors,
+)
 
 # Linear RGB to what dichromats see: Machado, Oliveira, Fernandes, "A Physiologically-based Model
 # for Simulation of Color Vision Deficiency" (2009), severity 1.0.

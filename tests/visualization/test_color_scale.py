@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.visualization.color_scale import BINS, ColorScale, scale_of
+from burg_drake.visualization.style.color_scale import BINS, ColorScale, scale_of
 
 
 def test_range_of_well_behaved_numbers_is_theirs() -> None:

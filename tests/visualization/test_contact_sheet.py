@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from burg_drake.core.schema import Pose
-from burg_drake.objects.entry import ContactGeometry, Fit, Primitive, StablePose
-from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.core.documents.schema import Pose
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.objects.library.entry import ContactGeometry, Fit, Primitive, StablePose
 from burg_drake.system_libraries import missing_render_libraries
-from burg_drake.visualization.contact_sheet import (
+from burg_drake.visualization.pictures.contact_sheet import (
     contact_name,
     grams,
     pose_note,

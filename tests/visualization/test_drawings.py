@@ -10,18 +10,24 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import Array, make_pose, rot_z
-from burg_drake.visualization.flat_view import FlatView, fit_view, path_data
-from burg_drake.visualization.grasp_strokes import grasp_corners, grasp_strokes
-from burg_drake.visualization.grasp_view import FINGER_LENGTH, STEM_LENGTH
-from burg_drake.visualization.portrait import camera_rotation
-from burg_drake.visualization.shaded_outline import DETAIL, TONES, Solid, footprint, shaded_outline
+from burg_drake.visualization.grasps.mesh import FINGER_LENGTH, STEM_LENGTH
+from burg_drake.visualization.grasps.strokes import grasp_corners, grasp_strokes
+from burg_drake.visualization.meshcat.portrait import camera_rotation
+from burg_drake.visualization.pictures.flat_view import FlatView, fit_view, path_data
+from burg_drake.visualization.pictures.shaded_drawing import (
+    DETAIL,
+    TONES,
+    SolidMesh,
+    footprint,
+    shaded_outline,
+)
 
 DOWN = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
 """A camera that looks straight down, with x to the right."""
 
 
-def solid(mesh: trimesh.Trimesh) -> Solid:
-    return Solid(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+def solid(mesh: trimesh.Trimesh) -> SolidMesh:
+    return SolidMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def polygons(d: str) -> list[Array]:
@@ -66,7 +72,7 @@ def test_the_nearer_solid_hides_the_other() -> None:
 def test_a_drawing_does_not_depend_on_where_things_are() -> None:
     shown = solid(trimesh.creation.annulus(0.02, 0.05, 0.03))
     R_WC = camera_rotation(0.5)
-    moved = Solid(shown.vertices + np.array([1.0, -2.0, 0.5]), shown.faces)
+    moved = SolidMesh(shown.vertices + np.array([1.0, -2.0, 0.5]), shown.faces)
     here = fit_view(shown.vertices, R_WC, 200.0, 200.0)
     there = fit_view(moved.vertices, R_WC, 200.0, 200.0)
     np.testing.assert_allclose(here.places(shown.vertices), there.places(moved.vertices), atol=1e-9)

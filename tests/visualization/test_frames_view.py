@@ -10,12 +10,12 @@ import pytest
 from recording import RecordingMeshcat
 
 from burg_drake.core.frames import inverse
-from burg_drake.formats.grasp_convention import grouped
+from burg_drake.formats.common.convention import grouped
+from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
-from burg_drake.formats.grasp_format import PANDA
-from burg_drake.station.gripper import gripper_of
-from burg_drake.station.hand import locate_hand
-from burg_drake.visualization.frames_view import ROOT, THEIRS, show_frames
+from burg_drake.station.document.gripper_document import locate_hand
+from burg_drake.station.world.gripper import gripper_of
+from burg_drake.visualization.gallery.grasp_frames import ROOT, THEIRS, show_frames
 from burg_drake.visualization.page import save_html
 
 

@@ -11,10 +11,10 @@ from pydrake.geometry import Meshcat
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import transform_points
-from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.visualization.gallery import show_library
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.visualization.gallery.library import show_library
 from burg_drake.visualization.page import save_html
-from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.visualization.scenes.scene import open_meshcat
 
 ROOT = "/drake/library"
 NAMES = ["mug", "can", "marble"]

@@ -5,12 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.visualization.gallery_layout import ELEVATION, Item, Layout, Row, lay_out
+from burg_drake.visualization.gallery.layout import (
+    ELEVATION,
+    GalleryLayout,
+    GalleryRow,
+    Item,
+    lay_out,
+)
 
 UNIT, LINE = 0.2, 0.03
 
 
-def some_rows(count: int, seed: int = 0) -> list[Row]:
+def some_rows(count: int, seed: int = 0) -> list[GalleryRow]:
     rng = np.random.default_rng(seed)
 
     def item() -> Item:
@@ -18,7 +24,7 @@ def some_rows(count: int, seed: int = 0) -> list[Row]:
         return Item(offset - size / 2, offset + size / 2, rng.uniform(0.0, 0.1))
 
     return [
-        Row(
+        GalleryRow(
             rng.uniform(0.1, 0.3),
             [item() for _ in range(3)],
             [item() for _ in range(rng.integers(0, 6))],
@@ -27,7 +33,7 @@ def some_rows(count: int, seed: int = 0) -> list[Row]:
     ]
 
 
-def boxes(rows: list[Row], layout: Layout) -> list[np.ndarray]:
+def boxes(rows: list[GalleryRow], layout: GalleryLayout) -> list[np.ndarray]:
     """(2, 3) bounds of all items in the world, by row."""
     return [
         np.array(

@@ -10,10 +10,10 @@ from recording import RecordingMeshcat
 
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.frames import grasp_from_axes, inverse, transform_points
-from burg_drake.core.grasps import GraspSet
-from burg_drake.objects.library import load_library
-from burg_drake.visualization.grasp_gallery import show_with_grasps
-from burg_drake.visualization.grasp_view import grasp_triangles
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.objects.library.document import load_library
+from burg_drake.visualization.gallery.with_grasps import show_with_grasps
+from burg_drake.visualization.grasps.mesh import grasp_triangles
 
 NAMES = ["mug", "bowl", "screwdriver", "marble", "can"]
 PER_OBJECT = 6

@@ -8,18 +8,18 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from burg_drake.core.colors import CATEGORIES
-from burg_drake.core.outcome import Outcome
-from burg_drake.visualization.color_map import map_colors
-from burg_drake.visualization.color_scale import BINS
-from burg_drake.visualization.grasp_groups import (
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.terminal.colors import CATEGORIES
+from burg_drake.visualization.grasps.groups import (
     GraspGroup,
     all_alike,
     by_name,
     by_number,
     by_outcome,
 )
-from burg_drake.visualization.palette import OTHERS, UNKNOWN, group_of
+from burg_drake.visualization.style.color_map import map_colors
+from burg_drake.visualization.style.color_scale import BINS
+from burg_drake.visualization.style.palette import OTHERS, UNKNOWN, group_of
 
 
 def members(groups: tuple[GraspGroup, ...]) -> list[int]:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.visualization.color_scale import BINS
-from burg_drake.visualization.grasp_legend import color_by, default_column, with_unit
-from burg_drake.visualization.legend import ColorBar, LegendEntry
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.visualization.grasps.legend import color_by, default_column, with_unit
+from burg_drake.visualization.style.color_scale import BINS
+from burg_drake.visualization.style.legend import ColorBar, LegendEntry
 
 N = 40
 

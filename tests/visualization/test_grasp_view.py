@@ -11,9 +11,9 @@ from recording import RecordingMeshcat
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, transform_points
-from burg_drake.core.outcome import Outcome
-from burg_drake.visualization.grasp_groups import all_alike, by_number, by_outcome
-from burg_drake.visualization.grasp_view import (
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.visualization.grasps.groups import all_alike, by_number, by_outcome
+from burg_drake.visualization.grasps.mesh import (
     BAR_RADIUS,
     FINGER_LENGTH,
     STEM_LENGTH,
@@ -21,7 +21,7 @@ from burg_drake.visualization.grasp_view import (
     grasp_path,
     grasp_triangles,
 )
-from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.visualization.scenes.scene import open_meshcat
 
 WIDTH = 0.05
 

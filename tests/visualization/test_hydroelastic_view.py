@@ -11,8 +11,8 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library import LibraryDocument, ObjectLibrary, load_library
-from burg_drake.visualization.hydroelastic_view import (
+from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
+from burg_drake.visualization.meshcat.hydroelastic_mesh import (
     HydroelasticMesh,
     boundary_faces,
     convex_depth,

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from burg_drake.visualization.legend import (
+from burg_drake.visualization.style.legend import (
     BAR_WIDTH,
     HISTOGRAM_HEIGHT,
     MARGIN,

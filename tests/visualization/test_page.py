@@ -10,9 +10,9 @@ import pytest
 from pydrake.geometry import Box, Rgba
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.visualization.legend import LegendEntry
 from burg_drake.visualization.page import panel, save_html
-from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.visualization.scenes.scene import open_meshcat
+from burg_drake.visualization.style.legend import LegendEntry
 
 
 class Resources(HTMLParser):

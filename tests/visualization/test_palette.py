@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.visualization.palette import GROUPS, UNJUDGED, group_of
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.visualization.style.palette import GROUPS, UNJUDGED, group_of
 
 # Linear RGB to what protanopes and deuteranopes see: Machado, Oliveira, Fernandes, "A
 # Physiologically-based Model for Simulation of Color Vision Deficiency" (2009), severity 1.0.

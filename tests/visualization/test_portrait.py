@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import rot_z
-from burg_drake.objects.library import load_library
-from burg_drake.visualization.portrait import best_yaw, camera_rotation, fit_camera, upright
+from burg_drake.objects.library.document import load_library
+from burg_drake.visualization.meshcat.portrait import best_yaw, camera_rotation, fit_camera, upright
 
 HALF = np.array([0.4, 0.3])
 

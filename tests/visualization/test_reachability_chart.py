@@ -7,16 +7,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from burg_drake.motion.reachability import ReachabilityMap
-from burg_drake.scene.scene import load_scene
-from burg_drake.visualization.color_map import CONTROL_POINTS
-from burg_drake.visualization.reachability_chart import (
+from burg_drake.motion.workspace.reachability import ReachabilityMap
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.visualization.pictures.reachability_svg import (
     TITLE,
     WIDTH,
     outlines,
     reachability_chart,
     reachability_key,
 )
+from burg_drake.visualization.style.color_map import CONTROL_POINTS
 
 
 def one_corner() -> ReachabilityMap:

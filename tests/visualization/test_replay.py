@@ -15,14 +15,20 @@ from burg_drake.core.frames import (
     rotation_from_rpy,
     transform_points,
 )
-from burg_drake.core.outcome import Outcome
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.simulation.hand_trial import HandTrial
-from burg_drake.simulation.result import Margins, TrialResult
-from burg_drake.station.engine import ENGINES
-from burg_drake.station.station import Station, load_station
-from burg_drake.visualization.replay import CLEAR_VIEW, VIEW, camera_offset, describe, record_trial
-from burg_drake.visualization.scene_view import open_meshcat
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.result import Margins, TrialResult
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.visualization.scenes.replay import (
+    CLEAR_VIEW,
+    VIEW,
+    camera_offset,
+    describe,
+    record_trial,
+)
+from burg_drake.visualization.scenes.scene import open_meshcat
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the box, from above."""

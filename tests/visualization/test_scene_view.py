@@ -10,10 +10,10 @@ from eye import VIEWS, in_view
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import transform_points
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.station.robot import Robot
-from burg_drake.station.station import Station, load_station
-from burg_drake.visualization.scene_view import (
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.station.world.robot import Robot
+from burg_drake.visualization.scenes.scene import (
     draw_board,
     open_meshcat,
     show_scene,

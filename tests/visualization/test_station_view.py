@@ -8,14 +8,14 @@ from eye import VIEWS, in_view
 from pydrake.geometry import Meshcat
 
 from burg_drake.core.frames import transform_points
-from burg_drake.motion.arm_span import ArmSpan
-from burg_drake.motion.reachability import ReachabilityMap
-from burg_drake.motion.station_check import empty_scene
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
-from burg_drake.visualization.legend import ColorBar, LegendEntry
-from burg_drake.visualization.scene_view import open_meshcat
-from burg_drake.visualization.station_view import BINS, MAP_PATH, show_station, tiles
+from burg_drake.motion.workspace.arm_span import ArmSpan
+from burg_drake.motion.workspace.reachability import ReachabilityMap
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
+from burg_drake.visualization.scenes.scene import open_meshcat
+from burg_drake.visualization.scenes.station import BINS, MAP_PATH, show_station, tiles
+from burg_drake.visualization.style.legend import ColorBar, LegendEntry
 
 
 @pytest.fixture(scope="module")

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from burg_drake.core.colors import distinct_colors
 from burg_drake.core.errors import MissingDependencyError, UnknownNameError
-from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.core.terminal.colors import distinct_colors
+from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.system_libraries import missing_render_libraries
-from burg_drake.visualization import thumbnails
-from burg_drake.visualization.thumbnails import (
+from burg_drake.visualization.pictures import thumbnails
+from burg_drake.visualization.pictures.thumbnails import (
     BACKGROUND,
     FILL,
     ObjectRenderer,
-    Picture,
+    Thumbnail,
     exploded,
     write_thumbnails,
 )
@@ -39,7 +39,7 @@ def renderer(library: ObjectLibrary) -> ObjectRenderer:
     return ObjectRenderer(library, NAMES)
 
 
-def check_framing(picture: Picture) -> None:
+def check_framing(picture: Thumbnail) -> None:
     """The object is inside margins, in the middle, and as large as it is meant to be."""
     height, width = picture.cover.shape
     rows, columns = np.nonzero(picture.cover > 0.02)
@@ -52,7 +52,7 @@ def check_framing(picture: Picture) -> None:
     assert FILL - 0.06 < fill < FILL + 0.02
 
 
-def check_ink(picture: Picture) -> None:
+def check_ink(picture: Thumbnail) -> None:
     """Where the object is, pixels are not background; in the corners they are."""
     background = 255 * np.array(BACKGROUND)
     inside = picture.pixels[picture.cover == 1.0].astype(float)

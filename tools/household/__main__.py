@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from burg_drake.objects.obj_file import face_palette
+from burg_drake.objects.library.obj_file import face_palette
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 

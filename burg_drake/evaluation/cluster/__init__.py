@@ -1,1 +1,5 @@
 """Judging on other machines: scenes and stations that travel, workers of Dask, and their driver."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

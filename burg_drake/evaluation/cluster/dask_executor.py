@@ -9,13 +9,12 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
-from burg_drake.core.errors import ClusterError, MissingDependencyError
+from burg_drake.core import ClusterError, MissingDependencyError
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
 from burg_drake.evaluation.cluster.unreached import why_unreached
-from burg_drake.evaluation.job import Job, OnFailure
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.limits import Limits
+from burg_drake.evaluation.stages import Verdict
+from burg_drake.evaluation.workers import Job, OnFailure, WorkerLimits
 
 REACH = 5.0
 """Time in which a scheduler has to be reached [s]."""
@@ -34,7 +33,7 @@ class DaskExecutor:
     def __init__(
         self,
         client: Any,
-        limits: Limits | None = None,
+        limits: WorkerLimits | None = None,
         tend: Callable[[], None] = lambda: None,
     ) -> None:
         """Uses a cluster that one is connected to.
@@ -48,20 +47,20 @@ class DaskExecutor:
         Raises:
             ClusterError: the connection is not encrypted and goes beyond this machine.
         """
-        from burg_drake.evaluation.cluster.crew import asking
+        from burg_drake.evaluation.cluster.members import asking
 
         address = client.scheduler.address if client.scheduler is not None else ""
         require_safe(address, "the scheduler at ")
         with asking(client):  # it may listen elsewhere, too, than where it was reached
             require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
-        self.limits = limits or Limits()
+        self.limits = limits or WorkerLimits()
         self._tend = tend
 
     @property
     def workers(self) -> int:
         """Number of children that judge at a time, as the cluster is now."""
-        from burg_drake.evaluation.cluster.crew import threads_by_address
+        from burg_drake.evaluation.cluster.members import threads_by_address
 
         return sum(threads_by_address(self.client).values())
 
@@ -79,7 +78,7 @@ class DaskExecutor:
 
 
 @contextlib.contextmanager
-def connect_cluster(cluster: str, limits: Limits | None = None) -> Iterator[DaskExecutor]:
+def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterator[DaskExecutor]:
     """An executor on a cluster, until the block is left.
 
     Args:

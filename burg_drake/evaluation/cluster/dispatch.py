@@ -16,18 +16,22 @@ from typing import Any
 
 from distributed import KilledWorker
 
-from burg_drake.core.errors import BurgError, ClusterError, SimulationError
-from burg_drake.core.outcome import Outcome, Stage
+from burg_drake.core import BurgError, ClusterError, SimulationError
+from burg_drake.core.grasps import Outcome, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.crew import LOST, Crew, Hand, asking, lost_scheduler
 from burg_drake.evaluation.cluster.delivery import ATTEMPTS, deliver_bundle
+from burg_drake.evaluation.cluster.members import (
+    LOST,
+    ClusterWorker,
+    ClusterWorkers,
+    asking,
+    lost_scheduler,
+)
 from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
 from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
 from burg_drake.evaluation.cluster.waiting import Waiting
-from burg_drake.evaluation.job import Job, JobFailed, OnFailure
-from burg_drake.evaluation.judge import Verdict, one_line
-from burg_drake.evaluation.limits import Limits
-from burg_drake.evaluation.pool import Answer
+from burg_drake.evaluation.stages import Verdict, one_line
+from burg_drake.evaluation.workers import Answer, Job, JobFailed, OnFailure, WorkerLimits
 
 LOOK = 1.0
 """Between two looks for new and lost workers [s]."""
@@ -45,15 +49,15 @@ class Dispatch:
         jobs: those under way.
     """
 
-    def __init__(self, client: Any, limits: Limits, tend: Callable[[], None]) -> None:
+    def __init__(self, client: Any, limits: WorkerLimits, tend: Callable[[], None]) -> None:
         self.client = client
         self.limits = limits
         self._tend = tend
-        self.crew = Crew(client)
+        self.crew = ClusterWorkers(client)
         self.jobs: list[SentJob] = []
         self._name = f"burg-drake-{uuid.uuid4().hex}"
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._sent: dict[Any, tuple[SentChunk, Hand]] = {}
+        self._sent: dict[Any, tuple[SentChunk, ClusterWorker]] = {}
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
         self._exhausted = False
@@ -118,7 +122,7 @@ class Dispatch:
                 if hand.load <= least and hand.job is not None and hand.job.left:
                     self.send(hand.job.cut(max(1, self.crew.threads)), hand)
 
-    def choose(self, hand: Hand) -> SentJob | None:
+    def choose(self, hand: ClusterWorker) -> SentJob | None:
         """What a worker is to work on: its job, or the next one, or one that others are at."""
         if hand.job is not None and hand.job.left:
             return hand.job
@@ -144,7 +148,7 @@ class Dispatch:
         self._exhausted = True
         return None
 
-    def send(self, chunk: SentChunk, hand: Hand) -> None:
+    def send(self, chunk: SentChunk, hand: ClusterWorker) -> None:
         """Sends a chunk to a worker."""
         packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
         with asking(self.client):
@@ -228,7 +232,7 @@ class Dispatch:
         open_ones = [grasp for k, grasp in enumerate(chunk.grasps) if k not in judged]
         yield from self.doubt(chunk, open_ones, "gave no answer about it")
 
-    def lose(self, hand: Hand) -> Iterator[Answer]:
+    def lose(self, hand: ClusterWorker) -> Iterator[Answer]:
         """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
         suspects = [chunk for chunk in hand.chunks if not chunk.done][: hand.threads]
         for chunk in list(hand.chunks):
@@ -261,7 +265,7 @@ class Dispatch:
                 Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True),
             )
 
-    def forget(self, chunk: SentChunk, hand: Hand) -> None:
+    def forget(self, chunk: SentChunk, hand: ClusterWorker) -> None:
         """A worker does not have a chunk any more."""
         del self._sent[chunk.future.key]
         hand.chunks.remove(chunk)
@@ -278,7 +282,7 @@ class Dispatch:
             raise failure.error
         self._on_failure(failure)
 
-    def _refetch(self, future: Any, hand: Hand) -> None:
+    def _refetch(self, future: Any, hand: ClusterWorker) -> None:
         """A result did not come: the worker is lost, which a look will tell, or is busy."""
         if self.client.status != "running":
             raise lost_scheduler(self.client)

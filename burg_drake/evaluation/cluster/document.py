@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.core.errors import ClusterError, FieldError, InvalidInputError, quoted
-from burg_drake.core.resources import resolve
-from burg_drake.core.schema import load_document
+from burg_drake.core import ClusterError, FieldError, InvalidInputError, quoted
+from burg_drake.core.documents import load_document
+from burg_drake.core.paths import resolve
 
 LOCAL = re.compile(r"local:(\d{1,4})")
 ADDRESS = re.compile(r"(tls|tcp)://(\[[^\]]+\]|[^:/\s]+):(\d{1,5})")

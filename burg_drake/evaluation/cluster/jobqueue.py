@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from typing import Any
 
-from burg_drake.core.errors import ClusterError, MissingDependencyError
+from burg_drake.core import ClusterError, MissingDependencyError
 from burg_drake.evaluation.cluster.document import Cluster, JobQueue
 from burg_drake.evaluation.cluster.node import LOOPBACK
 

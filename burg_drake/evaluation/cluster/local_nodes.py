@@ -9,8 +9,8 @@ from __future__ import annotations
 import subprocess
 from multiprocessing.connection import Connection
 
-from burg_drake.core.errors import ClusterError
-from burg_drake.core.processes import cause_of_death, start_worker
+from burg_drake.core import ClusterError
+from burg_drake.core.workers import cause_of_death, start_worker
 
 START = 60.0
 """Time in which a process has to start [s]."""

@@ -15,14 +15,11 @@ from typing import Any
 
 from distributed import WorkerPlugin, get_worker
 
-from burg_drake.core.errors import BurgError, SimulationError
+from burg_drake.core import BurgError, SimulationError
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.recipe import Recipe
-from burg_drake.evaluation.cluster.unpacked import unpack
-from burg_drake.evaluation.job import Job, JobFailed
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.limits import Limits
-from burg_drake.evaluation.pool import Pool
+from burg_drake.evaluation.cluster.bundles import JudgeRecipe, unpack
+from burg_drake.evaluation.stages import Verdict
+from burg_drake.evaluation.workers import Job, JobFailed, Pool, WorkerLimits
 
 IDLE = 60.0
 """A child without work ends after that time, as its driver may be gone [s]."""
@@ -40,9 +37,9 @@ class Chunk:
     """
 
     run: str
-    recipe: Recipe
+    recipe: JudgeRecipe
     grasps: tuple[Candidate, ...]
-    limits: Limits
+    limits: WorkerLimits
 
 
 @dataclass(frozen=True)
@@ -99,7 +96,7 @@ class Supervisor(WorkerPlugin):
         for pool in idle:
             pool.kill()
 
-    def judge(self, job: Job, limits: Limits) -> Answers:
+    def judge(self, job: Job, limits: WorkerLimits) -> Answers:
         """Has a child judge the grasps of a job."""
         pool = self._take(limits)
         if pool is None:
@@ -125,7 +122,7 @@ class Supervisor(WorkerPlugin):
             error=failed[0].error if failed else None,
         )
 
-    def _take(self, limits: Limits) -> Pool | None:
+    def _take(self, limits: WorkerLimits) -> Pool | None:
         with self._lock:
             if self._stopped:
                 return None

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.bundle import Bundle
-from burg_drake.evaluation.cluster.bundled_judge import recipe_of
-from burg_drake.evaluation.job import Job
+from burg_drake.evaluation.cluster.bundles import Bundle, recipe_of
+from burg_drake.evaluation.workers import Job
 
 MOST = 32
 """Grasps of a chunk. Dask takes some milliseconds for each chunk, and what a lost worker had not

@@ -9,8 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 import burg_drake
-from burg_drake.core.content import content_hash
-from burg_drake.core.errors import ClusterError
+from burg_drake.core import ClusterError, content_hash
 
 PACKAGES = ("drake", "numpy", "scipy", "trimesh")
 """Packages that decide about verdicts."""

@@ -6,8 +6,8 @@ import time
 import uuid
 from typing import Any
 
-from burg_drake.core.errors import ClusterError
-from burg_drake.evaluation.cluster.crew import asking
+from burg_drake.core import ClusterError
+from burg_drake.evaluation.cluster.members import asking
 
 PATIENCE = 600.0
 """So long the run waits without any worker [s]."""

@@ -1,13 +1,5 @@
 """The report of a run as one self-contained HTML page."""
 
-from __future__ import annotations
+import lazy_loader
 
-from burg_drake.core.lazy import attach
-
-__all__, __getattr__, __dir__ = attach(
-    __name__,
-    {
-        "burg_drake.evaluation.report.campaign": ["campaign_page", "write_campaign_report"],
-        "burg_drake.evaluation.report.page": ["report_page", "write_report"],
-    },
-)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

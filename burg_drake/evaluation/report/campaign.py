@@ -11,28 +11,39 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.figures import count
+from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
-from burg_drake.core.frames import Array
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.evaluation.campaign import SCENES_FOLDER, Campaign
-from burg_drake.evaluation.codes import Texts
-from burg_drake.evaluation.ledger import LEDGER_FILE
-from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.part_store import Rows as StoredRows
-from burg_drake.evaluation.report.campaign_pictures import object_pictures
-from burg_drake.evaluation.report.cascade import cascade_section
-from burg_drake.evaluation.report.causes import MARGINS_ASKED, Rows, causes_section
-from burg_drake.evaluation.report.headline import headline
-from burg_drake.evaluation.report.html_page import closer, header, html_page
-from burg_drake.evaluation.report.margins import CHOSEN, FURTHER, further_margins, margin_section
-from burg_drake.evaluation.report.markup import Html, element
-from burg_drake.evaluation.report.outcome_groups import groups_of_codes
-from burg_drake.evaluation.report.outcomes import cost_section, count_section, objects_section
-from burg_drake.evaluation.report.provenance import campaign_facts, repeat_campaign
-from burg_drake.evaluation.report.scenes import scenes_section
-from burg_drake.evaluation.run_store import REPORT_FILE
-from burg_drake.evaluation.summary import Summary, summarize
+from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.terminal import count
+from burg_drake.evaluation.records import LEDGER_FILE, engine_label
+from burg_drake.evaluation.report.elements import (
+    Html,
+    closing_section,
+    element,
+    groups_of_codes,
+    header,
+    html_page,
+)
+from burg_drake.evaluation.report.sections import (
+    CHOSEN,
+    FURTHER,
+    MARGINS_ASKED,
+    CauseRows,
+    campaign_facts,
+    cascade_section,
+    causes_section,
+    cost_section,
+    count_section,
+    further_margins,
+    margin_section,
+    object_pictures,
+    objects_section,
+    opening_section,
+    repeat_campaign,
+    scenes_section,
+)
+from burg_drake.evaluation.results import Summary, summarize
+from burg_drake.evaluation.store import REPORT_FILE, SCENES_FOLDER, Campaign, StoredRows, Texts
 
 TEXTS = ("object", "blocker", "outcome", "stage")
 POSES = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
@@ -74,7 +85,7 @@ def campaign_page(campaign: Campaign) -> str:
         f"Grasp evaluation: {title}",
         header("Grasp evaluation of many scenes", title, _about(campaign)),
         _notice(campaign, summary),
-        headline(summary),
+        opening_section(summary),
         scenes_section(summary.scenes, partial(_link, campaign), partial(_drill_down, campaign)),
         cascade_section(summary),
         objects_section(summary),
@@ -82,7 +93,7 @@ def campaign_page(campaign: Campaign) -> str:
         causes_section(_rows(campaign, stored, outcomes)),
         margin_section(tried, own, document.trial.get("disturbance", math.inf)),
         repeat_campaign(campaign),
-        closer(
+        closing_section(
             count_section(summary),
             further_margins(tried, own),
             cost_section(summary),
@@ -140,7 +151,7 @@ def _tried(
     return {name: stored.column(name)[tried] for name in names}, groups[tried]
 
 
-def _rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) -> Rows:
+def _rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) -> CauseRows:
     ends = np.cumsum(stored.counts)
 
     def replay(row: int) -> str:
@@ -148,7 +159,7 @@ def _rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) ->
         id = stored.table.column("id")[row].as_py()
         return shlex.join(["burg-drake", "replay", str(campaign.folder(name)), "--grasp", id])
 
-    return Rows(
+    return CauseRows(
         outcomes=outcomes,
         objects=Texts(*stored.codes("object")),
         blockers=Texts(*stored.codes("blocker")),

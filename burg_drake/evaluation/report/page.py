@@ -9,25 +9,43 @@ from __future__ import annotations
 
 import math
 
-from burg_drake.core.figures import count
 from burg_drake.core.files import atomic_write
-from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.report.arm import arm_section, execution_section
-from burg_drake.evaluation.report.bodies import collision_section, disturbed_section
-from burg_drake.evaluation.report.cascade import cascade_section
-from burg_drake.evaluation.report.causes import causes_section, rows_of_run
-from burg_drake.evaluation.report.grasps import best_section, failure_section
-from burg_drake.evaluation.report.headline import headline
-from burg_drake.evaluation.report.html_page import closer, header, html_page
-from burg_drake.evaluation.report.margins import further_margins, margin_section, tried_margins
-from burg_drake.evaluation.report.markup import Html, element
-from burg_drake.evaluation.report.outcome_groups import group_indices
-from burg_drake.evaluation.report.outcomes import cost_section, count_section, objects_section
-from burg_drake.evaluation.report.picture import grasp_section, pictures_of, scene_picture
-from burg_drake.evaluation.report.provenance import provenance, repeat_section
-from burg_drake.evaluation.report.reachability import reachability_section
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.summary import summarize
+from burg_drake.core.terminal import count
+from burg_drake.evaluation.records import engine_label
+from burg_drake.evaluation.report.elements import (
+    Html,
+    closing_section,
+    element,
+    group_indices,
+    header,
+    html_page,
+)
+from burg_drake.evaluation.report.sections import (
+    arm_section,
+    best_section,
+    cascade_section,
+    causes_section,
+    collision_section,
+    cost_section,
+    count_section,
+    disturbed_section,
+    execution_section,
+    failure_section,
+    further_margins,
+    grasp_section,
+    margin_section,
+    objects_section,
+    opening_section,
+    pictures_of,
+    provenance,
+    reachability_section,
+    repeat_section,
+    rows_of_run,
+    scene_picture,
+    tried_margins,
+)
+from burg_drake.evaluation.results import summarize
+from burg_drake.evaluation.store import Run
 
 
 def write_report(run: Run) -> None:
@@ -50,7 +68,7 @@ def report_page(run: Run) -> str:
         f"Grasp evaluation: {title}",
         header("Grasp evaluation", title, _about(run)),
         _notice(run),
-        headline(summary),
+        opening_section(summary),
         scene_picture(pictures),
         cascade_section(summary),
         objects_section(summary),
@@ -60,7 +78,7 @@ def report_page(run: Run) -> str:
         reachability_section(run),
         execution_section(summary, columns),
         repeat_section(run),
-        closer(
+        closing_section(
             best_section(run),
             count_section(summary),
             arm_section(summary, columns),

@@ -9,14 +9,13 @@ from typing import Literal
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError, nearest, quoted
-from burg_drake.evaluation.campaign import Campaign
-from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.paired import Paired
-from burg_drake.experiment.comparison.placement import LIMIT_MM
-from burg_drake.experiment.comparison.side import Side
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.core import InvalidInputError, nearest, quoted
+from burg_drake.evaluation.store import Campaign, Run
+from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.comparison.placement_error import LIMIT_MM
+from burg_drake.experiment.pairing import Side
+from burg_drake.experiment.statistics import Paired
+from burg_drake.experiment.trials import Success
 
 SUCCESSES: tuple[Success, ...] = ("lifted", "held")
 

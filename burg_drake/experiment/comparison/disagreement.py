@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from burg_drake.core.frames import Array
-from burg_drake.experiment.comparison.pairs import Pairs
-from burg_drake.experiment.trials.sheet import RealTrial
+from burg_drake.core import Array
+from burg_drake.experiment.pairing import VerdictPairs
+from burg_drake.experiment.trials import RealTrial
 
 MOST_LISTED = 200
 """Of each kind; the matrix counts all."""
@@ -48,7 +48,7 @@ class Disagreement:
 
 
 def disagreements(
-    pairs: Pairs,
+    pairs: VerdictPairs,
     scenes: Mapping[str, str],
     folders: Sequence[Mapping[str, str]],
     trials: Sequence[RealTrial] = (),

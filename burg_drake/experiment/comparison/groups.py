@@ -7,16 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.outcome import Stage
-from burg_drake.experiment.comparison.agreement import Agreement, agreements, grouped
-from burg_drake.experiment.comparison.arrays import Values
-from burg_drake.experiment.comparison.measures import Figure, share
-from burg_drake.experiment.comparison.pairs import Pairs
-from burg_drake.experiment.comparison.texts import Factor
+from burg_drake.core.grasps import Stage
+from burg_drake.experiment.pairing import Factor, VerdictPairs
+from burg_drake.experiment.statistics import Agreement, Estimate, Values, agreements, grouped, share
 
 
 @dataclass(frozen=True, kw_only=True)
-class Group:
+class FactorGroup:
     """Trials that have something in common, such as their object.
 
     Attributes:
@@ -42,12 +39,12 @@ class Stopped:
     outcome: str
     blocker: str
     trials: int
-    successes: Figure
+    successes: Estimate
 
 
 def by_factor(
-    pairs: Pairs, factor: Factor, names: Mapping[str, str] | None = None, *, seed: int = 0
-) -> tuple[Group, ...]:
+    pairs: VerdictPairs, factor: Factor, names: Mapping[str, str] | None = None, *, seed: int = 0
+) -> tuple[FactorGroup, ...]:
     """Agreement for each text of a column that occurs.
 
     Args:
@@ -64,12 +61,12 @@ def by_factor(
     found = agreements(counts[seen], seed=seed)
     labels = [factor.names[k] for k in seen]
     return tuple(
-        Group(name=(names or {}).get(label, label), agreement=a)
+        FactorGroup(name=(names or {}).get(label, label), agreement=a)
         for label, a in zip(labels, found, strict=True)
     )
 
 
-def stopped(pairs: Pairs) -> tuple[Stopped, ...]:
+def stopped(pairs: VerdictPairs) -> tuple[Stopped, ...]:
     """What became of the grasps by verdict, the most frequent ones of a stage first; success is
     among the verdicts."""
     stages, outcomes, blockers = pairs.stage, pairs.simulated, pairs.blocker
@@ -91,7 +88,7 @@ def stopped(pairs: Pairs) -> tuple[Stopped, ...]:
     return tuple(sorted(rows, key=lambda row: (_STAGES.index(row.stage), -row.trials)))
 
 
-def outcome_table(pairs: Pairs) -> dict[str, dict[str, int]]:
+def outcome_table(pairs: VerdictPairs) -> dict[str, dict[str, int]]:
     """How many trials ended how, by verdict; only what occurs."""
     rows, columns = pairs.simulated, pairs.ended
     counts = _crossed(rows, columns)

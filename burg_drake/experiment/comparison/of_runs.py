@@ -7,26 +7,28 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.campaign import Campaign
-from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.comparison.calibration import MARGINS, PROBABILITY
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
-from burg_drake.experiment.comparison.judgement import judgement
-from burg_drake.experiment.comparison.matching import Match, match_rows
-from burg_drake.experiment.comparison.pairs import (
+from burg_drake.experiment.comparison.judge_assessment import judgement
+from burg_drake.experiment.pairing import (
     NAMES,
     REFERENCE_NAMES,
-    Pairs,
+    JudgedRuns,
+    Match,
+    ResultTable,
+    VerdictPairs,
     make_pairs,
+    match_rows,
+    predicted_probability,
+    require_common_scene,
+    settings_apart,
     successes,
     undecided,
 )
-from burg_drake.experiment.comparison.probability import predicted_probability
-from burg_drake.experiment.comparison.side import Judged, require_common_scene, settings_apart
-from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.experiment.statistics import MARGINS, PROBABILITY
+from burg_drake.experiment.trials import Success
 
 
 def compare_runs(
@@ -38,10 +40,10 @@ def compare_runs(
     seed: int = 0,
 ) -> Comparison:
     """Compares the verdicts of two runs; see `comparison.compare`."""
-    sides = Judged.load(first), Judged.load(second)
+    sides = JudgedRuns.load(first), JudgedRuns.load(second)
     require_common_scene(*sides)
     with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
-        one, other = pool.map(Judged.table, sides, (NAMES, REFERENCE_NAMES))
+        one, other = pool.map(JudgedRuns.table, sides, (NAMES, REFERENCE_NAMES))
     tables = one, other
     found = match_rows(*tables)
     if not len(found.first):
@@ -73,8 +75,8 @@ def compare_runs(
 
 
 def pairs_of_runs(
-    tables: tuple[Table, Table], found: Match, success: Success
-) -> tuple[Pairs, dict[str, int]]:
+    tables: tuple[ResultTable, ResultTable], found: Match, success: Success
+) -> tuple[VerdictPairs, dict[str, int]]:
     """Pairs of verdicts of the grasps in common, and what is left out by reason."""
     ended = tables[1].texts["outcome"].take(found.second)
     pairs = make_pairs(
@@ -90,7 +92,7 @@ def pairs_of_runs(
     return pairs if keep.all() else pairs.take(keep), left_out
 
 
-def _nothing_in_common(sides: tuple[Judged, Judged], found: Match) -> str:
+def _nothing_in_common(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:
     paths = f"{sides[0].path} and {sides[1].path}"
     if found.other_content:
         return (

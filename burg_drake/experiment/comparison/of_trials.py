@@ -8,24 +8,28 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
-from burg_drake.evaluation.campaign import Campaign
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table import Columns
-from burg_drake.experiment.comparison.calibration import MARGINS, PROBABILITY
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.evaluation.records import Columns
+from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
-from burg_drake.experiment.comparison.judgement import Judgement, Strata, judgement
-from burg_drake.experiment.comparison.paired import paired
-from burg_drake.experiment.comparison.pairs import NAMES, Pairs, make_pairs, undecided
-from burg_drake.experiment.comparison.placement import offsets, placement_agreement
-from burg_drake.experiment.comparison.probability import predicted_probability
-from burg_drake.experiment.comparison.side import Judged, settings_apart, side_of_trials
-from burg_drake.experiment.comparison.table import Table
-from burg_drake.experiment.comparison.texts import Factor
-from burg_drake.experiment.comparison.tried import find_tried
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.experiment.comparison.judge_assessment import Judgement, Strata, judgement
+from burg_drake.experiment.comparison.placement_error import offsets, placement_agreement
+from burg_drake.experiment.pairing import (
+    NAMES,
+    Factor,
+    JudgedRuns,
+    ResultTable,
+    VerdictPairs,
+    find_tried,
+    make_pairs,
+    predicted_probability,
+    settings_apart,
+    side_of_trials,
+    undecided,
+)
+from burg_drake.experiment.statistics import MARGINS, PROBABILITY, paired
+from burg_drake.experiment.trials import (
     RealTrial,
     Success,
     TrialSheet,
@@ -46,7 +50,7 @@ def compare_trials(
     """Compares one or two runs with the trials of a sheet; see `comparison.compare`."""
     sheet = load_trials(path)
     success = success or sheet.selection.success
-    sides = [Judged.load(run) for run in runs]
+    sides = [JudgedRuns.load(run) for run in runs]
     found_rows = [find_tried(sheet, path, side) for side in sides]
     tables = [columns for columns, _ in found_rows]
     left_out = _missing([missing for _, missing in found_rows])
@@ -127,20 +131,20 @@ def _telling(
 
 def _pairs(
     trials: Sequence[RealTrial], columns: Columns, chosen: Sequence[int], success: Success
-) -> Pairs:
+) -> VerdictPairs:
     """Verdicts and outcomes of the chosen trials."""
     row = {k: r for r, k in enumerate(columns["trial"].tolist())}
     rows = np.array([row[k] for k in chosen], dtype=np.intp)
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    table = Table.of_columns(columns, NAMES).take(rows, MARGINS)
+    table = ResultTable.of_columns(columns, NAMES).take(rows, MARGINS)
     return make_pairs(table, ended, actual, success)
 
 
 def _judgement(
-    pairs: Pairs,
-    side: Judged,
+    pairs: VerdictPairs,
+    side: JudgedRuns,
     sheet: TrialSheet,
     trials: Sequence[RealTrial],
     offsets_mm: tuple[Array, Array],
@@ -170,7 +174,7 @@ def _strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
 def _notes(
     sheet: TrialSheet,
     trials: Sequence[RealTrial],
-    sides: Sequence[Judged],
+    sides: Sequence[JudgedRuns],
     tables: Sequence[Columns],
     judged: Judgement,
 ) -> tuple[str, ...]:

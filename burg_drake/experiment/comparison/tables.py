@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from burg_drake.core.figures import count, figure
-from burg_drake.core.text_table import TextTable
-from burg_drake.experiment.comparison.agreement import Agreement
-from burg_drake.experiment.comparison.calibration import Calibration
+from burg_drake.core.terminal import TextTable, count, figure
 from burg_drake.experiment.comparison.comparison import Comparison
-from burg_drake.experiment.comparison.groups import Group
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import MEASURES
+from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.wording import (
     SHARES,
     bias_words,
@@ -21,6 +17,7 @@ from burg_drake.experiment.comparison.wording import (
     number,
     of_selected,
 )
+from burg_drake.experiment.statistics import MEASURES, Agreement, MarginCalibration
 
 MOST_ROWS = 20
 
@@ -93,7 +90,7 @@ def figure_table(judged: Judgement, name: str = "") -> TextTable:
     return table
 
 
-def group_table(title: str, head: str, groups: Sequence[Group]) -> TextTable:
+def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTable:
     """Counts and shares by object or scene."""
     table = TextTable(title).names(head).numbers("trials", "TP", "FP", "FN", "TN")
     table.numbers("right", "95 % CI", "precision", "recall")
@@ -129,7 +126,7 @@ def stopped_table(judged: Judgement, name: str = "") -> TextTable:
     return table
 
 
-def calibration_table(found: Sequence[Calibration], name: str = "") -> TextTable:
+def calibration_table(found: Sequence[MarginCalibration], name: str = "") -> TextTable:
     """How well each margin ranks success above failure."""
     weighted = any(c.auroc_weighted is not None for c in found)
     table = TextTable(f"What margins tell about success{name}").texts("margin", "better")
@@ -156,9 +153,9 @@ def placement_table(judged: Judgement, name: str = "") -> TextTable:
     assert p is not None
     limit = f"{p.limit_mm:g} mm"
     groups = [
-        Group(name=f"every object within {limit}", agreement=p.within),
-        Group(name="one farther off", agreement=p.beyond),
-        Group(name="not all measured", agreement=p.unmeasured),
+        FactorGroup(name=f"every object within {limit}", agreement=p.within),
+        FactorGroup(name="one farther off", agreement=p.beyond),
+        FactorGroup(name="not all measured", agreement=p.unmeasured),
     ]
     table = group_table(f"By placement of the objects{name}", "placement", groups)
     if p.largest.auroc.value is not None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from burg_drake.core.figures import MISSING, figure
-from burg_drake.experiment.comparison.calibration import PROBABILITY
+from burg_drake.core.terminal import MISSING, figure
 from burg_drake.experiment.comparison.comparison import Comparison
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import MEASURES, Figure
+from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Estimate
 
 SHARES = frozenset(name for name, measure in MEASURES.items() if measure.is_share)
 CELL_NAMES = {
@@ -29,14 +28,14 @@ def of_selected(comparison: Comparison) -> str:
     return "" if comparison.kind == "runs" else ", selected trials"
 
 
-def number(found: Figure, *, percent: bool) -> str:
+def number(found: Estimate, *, percent: bool) -> str:
     """The value of a figure."""
     if found.value is None:
         return MISSING
     return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
 
 
-def interval(found: Figure, *, percent: bool) -> str:
+def interval(found: Estimate, *, percent: bool) -> str:
     """The interval of a figure in brackets; empty if there is none."""
     if found.low is None or found.high is None:
         return ""
@@ -48,7 +47,7 @@ def interval(found: Figure, *, percent: bool) -> str:
     return f"[{low}, {high}]"
 
 
-def brief(found: Figure) -> str:
+def brief(found: Estimate) -> str:
     """A share in whole per cents with its interval."""
     if found.value is None:
         return f"undefined ({found.reason})"
@@ -115,7 +114,7 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
 
 def margin_title(name: str) -> tuple[str, str, float]:
     """What a margin is called, its unit for people, and how many of them its column's unit is."""
-    from burg_drake.core.columns import describe
+    from burg_drake.core.grasps import describe
 
     if name == PROBABILITY:
         return "predicted probability", "", 1.0

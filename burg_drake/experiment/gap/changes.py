@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.gap.steps import Ladder, Step, StepName
-from burg_drake.experiment.trials.sheet import Success, succeeded
+from burg_drake.core import wilson_interval
+from burg_drake.core.grasps import Outcome
+from burg_drake.evaluation.store import Run
+from burg_drake.experiment.gap.steps import GapStep, GapSteps, StepName
+from burg_drake.experiment.trials import Success, succeeded
 
 
 @dataclass(frozen=True)
-class Move:
+class OutcomeChange:
     """A grasp before and after a step.
 
     Attributes:
@@ -51,7 +51,7 @@ class Change:
     """
 
     step: StepName
-    moves: tuple[Move, ...]
+    moves: tuple[OutcomeChange, ...]
     success: Success
     failed: int = 0
 
@@ -61,12 +61,12 @@ class Change:
         return Counter((move.before, move.after) for move in self.moves)
 
     @cached_property
-    def lost(self) -> tuple[Move, ...]:
+    def lost(self) -> tuple[OutcomeChange, ...]:
         """Successes that are none any more."""
         return tuple(move for move in self.moves if move.lost)
 
     @cached_property
-    def won(self) -> tuple[Move, ...]:
+    def won(self) -> tuple[OutcomeChange, ...]:
         """Failures that succeed now."""
         return tuple(move for move in self.moves if move.won)
 
@@ -86,7 +86,7 @@ class Change:
         return Counter(move.blocker for move in self.lost if move.blocker)
 
 
-def gap_changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
+def gap_changes(ladder: GapSteps, success: Success) -> tuple[Change, ...]:
     """What each step but the first changes.
 
     Args:
@@ -96,19 +96,19 @@ def gap_changes(ladder: Ladder, success: Success) -> tuple[Change, ...]:
     return tuple(_change(before.runs[0], step, success) for before, step in pairwise(ladder.steps))
 
 
-def _change(before: Run, step: Step, success: Success) -> Change:
+def _change(before: Run, step: GapStep, success: Success) -> Change:
     moves = list(_moves(before, step.runs, success))
     told = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
     return Change(step.name, told, success, len(moves) - len(told))
 
 
-def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[Move]:
+def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[OutcomeChange]:
     verdicts, scene = before.verdicts, before.scene()
     for run in after:
         for candidate in run.candidates:
             was, now = verdicts[candidate.id].outcome, run.verdicts[candidate.id]
             there, here = succeeded(was, success), succeeded(now.outcome, success)
-            yield Move(
+            yield OutcomeChange(
                 candidate.id,
                 candidate.instance,
                 scene.instance(candidate.instance).object,
@@ -121,7 +121,7 @@ def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[Move
             )
 
 
-def successes_by_object(step: Step, success: Success) -> dict[str, tuple[int, int]]:
+def successes_by_object(step: GapStep, success: Success) -> dict[str, tuple[int, int]]:
     """Successes and grasps of each object, without those whose simulation failed; in displaced
     scenes counted once a scene."""
     found: dict[str, tuple[int, int]] = {}

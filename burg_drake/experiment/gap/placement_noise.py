@@ -12,12 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core.content import rng_from
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, rot_z
-from burg_drake.experiment.gap.displaced import displaced_scene
-from burg_drake.scene.scene import Scene
-from burg_drake.scene.validate import SceneIssue
+from burg_drake.core import Array, InvalidInputError, rng_from, rot_z
+from burg_drake.experiment.gap.displacement import displaced_scene
+from burg_drake.scene.document import Scene, SceneIssue
 
 MOST_DRAWS = 200
 """Draws of one object; then it stays where it was planned."""

@@ -12,14 +12,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 
-from burg_drake.core.outcome import Outcome, Stage
-from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
-from burg_drake.evaluation.judge import LIFT_HEIGHT, Decision, Judge, Verdict
-from burg_drake.evaluation.run_document import origin_of
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.station_judge import StationJudge
+from burg_drake.evaluation.records import origin_of
+from burg_drake.evaluation.stages import LIFT_HEIGHT, Decision, Judge, StationJudge, Verdict
+from burg_drake.evaluation.store import Run
+from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
 
 

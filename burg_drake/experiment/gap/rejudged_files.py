@@ -15,13 +15,16 @@ from typing import Any
 import numpy as np
 
 from burg_drake.core.files import atomic_write
-from burg_drake.core.references import portable_reference
-from burg_drake.evaluation.run_document import HASH_DIGITS
-from burg_drake.evaluation.table import Columns, trial_columns
-from burg_drake.evaluation.table_file import write_table
-from burg_drake.evaluation.trial import Trial
-from burg_drake.experiment.gap.rejudged import CAUSES, Rejudged, Rejudging
-from burg_drake.scene.scene import save_scene
+from burg_drake.core.paths import portable_reference
+from burg_drake.evaluation.records import (
+    HASH_DIGITS,
+    Columns,
+    RecordedTrial,
+    trial_columns,
+    write_table,
+)
+from burg_drake.experiment.gap.rejudged_trials import CAUSES, Rejudged, Rejudging
+from burg_drake.scene.document import save_scene
 
 TABLE_FILE = "rejudged.csv"
 JSON_FILE = "rejudged.json"
@@ -61,7 +64,7 @@ def _row(trial: Rejudged, found: Rejudging) -> Columns | None:
         scene_content=trial.scene.content[:HASH_DIGITS],
         run="",
     )
-    one = Trial(
+    one = RecordedTrial(
         id=trial.grasp,
         instance=trial.instance,
         object=trial.object,

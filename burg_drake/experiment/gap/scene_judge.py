@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.core.content import content_hash
-from burg_drake.evaluation.mode import Mode
-from burg_drake.evaluation.station_judge import StationJudge, StationJudgeFactory
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import Engine
-from burg_drake.station.station import Station
+from burg_drake.core import content_hash
+from burg_drake.evaluation.stages import Mode, StationJudge, StationJudgeFactory
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Engine, Station
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.trial_settings import TrialSettings
+    from burg_drake.simulation.trials import TrialSettings
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class SceneJudgeFactory:
     @property
     def plain(self) -> Callable[[], StationJudge]:
         """The usual factory where it does the same: clusters know how to send that one."""
-        from burg_drake.simulation.trial_settings import TrialSettings
+        from burg_drake.simulation.trials import TrialSettings
 
         if self.settings != TrialSettings(motion=self.settings.motion):
             return self

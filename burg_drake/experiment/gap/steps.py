@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.evaluation.mode import Mode
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.stages import Mode
+from burg_drake.evaluation.store import Run
 
 StepName = Literal["hand", "reach", "arm", "placed"]
 
@@ -43,7 +43,7 @@ class GapDocument:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class GapStep:
     """One step.
 
     Attributes:
@@ -56,7 +56,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Ladder:
+class GapSteps:
     """All steps.
 
     Attributes:
@@ -69,7 +69,7 @@ class Ladder:
 
     path: Path
     document: GapDocument
-    steps: tuple[Step, ...]
+    steps: tuple[GapStep, ...]
     tried: tuple[Run, ...] = ()
 
     @property

@@ -8,12 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.tag_layout import lay_out
-from burg_drake.cameras.text_tags import paste, tag
-from burg_drake.core.frames import Array, inverse
-from burg_drake.experiment.pages.bodies import GROUND, HAND, PlacedBody
+from burg_drake.cameras.overlay import lay_out, paste, tag
+from burg_drake.core import Array, inverse
 from burg_drake.experiment.pages.painting import Painting, Viewpoint
-from burg_drake.visualization.shadow import painted_shadow
+from burg_drake.experiment.pages.scene_bodies import GROUND, HAND, PlacedBody
+from burg_drake.visualization.pictures import painted_shadow
 
 RIM = (230, 60, 0)
 """Of the target: an orange that stays dark in print without colour."""

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core.content import content_hash
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.core import BurgError, InvalidInputError, content_hash
+from burg_drake.core.grasps import RealOutcome
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.pages.words import (
     SHORT_LIST,
@@ -24,9 +23,15 @@ from burg_drake.experiment.pages.words import (
     outcome_label,
     point_text,
 )
-from burg_drake.experiment.trials.book import TrialBook, TrialChanged
-from burg_drake.experiment.trials.entries import entered
-from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
+from burg_drake.experiment.trials import (
+    ObjectPlace,
+    RealTrial,
+    RobotReport,
+    TrialBook,
+    TrialChanged,
+    TrialSheet,
+    entered,
+)
 
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""

@@ -14,20 +14,23 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from burg_drake.cameras.event_log import EventLog
-from burg_drake.cameras.frame_source import FrameSource
-from burg_drake.cameras.image_file import write_image
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.live_session import LiveSession
-from burg_drake.cameras.overlay_style import OverlayStyle
-from burg_drake.cameras.picture import Picture
-from burg_drake.cameras.placement_document import Placement, PlacementCheck
-from burg_drake.cameras.session import Session, Sight, pose_line
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.evaluation.judge import one_line
+from burg_drake.cameras.live import (
+    EventLog,
+    FrameProcessor,
+    LiveSession,
+    LocatedFrame,
+    Picture,
+    pose_line,
+)
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.overlay import OverlayStyle
+from burg_drake.cameras.placement import Placement, PlacementCheck
+from burg_drake.cameras.sources import FrameSource, write_image
+from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.evaluation.stages import one_line
 from burg_drake.experiment.pages.lab_book import LabBook
-from burg_drake.experiment.trials.evidence import keep_evidence, object_places
-from burg_drake.scene.scene import Scene
+from burg_drake.experiment.trials import keep_evidence, object_places
+from burg_drake.scene.document import Scene
 
 IDLE_AFTER = 5.0
 """The camera is not looked at when no browser has asked for a picture for so long [s]."""
@@ -91,7 +94,7 @@ class LabCamera:
             self.close()
             source = self._open(scene)
             try:
-                session = Session(scene, self._intrinsics, print_scale=self._print_scale)
+                session = FrameProcessor(scene, self._intrinsics, print_scale=self._print_scale)
                 events = EventLog(lambda event: None)
                 live = LiveSession(session, source, events=events, idle_after=IDLE_AFTER)
             except BaseException:
@@ -203,7 +206,9 @@ class LabCamera:
             if self._shown == number:
                 view.live.placement, self._drawn = check, number
 
-    def _measure(self, view: _View, number: int, sight: Sight, keep: bool, refusal: str) -> None:
+    def _measure(
+        self, view: _View, number: int, sight: LocatedFrame, keep: bool, refusal: str
+    ) -> None:
         begun = time.monotonic()
         told: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
         try:
@@ -223,7 +228,7 @@ class LabCamera:
         told["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
         self._checked = told
 
-    def _keep(self, number: int, sight: Sight, check: PlacementCheck) -> None:
+    def _keep(self, number: int, sight: LocatedFrame, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
         path = self._lab.runs.path
         with tempfile.TemporaryDirectory() as folder:

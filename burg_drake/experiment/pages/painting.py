@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core.frames import Array, inverse, transform_points
-from burg_drake.experiment.pages.bodies import PlacedBody
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.core import Array, inverse, transform_points
+from burg_drake.experiment.pages.scene_bodies import PlacedBody
 
 NOTHING = -1
 BACKGROUND = (0.953, 0.961, 0.969)

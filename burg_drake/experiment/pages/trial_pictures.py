@@ -10,11 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from burg_drake.core.frames import Array, inverse, transform_points
-from burg_drake.experiment.pages.bodies import GROUND, PlacedBody, SceneBodies, stock
+from burg_drake.core import Array, inverse, transform_points
 from burg_drake.experiment.pages.highlight import jpeg, shaded, with_names, with_target
 from burg_drake.experiment.pages.painting import Painter, Painting, Viewpoint
 from burg_drake.experiment.pages.ray_painter import RayPainter
+from burg_drake.experiment.pages.scene_bodies import GROUND, PlacedBody, SceneBodies, stock
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.pages.viewpoints import (
     Subject,
@@ -23,8 +23,8 @@ from burg_drake.experiment.pages.viewpoints import (
     fitted,
     grasp_viewpoint,
 )
-from burg_drake.experiment.trials.sheet import RealTrial
-from burg_drake.objects.rays import RayCaster
+from burg_drake.experiment.trials import RealTrial
+from burg_drake.geometry import RayCaster
 from burg_drake.system_libraries import missing_render_libraries
 
 SIZE = (520, 390)

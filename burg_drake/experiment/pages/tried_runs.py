@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.run_store import Run
-from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet, load_trials
-from burg_drake.experiment.trials.sources import load_sources
-from burg_drake.scene.scene import Scene
-from burg_drake.station.station import Station
+from burg_drake.evaluation.store import Run
+from burg_drake.experiment.trials import RealTrial, TrialSheet, load_sources, load_trials
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.core.frames import Array, make_pose, transform_points
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.core import Array, make_pose, transform_points
 from burg_drake.experiment.pages.painting import Viewpoint
-from burg_drake.objects.rays import RayCaster
-from burg_drake.visualization.camera_aim import looking
-from burg_drake.visualization.portrait import fit_camera
+from burg_drake.geometry import RayCaster
+from burg_drake.visualization.meshcat import fit_camera, looking
 
 HALF_VIEW, NARROW = 0.24, 0.06
 """Tangents of half the vertical angle of view: little perspective, and hardly any from above."""

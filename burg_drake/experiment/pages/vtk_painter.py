@@ -24,9 +24,8 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from burg_drake.cameras.intrinsics import camera_info
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.experiment.pages.bodies import Body, PlacedBody
+from burg_drake.cameras.optics import camera_info
+from burg_drake.core import InvalidInputError, MissingDependencyError
 from burg_drake.experiment.pages.painting import (
     BACKGROUND,
     NOTHING,
@@ -34,7 +33,8 @@ from burg_drake.experiment.pages.painting import (
     Viewpoint,
     finer,
 )
-from burg_drake.station.cameras import LIGHTS
+from burg_drake.experiment.pages.scene_bodies import DrawnBody, PlacedBody
+from burg_drake.station.world import LIGHTS
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
 RENDERER = "trials"
@@ -56,7 +56,7 @@ class VtkPainter:
         InvalidInputError: Drake cannot load a mesh.
     """
 
-    def __init__(self, stock: Mapping[str, tuple[Body, int]]) -> None:
+    def __init__(self, stock: Mapping[str, tuple[DrawnBody, int]]) -> None:
         missing = missing_render_libraries()
         if missing:
             raise MissingDependencyError(describe_missing(missing))
@@ -93,7 +93,7 @@ class VtkPainter:
             np.where(known, owner[np.where(known, shown, 0)], NOTHING),
         )
 
-    def _add(self, key: str, number: int, body: Body) -> None:
+    def _add(self, key: str, number: int, body: DrawnBody) -> None:
         frame = GeometryFrame(f"{len(self._frames)}")
         self._frames[key, number] = self._graph.RegisterFrame(self._source, frame)
         self._labels[key, number] = label = len(self._frames)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from burg_drake.core.frames import Array
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.core import Array
+from burg_drake.core.grasps import RealOutcome
 
 SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
     RealOutcome.LIFTED: ("lifted", "held at the end of the lift, nothing else moved"),

@@ -12,17 +12,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from burg_drake.core.document_text import read_text
-from burg_drake.core.errors import (
+from burg_drake.core import (
     InvalidInputError,
     quoted,
 )
-from burg_drake.core.files import atomic_write
-from burg_drake.core.schema import parse_document
+from burg_drake.core.documents import parse_document
+from burg_drake.core.files import atomic_write, read_text
 from burg_drake.experiment.trials.entries import (
     Entry,
     How,
-    Lacking,
+    MissingValues,
     append_entry,
     entered,
     journal_path,
@@ -31,11 +30,10 @@ from burg_drake.experiment.trials.entries import (
     sync_folder,
     with_values,
 )
+from burg_drake.experiment.trials.file_lock import exclusive
 from burg_drake.experiment.trials.given_entry import EMPTY, checked, includes, merged
-from burg_drake.experiment.trials.given_entry import real_outcome as real_outcome
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
-from burg_drake.experiment.trials.trial_text import with_trial
-from burg_drake.experiment.trials.turn import turn
+from burg_drake.experiment.trials.sheet_text import with_trial
 
 
 class TrialChanged(InvalidInputError):
@@ -82,7 +80,7 @@ class TrialBook:
         """All that was ever recorded, in order."""
         return read_entries(journal_path(self.path))
 
-    def lacking(self) -> list[Lacking]:
+    def lacking(self) -> list[MissingValues]:
         """What the file lacks of that; see `entries.lacking`."""
         return lacking(self.sheet(), self.entries())
 
@@ -204,7 +202,7 @@ class TrialBook:
     def _change(
         self, number: int | Literal["next"], change: Callable[[RealTrial], RealTrial], how: How
     ) -> RealTrial:
-        with turn(self.path):
+        with exclusive(self.path):
             while True:
                 text, sheet = self._read()
                 old = self._chosen(sheet, number)

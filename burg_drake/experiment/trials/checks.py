@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from burg_drake.core.errors import FieldError, nearest, quoted
+from burg_drake.core import FieldError, nearest, quoted
 
 
 def require_least(value: int, least: int, name: str) -> None:

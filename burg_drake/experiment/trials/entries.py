@@ -15,12 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
+from burg_drake.core.documents import Reader, dump_document, parse_json, parse_nodes, plain_data
 from burg_drake.core.files import open_regular
-from burg_drake.core.json_text import parse_json
-from burg_drake.core.reader import Reader
-from burg_drake.core.schema import dump_document, plain_data
-from burg_drake.core.yaml_nodes import parse_nodes
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 
 How = Literal["recorded", "corrected", "again", "restored", "kept"]
@@ -59,7 +56,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Lacking:
+class MissingValues:
     """What the file lacks of the entries for a trial.
 
     Attributes:
@@ -150,7 +147,7 @@ def sync_folder(folder: Path) -> None:
         os.close(file)
 
 
-def lacking(sheet: TrialSheet, entries: Iterable[Entry]) -> list[Lacking]:
+def lacking(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
     """What the sheet lacks of what was recorded, trial by trial.
 
     A field counts as lost if the sheet has a value of it that the journal knows from before the
@@ -168,5 +165,7 @@ def lacking(sheet: TrialSheet, entries: Iterable[Entry]) -> list[Lacking]:
         lost = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
         if differing:
             edited = tuple(name for name in differing if name not in lost)
-            found.append(Lacking(trial.number, {name: last.get(name) for name in lost}, edited))
+            found.append(
+                MissingValues(trial.number, {name: last.get(name) for name in lost}, edited)
+            )
     return found

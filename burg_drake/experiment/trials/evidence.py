@@ -12,14 +12,13 @@ import math
 from itertools import count
 from pathlib import Path
 
-from burg_drake.cameras.placement_document import Placement, PlacementCheck, save_placement
-from burg_drake.core.document_text import IMAGE_SIZE, read_bytes
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import atomic_write
-from burg_drake.core.schema import Pose
+from burg_drake.cameras.placement import Placement, PlacementCheck, save_placement
+from burg_drake.core import InvalidInputError
+from burg_drake.core.documents import Pose
+from burg_drake.core.files import IMAGE_SIZE, atomic_write, read_bytes
+from burg_drake.experiment.trials.file_lock import exclusive
 from burg_drake.experiment.trials.sheet import ObjectPlace, RealTrial, TrialSheet
-from burg_drake.experiment.trials.turn import turn
-from burg_drake.scene.scene import Scene
+from burg_drake.scene.document import Scene
 
 PHOTOS, PLACEMENTS = "photos", "placements"
 MILLI = 1e3
@@ -73,11 +72,9 @@ def measured(
     Raises:
         InvalidInputError: a file cannot be read, or the images do not belong to the intrinsics.
     """
-    from burg_drake.cameras.image_file import read_image
-    from burg_drake.cameras.intrinsics_file import load_intrinsics
-    from burg_drake.cameras.placement import check_placement
-    from burg_drake.cameras.placement_depth_file import read_depth
-    from burg_drake.cameras.placement_document import image_of_file
+    from burg_drake.cameras.optics import load_intrinsics
+    from burg_drake.cameras.placement import check_placement, image_of_file
+    from burg_drake.cameras.sources import read_depth, read_image
 
     camera = load_intrinsics(intrinsics)
     image = read_image(photo)
@@ -121,7 +118,7 @@ def keep_evidence(
     folder = Path(sheet_path).parent
     content = None if photo is None else read_bytes(photo, IMAGE_SIZE)
     copy = ""
-    with turn(Path(sheet_path)):  # no other one takes the same name
+    with exclusive(Path(sheet_path)):  # no other one takes the same name
         stem = _free_stem(folder, number)
         if photo is not None and content is not None:
             copy = f"{PHOTOS}/{stem}{Path(photo).suffix.lower()}"

@@ -17,31 +17,28 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write, remove_unfinished, writable_folder
-from burg_drake.core.names import require_name
-from burg_drake.core.outcome import Outcome
-from burg_drake.core.processes import default_workers
-from burg_drake.core.progress import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.grasps import Outcome
+from burg_drake.core.paths import require_name
+from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.workers import default_workers
+from burg_drake.evaluation import ReachJudgeFactory
 from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.executors import judge_all
-from burg_drake.evaluation.feasibility import ReachJudgeFactory
-from burg_drake.evaluation.judge import Verdict
-from burg_drake.evaluation.motion_numbers import motion_in
-from burg_drake.evaluation.plan_folder import PlanFolder, PlanFormat, plans_document
-from burg_drake.evaluation.run_document import input_of, numbers
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.screens import arm_settings
+from burg_drake.evaluation.records import input_of, motion_in, numbers
+from burg_drake.evaluation.stages import Verdict, arm_settings
+from burg_drake.evaluation.store import PlanFolder, PlanFormat, Run, plans_document
+from burg_drake.evaluation.workers import judge_all
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 from burg_drake.experiment.trials.sources import Moved, load_sources
-from burg_drake.station.station import Station, load_station
+from burg_drake.station.document import Station, load_station
 
 INDEX_FILE = "index.csv"
 RUNS = "runs"
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedMotion:
     """What became of the motion of a trial.
 
     Attributes:
@@ -93,7 +90,7 @@ def export_trials(
     retry_failed: bool = False,
     workers: int | None = None,
     progress: bool | Listener = False,
-) -> list[Exported]:
+) -> list[ExportedMotion]:
     """Plans the motion of every trial and writes it to a file, as `reach` does.
 
     The hand moves as in the run that the grasp is from. What an earlier call with the same sheet
@@ -128,7 +125,7 @@ def export_trials(
         jobs.append((own, _factory(run, own, out / RUNS / key, out, format, station)))
     writable_folder(out)
     remove_unfinished(out)
-    rows: dict[int, Exported] = {}
+    rows: dict[int, ExportedMotion] = {}
     with Reporter(progress) as reporter:
         for own, (factory, candidates) in jobs:
             verdicts = _judge(
@@ -151,7 +148,7 @@ def _factory(
     station: Station | str | Path | None,
 ) -> tuple[ReachJudgeFactory, Candidates]:
     """What judges the grasps of one run, and these."""
-    from burg_drake.motion.usable_arm import require_usable_arm
+    from burg_drake.motion.workspace import require_usable_arm
 
     scene = run.scene()
     if station is None:
@@ -205,7 +202,7 @@ def _judge(
     return folder.verdicts()
 
 
-def _exported(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> Exported:
+def _exported(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> ExportedMotion:
     plan = plans.plan(trial.grasp)
     failed = verdict.outcome is Outcome.SIMULATION_FAILED
     there = verdict.outcome is Outcome.REACHABLE and plan.is_file()
@@ -213,7 +210,7 @@ def _exported(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> Exported
     if there and own != plan and not own.exists():  # the same grasp is tried twice
         atomic_write(own, plan.read_bytes())
     duration = verdict.margins.get("duration") if there else None
-    return Exported(
+    return ExportedMotion(
         number=trial.number,
         block=trial.block,
         run=trial.run,
@@ -243,10 +240,10 @@ def _require_folder(out: Path) -> None:
             )
 
 
-def _index(rows: Sequence[Exported]) -> str:
+def _index(rows: Sequence[ExportedMotion]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Exported)])
+    writer.writerow([field.name for field in fields(ExportedMotion)])
     for row in rows:
         cells = vars(row).values()
         writer.writerow(["" if cell is None else cell for cell in cells])

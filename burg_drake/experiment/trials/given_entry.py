@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest, quoted
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest, quoted
+from burg_drake.core.grasps import RealOutcome
 from burg_drake.experiment.trials.entries import FIELDS
 from burg_drake.experiment.trials.sheet import RealTrial, RobotReport
 

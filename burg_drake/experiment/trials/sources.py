@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError, UnknownNameError, nearest, quoted
-from burg_drake.core.frames import check_pose
-from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.results import load_runs
-from burg_drake.evaluation.run_document import HASH_DIGITS
-from burg_drake.evaluation.run_store import RUN_FILE, Run
-from burg_drake.evaluation.table import Columns
+from burg_drake.core import (
+    InvalidInputError,
+    UnknownNameError,
+    check_pose,
+    content_hash,
+    nearest,
+    quoted,
+)
+from burg_drake.evaluation.records import HASH_DIGITS, Columns, engine_label
+from burg_drake.evaluation.store import RUN_FILE, Run, load_runs
 from burg_drake.experiment.trials.sheet import RealTrial, SourceRun, TrialSheet
 
 Moved = Mapping[str, "str | Path"]

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidates import Candidate
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import Job, OnFailure
-from burg_drake.evaluation.judge import Verdict, judge_grasp
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.evaluation.workers.executor import Job, OnFailure
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

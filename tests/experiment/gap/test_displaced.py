@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.candidates import Candidates, given_candidates
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.candidates.candidates import Candidates, given_candidates
 from burg_drake.experiment.gap import placement_noise
-from burg_drake.experiment.gap.displaced import (
+from burg_drake.experiment.gap.displacement import (
     commanded,
     commanded_candidates,
     displaced_scene,
@@ -23,8 +23,8 @@ from burg_drake.experiment.gap.placement_noise import (
     moved,
     noisy_scene,
 )
-from burg_drake.scene.scene import Scene, load_scene
-from burg_drake.scene.validate import SceneIssue
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.scene.document.validation import SceneIssue
 
 
 @pytest.fixture(scope="module")

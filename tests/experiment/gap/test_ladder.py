@@ -13,28 +13,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.apps import gap as gap_verb
 from burg_drake.apps.cli import main
+from burg_drake.apps.comparison import gap as gap_verb
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.outcome import Outcome, RealOutcome, Stage
-from burg_drake.evaluation.executor import Job
-from burg_drake.evaluation.judge import Verdict, judge_grasp
-from burg_drake.evaluation.rerun import differences
-from burg_drake.evaluation.run_document import run_hash
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.station_judge import StationJudge
+from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
+from burg_drake.evaluation.records.run_document import run_hash
+from burg_drake.evaluation.replay import differences
+from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
+from burg_drake.evaluation.stages.station_judge import StationJudge
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.evaluation.workers.executor import Job
 from burg_drake.experiment.gap.changes import gap_changes
-from burg_drake.experiment.gap.ladder import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
+from burg_drake.experiment.gap.measurement import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.experiment.gap.report.sections import change_section, push_section
-from burg_drake.experiment.gap.report.story import story
+from burg_drake.experiment.gap.report.sentences import step_sentences
 from burg_drake.experiment.gap.report.tables import gap_json
-from burg_drake.experiment.gap.steps import Ladder, Step
-from burg_drake.experiment.gap.steps_reality import agreement_by_step, tried_grasps
+from burg_drake.experiment.gap.step_agreement import agreement_by_step, tried_grasps
+from burg_drake.experiment.gap.steps import GapStep, GapSteps
 from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, TrialSheet
 from burg_drake.experiment.trials.sources import grasp_contents
-from burg_drake.scene.scene import Scene
-from burg_drake.station.engine import ENGINES
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import ENGINES
 from tests.experiment.gap.conftest import Here
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
@@ -42,20 +42,20 @@ ASKED: dict[str, Any] = {"noise": NONE, "executor": Here(), "progress": False}
 
 
 @pytest.fixture(scope="module")
-def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Ladder:
+def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> GapSteps:
     """The grasps of a run by the hand alone, and in a scene that is displaced by nothing."""
     out = tmp_path_factory.mktemp("gap") / "steps"
     return measure_gap(run, out, last="hand", samples=1, **ASKED)
 
 
 @pytest.fixture(scope="module")
-def ladder(run: Run, by_hand: Ladder) -> Ladder:
+def ladder(run: Run, by_hand: GapSteps) -> GapSteps:
     """The same folder with one step more."""
     found = measure_gap(run, by_hand.path, last="reach", samples=0, **ASKED)
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
-def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: Ladder) -> None:
+def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: GapSteps) -> None:
     hand, (run,) = by_hand.first, by_hand.steps[1].runs
     assert hand is not run and run.document.scene.content == hand.document.scene.content
     assert run.candidates.id == hand.candidates.id[:2]
@@ -63,7 +63,7 @@ def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: Ladde
         assert differences(hand.verdicts[id], run.verdicts[id]) == []
 
 
-def test_reach_has_the_bits_of_a_run_of_its_own(ladder: Ladder) -> None:
+def test_reach_has_the_bits_of_a_run_of_its_own(ladder: GapSteps) -> None:
     """The oracle is the judge that nobody has shortened."""
     hand, reach = (step.runs[0] for step in ladder.steps[:2])
     judge = StationJudge(hand.scene(), hand.station(), engine=hand.document.engine, mode="reach")
@@ -80,7 +80,7 @@ def test_reach_has_the_bits_of_a_run_of_its_own(ladder: Ladder) -> None:
 
 
 def test_the_page_and_the_figures_tell_the_same(
-    ladder: Ladder, capsys: pytest.CaptureFixture[str]
+    ladder: GapSteps, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["gap", str(ladder.steps[0].runs[0].path), "-o", str(ladder.path.parent / "again")]
     words += ["--mode", "hand", "--samples", "0", "--quiet"]
@@ -96,7 +96,7 @@ def test_the_page_and_the_figures_tell_the_same(
     assert json.loads(capsys.readouterr().out.split("report ")[-1].split("\n", 1)[1])["steps"]
 
 
-def test_other_steps_are_refused(run: Run, ladder: Ladder) -> None:
+def test_other_steps_are_refused(run: Run, ladder: GapSteps) -> None:
     with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '.*' there"):
         measure_gap("tabletop_six", ladder.path, last="reach", **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
@@ -152,7 +152,7 @@ def overlapping(scene: Scene) -> Scene:
 
 
 def test_options_of_a_scene_are_refused_with_a_run(
-    ladder: Ladder, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    ladder: GapSteps, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     words = ["gap", str(ladder.steps[0].runs[0].path), "-o", str(tmp_path / "out")]
     assert main([*words, "--engine", "standard"]) == 2
@@ -180,7 +180,7 @@ def stated(run: Run, outcomes: dict[str, Outcome]) -> Run:
 
 
 @pytest.fixture
-def known(ladder: Ladder) -> Ladder:
+def known(ladder: GapSteps) -> GapSteps:
     """Steps with verdicts that are given: of three grasps one is lost in each step."""
     hand = ladder.steps[0].runs[0]
     one, two, three = hand.candidates.id
@@ -199,7 +199,7 @@ def known(ladder: Ladder) -> Ladder:
     return replace(ladder, steps=tuple(steps))
 
 
-def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
+def test_what_is_lost_and_won_is_counted(known: GapSteps) -> None:
     for run in (step.runs[0] for step in known.steps):
         run.__dict__["candidates"] = [c for c in known.first.candidates if c.id in run.verdicts]
     reach, placed = gap_changes(known, "lifted")
@@ -211,7 +211,7 @@ def test_what_is_lost_and_won_is_counted(known: Ladder) -> None:
     assert (low, high) == pytest.approx((0.0945, 0.9055), abs=1e-4)
 
 
-def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: Ladder) -> None:
+def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: GapSteps) -> None:
     """The second one, which the first step lost, was ended from outside."""
     one, two, three = known.first.candidates.id
     reach = known.steps[1].runs[0]
@@ -222,7 +222,7 @@ def test_what_could_not_be_simulated_is_neither_lost_nor_won(known: Ladder) -> N
     assert (change.successes, len(change.lost), len(change.won), change.failed) == (1, 0, 1, 1)
     assert [move.grasp for move in change.moves] == [one, three]
     told = "With the arm: 1 could not be simulated here or in the step before, and counts as"
-    assert story(replace(known, steps=steps), (change,), "lifted")[-1].startswith(told)
+    assert step_sentences(replace(known, steps=steps), (change,), "lifted")[-1].startswith(told)
     assert told in change_section(change)
     found = gap_json(replace(known, steps=known.steps[:1]), (change,), (), "lifted")
     assert found["changes"][0]["not_simulated"] == 1
@@ -268,7 +268,7 @@ def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) ->
         tried_grasps(own, "trials.yaml", run)
 
 
-def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
+def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     real = (RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED)
     trials = real_trials(known.first, *real)
     later = replace(trials[0], number=4, outcome=None)
@@ -282,7 +282,7 @@ def test_each_step_is_held_against_the_robot(known: Ladder) -> None:
     assert found[2].found.recall.value == 0.5
 
 
-def test_the_page_shows_all_sections(ladder: Ladder) -> None:
+def test_the_page_shows_all_sections(ladder: GapSteps) -> None:
     from burg_drake.experiment.gap.report.page import gap_page
 
     page = gap_page(ladder, "lifted", (), "burg-drake gap tabletop_six -o gap")
@@ -293,7 +293,7 @@ def test_the_page_shows_all_sections(ladder: Ladder) -> None:
     assert "burg-drake replay" in page
 
 
-def test_what_the_approach_pushes_is_told_by_object(known: Ladder) -> None:
+def test_what_the_approach_pushes_is_told_by_object(known: GapSteps) -> None:
     """Five trials of the arm, as a table has them; one has failed."""
     arm = Run(known.first.path, known.first.document)
     arm.__dict__["results"] = {
@@ -304,7 +304,7 @@ def test_what_the_approach_pushes_is_told_by_object(known: Ladder) -> None:
         "pushed_box": np.array([0.0, 0.004, 0.0, 0.0, np.nan]),
         "pushed_mug": np.array([0.0, 0.0, 0.03, 0.0, np.nan]),
     }
-    page = push_section(replace(known, steps=(*known.steps, Step("arm", (arm,)))))
+    page = push_section(replace(known, steps=(*known.steps, GapStep("arm", (arm,)))))
     assert page is not None and "in 2 of 4 trials (largest 30.0 mm)" in page
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in page.split("<tr>")[2:]]
     assert rows == [

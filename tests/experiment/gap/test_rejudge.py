@@ -14,20 +14,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from burg_drake.apps.cli import main
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.frames import Array
-from burg_drake.core.outcome import Outcome, RealOutcome
-from burg_drake.core.schema import Pose
-from burg_drake.evaluation.candidates import Candidates
-from burg_drake.evaluation.executor import Job, JobFailed, OnFailure
-from burg_drake.evaluation.journal import decode
-from burg_drake.evaluation.rerun import differences
-from burg_drake.evaluation.run_store import Run
-from burg_drake.evaluation.table_file import read_table
-from burg_drake.experiment.gap.measured import measured_scene, upright
-from burg_drake.experiment.gap.rejudge import rejudge
-from burg_drake.experiment.gap.rejudged import Rejudging, runs_for
-from burg_drake.experiment.gap.report.rejudged import rejudged_section, rejudged_words
+from burg_drake.core.grasps.outcome import Outcome, RealOutcome
+from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records.journal import decode
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.replay import differences
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.evaluation.workers.executor import Job, JobFailed, OnFailure
+from burg_drake.experiment.gap.measured_places import measured_scene, upright
+from burg_drake.experiment.gap.rejudged_trials import Rejudging, runs_for
+from burg_drake.experiment.gap.rejudging import rejudge
+from burg_drake.experiment.gap.report.rejudging import rejudged_section, rejudged_words
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
@@ -38,8 +38,8 @@ from burg_drake.experiment.trials.sheet import (
     save_trials,
 )
 from burg_drake.experiment.trials.sources import grasp_content
-from burg_drake.scene.scene import Scene
-from burg_drake.station.scene_check import SceneCheck
+from burg_drake.scene.document.scene import Scene
+from burg_drake.station.checks.scene_check import SceneCheck
 from tests.experiment.gap.conftest import Here
 
 MISSED = {"no_contact", "collision_target", "collision_table", "closed_empty", "one_finger"}

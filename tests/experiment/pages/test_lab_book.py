@@ -11,14 +11,13 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.intrinsics import Intrinsics
-from burg_drake.cameras.placement_document import PlacementCheck
-from burg_drake.cameras.session import Session, Sight
-from burg_drake.cameras.sources import open_source
-from burg_drake.cameras.synthetic import board_image
+from burg_drake.cameras.live.frame_processing import FrameProcessor, LocatedFrame
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.document import PlacementCheck
+from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
-from burg_drake.core.outcome import RealOutcome
+from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.pages import lab_book
 from burg_drake.experiment.pages.lab_book import (
     EntryConflict,
@@ -32,6 +31,7 @@ from burg_drake.experiment.pages.lab_camera import LabCamera
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
+from tests.cameras.synthetic import board_image
 
 TIME = "2026-05-05T10:02:11+02:00"
 
@@ -196,7 +196,7 @@ def test_a_check_that_fails_says_why(
     def broken(*_: object) -> None:
         raise cv2.error("no such matrix")
 
-    monkeypatch.setattr(Session, "check", broken)
+    monkeypatch.setattr(FrameProcessor, "check", broken)
     over.watch(4)
     assert over.next_picture(0, 0, 30.0) is not None
     over.check(4, keep=True)
@@ -211,13 +211,13 @@ def test_an_outcome_that_comes_while_a_check_is_at_work(
     lab: LabBook, trials: Path, over: LabCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Photo and placement stay with the trial that was shown; the next one shows no offsets."""
-    entered, check = threading.Event(), Session.check
+    entered, check = threading.Event(), FrameProcessor.check
 
-    def slow(session: Session, sight: Sight) -> PlacementCheck:
+    def slow(session: FrameProcessor, sight: LocatedFrame) -> PlacementCheck:
         assert entered.wait(30.0)
         return check(session, sight)
 
-    monkeypatch.setattr(Session, "check", slow)
+    monkeypatch.setattr(FrameProcessor, "check", slow)
     over.watch(5)
     assert over.next_picture(0, 0, 30.0) is not None
     over.check(5, keep=True)

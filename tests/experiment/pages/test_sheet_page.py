@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose
-from burg_drake.core.outcome import Outcome, RealOutcome
-from burg_drake.experiment.pages.sheet_page import SheetOptions, sheet_page
+from burg_drake.core.grasps.outcome import Outcome, RealOutcome
+from burg_drake.experiment.pages.protocol import SheetOptions, sheet_page
 from burg_drake.experiment.pages.trial_pictures import TrialPictures
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.pages.words import SHORT_LIST, approach_text, closing_text

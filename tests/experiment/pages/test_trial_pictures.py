@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.experiment.pages.bodies import HAND
 from burg_drake.experiment.pages.highlight import RIM
 from burg_drake.experiment.pages.painting import NOTHING
+from burg_drake.experiment.pages.scene_bodies import HAND
 from burg_drake.experiment.pages.trial_pictures import TrialPictures
 from burg_drake.experiment.pages.tried_runs import TriedRuns
 

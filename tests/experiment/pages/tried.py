@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run_store import Run
+from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.trials.sheet import (
     RealTrial,
     Selection,
@@ -20,8 +20,8 @@ from burg_drake.experiment.trials.sheet import (
     save_trials,
 )
 from burg_drake.experiment.trials.sources import grasp_content, source_of
-from burg_drake.scene.scene import load_scene
-from burg_drake.station.station import load_station
+from burg_drake.scene.document.scene import load_scene
+from burg_drake.station.document.station_document import load_station
 from tests.evaluation.inline_executor import Inline
 from tests.evaluation.known_judge import install
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from burg_drake.core.figures import count, figure
-from burg_drake.evaluation.report.markup import (
+from burg_drake.core.terminal import count, figure
+from burg_drake.evaluation.report.elements import (
     Child,
     Html,
     command,
@@ -19,7 +19,7 @@ from burg_drake.evaluation.report.markup import (
 )
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.disagreement import Disagreement
-from burg_drake.experiment.comparison.judgement import Judgement
+from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.figures import share_mark
 
 MOST_CASES = 50

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from burg_drake.core.figures import count
-from burg_drake.evaluation.report.charts import interval_mark
-from burg_drake.evaluation.report.markup import Child, Html, element, join, section, table
-from burg_drake.experiment.comparison.agreement import Agreement
+from burg_drake.core.terminal import count
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    element,
+    interval_mark,
+    join,
+    section,
+    table,
+)
 from burg_drake.experiment.comparison.comparison import Comparison
-from burg_drake.experiment.comparison.groups import Group
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import CELLS, MEASURES, Figure
+from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.wording import CELL_NAMES, SHARES, interval, number
+from burg_drake.experiment.statistics import CELLS, MEASURES, Agreement, Estimate
 
 MOST_ROWS = 60
 Named = Sequence[tuple[str, Judgement]]
@@ -88,7 +94,7 @@ def figure_section(judged: Named) -> Html:
     )
 
 
-def figure_cell(found: Figure, *, percent: bool) -> Html:
+def figure_cell(found: Estimate, *, percent: bool) -> Html:
     """A figure and its interval, below each other where there is little room."""
     if found.value is None:
         return element("td", found.reason, class_="number faint why")
@@ -109,7 +115,7 @@ def _how(judged: Named) -> str:
     return text
 
 
-def group_section(title: str, text: str, head: str, groups: Sequence[Group]) -> Html:
+def group_section(title: str, text: str, head: str, groups: Sequence[FactorGroup]) -> Html:
     """Counts, and shares with their intervals as dots and lines, by object or scene."""
     names = [head, "trials", "TP", "FP", "FN", "TN", "right", "precision", "recall"]
     rows = [_group_row(group) for group in groups[:MOST_ROWS]]
@@ -118,7 +124,7 @@ def group_section(title: str, text: str, head: str, groups: Sequence[Group]) -> 
     return section(title, text, table(names, rows, numbers=range(1, 6), style="groups"))
 
 
-def _group_row(group: Group) -> Html:
+def _group_row(group: FactorGroup) -> Html:
     a = group.agreement
     counts = [
         element("td", count(round(n)), class_="number", data_label=name)
@@ -131,7 +137,7 @@ def _group_row(group: Group) -> Html:
     return element("tr", element("th", group.name, scope="row"), *counts, *shares)
 
 
-def share_mark(found: Figure) -> Child:
+def share_mark(found: Estimate) -> Child:
     """A share as a dot with its interval, and in figures."""
     if found.value is None or found.low is None or found.high is None:
         return element("span", found.reason, class_="faint")

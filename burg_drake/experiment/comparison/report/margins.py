@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from burg_drake.core.figures import count
-from burg_drake.evaluation.report.markup import Html, element, section, table
-from burg_drake.experiment.comparison.calibration import Calibration
-from burg_drake.experiment.comparison.groups import Group
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.core.terminal import count
+from burg_drake.evaluation.report.elements import Html, element, section, table
+from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.figures import figure_cell, group_section
 from burg_drake.experiment.comparison.report.plots import reliability_plot
 from burg_drake.experiment.comparison.wording import margin_title
+from burg_drake.experiment.statistics import Estimate, MarginCalibration
 
 MOST_PLOTS = 4
 
@@ -41,13 +40,13 @@ def margin_section(judged: Judgement) -> Html | None:
     )
 
 
-def _telling(found: Calibration) -> float:
+def _telling(found: MarginCalibration) -> float:
     """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
     low, high = found.auroc.low, found.auroc.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
 
 
-def _row(c: Calibration, weighted: bool) -> Html:
+def _row(c: MarginCalibration, weighted: bool) -> Html:
     found = (c.auroc, c.auroc_weighted) if weighted else (c.auroc,)
     return element(
         "tr",
@@ -55,7 +54,7 @@ def _row(c: Calibration, weighted: bool) -> Html:
             "th", f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}", scope="row"
         ),
         element("td", count(c.trials), class_="number"),
-        *(figure_cell(f or Figure.undefined(""), percent=False) for f in found),
+        *(figure_cell(f or Estimate.undefined(""), percent=False) for f in found),
     )
 
 
@@ -66,9 +65,9 @@ def placement_section(judged: Judgement, of: str) -> Html | None:
         return None
     limit = f"{p.limit_mm:g} mm"
     groups = [
-        Group(name=f"every object within {limit}", agreement=p.within),
-        Group(name=f"an object more than {limit} off", agreement=p.beyond),
-        Group(name="not all measured", agreement=p.unmeasured),
+        FactorGroup(name=f"every object within {limit}", agreement=p.within),
+        FactorGroup(name=f"an object more than {limit} off", agreement=p.beyond),
+        FactorGroup(name="not all measured", agreement=p.unmeasured),
     ]
     text = (
         "Where objects stood off their targets, the simulation judged another scene than the robot"

@@ -7,12 +7,20 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from burg_drake.core.figures import count
-from burg_drake.evaluation.report.html_page import header, html_page, tiles
-from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
+from burg_drake.core.terminal import count
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    command,
+    element,
+    header,
+    html_page,
+    join,
+    section,
+    tiles,
+)
 from burg_drake.experiment.comparison.comparison import Comparison
-from burg_drake.experiment.comparison.judgement import Judgement
-from burg_drake.experiment.comparison.measures import Figure
+from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.cases import (
     case_section,
     outcome_section,
@@ -24,7 +32,6 @@ from burg_drake.experiment.comparison.report.figures import (
     matrix_section,
 )
 from burg_drake.experiment.comparison.report.margins import margin_section, placement_section
-from burg_drake.experiment.comparison.side import Side
 from burg_drake.experiment.comparison.wording import (
     SHARES,
     bias_words,
@@ -33,6 +40,8 @@ from burg_drake.experiment.comparison.wording import (
     number,
     of_selected,
 )
+from burg_drake.experiment.pairing import Side
+from burg_drake.experiment.statistics import Estimate
 
 KINDS = {
     "trials": "Simulation against reality",
@@ -119,7 +128,7 @@ def _unbroken(text: str) -> str:
     return text.replace(" %", "\u00a0%")
 
 
-def _tile(name: str, found: Figure, key: str) -> tuple[str, Child, str]:
+def _tile(name: str, found: Estimate, key: str) -> tuple[str, Child, str]:
     percent = key in SHARES
     if found.value is None:
         return name, "-", found.reason

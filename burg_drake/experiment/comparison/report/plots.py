@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from burg_drake.core.figures import figure
-from burg_drake.evaluation.report.charts import nice_step
-from burg_drake.evaluation.report.markup import Html, element
-from burg_drake.experiment.comparison.calibration import Bin, Calibration
+from burg_drake.core.terminal import figure
+from burg_drake.evaluation.report.elements import Html, element, nice_step
 from burg_drake.experiment.comparison.wording import margin_title
+from burg_drake.experiment.statistics import Bin, MarginCalibration
 
 WIDTH, HEIGHT = 330, 210
 LEFT, RIGHT, TOP, BOTTOM = 38, 10, 24, 38
 """Size and margins of a plot in SVG units."""
 
 
-def reliability_plot(found: Calibration, vertical: str) -> Html:
+def reliability_plot(found: MarginCalibration, vertical: str) -> Html:
     """Share over a number: a dot with its interval for each bin, the isotonic fit as a line, and
     the share of all together dashed.
 
@@ -84,7 +83,7 @@ def _across(share: float | None) -> Html | None:
     )
 
 
-def _fit(found: Calibration, x: Callable[[float], float]) -> Html | None:
+def _fit(found: MarginCalibration, x: Callable[[float], float]) -> Html | None:
     """The isotonic fit, which jumps half way between its steps."""
     points, steps = [], found.isotonic
     for k, step in enumerate(steps):

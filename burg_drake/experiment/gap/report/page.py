@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from burg_drake.core.figures import percent
 from burg_drake.core.files import atomic_write
-from burg_drake.evaluation.origin import engine_label
-from burg_drake.evaluation.report.html_page import header, html_page, tiles
-from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section
+from burg_drake.core.terminal import percent
+from burg_drake.evaluation.records import engine_label
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    command,
+    element,
+    header,
+    html_page,
+    join,
+    section,
+    tiles,
+)
 from burg_drake.experiment.gap.changes import Change, gap_changes
-from burg_drake.experiment.gap.report.flow_chart import STYLE
+from burg_drake.experiment.gap.report.flow import STYLE
 from burg_drake.experiment.gap.report.sections import (
     change_section,
     flow_section,
@@ -18,16 +27,16 @@ from burg_drake.experiment.gap.report.sections import (
     push_section,
     reality_section,
 )
-from burg_drake.experiment.gap.report.story import TITLES, story
-from burg_drake.experiment.gap.steps import Ladder
-from burg_drake.experiment.gap.steps_reality import StepAgreement
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.experiment.gap.report.sentences import TITLES, step_sentences
+from burg_drake.experiment.gap.step_agreement import StepAgreement
+from burg_drake.experiment.gap.steps import GapSteps
+from burg_drake.experiment.trials import Success
 
 REPORT_FILE = "gap.html"
 
 
 def write_gap_report(
-    ladder: Ladder, success: Success, agreement: Sequence[StepAgreement], command_line: str
+    ladder: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
 ) -> None:
     """Writes the page into the folder of the steps.
 
@@ -45,7 +54,7 @@ def write_gap_report(
 
 
 def gap_page(
-    ladder: Ladder, success: Success, agreement: Sequence[StepAgreement], command_line: str
+    ladder: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
 ) -> str:
     """The page as HTML."""
     found = gap_changes(ladder, success)
@@ -55,7 +64,7 @@ def gap_page(
         f"Where grasps are lost: {title}",
         element("style", Html(STYLE)),
         header("Where grasps are lost", title, _about(ladder, success)),
-        *_told(story(ladder, found, success)),
+        *_told(step_sentences(ladder, found, success)),
         tiles(_tiles(ladder, found)),
         flow_section(ladder, found),
         objects_section(ladder, success),
@@ -66,7 +75,7 @@ def gap_page(
     )
 
 
-def _about(ladder: Ladder, success: Success) -> str:
+def _about(ladder: GapSteps, success: Success) -> str:
     document = ladder.first.document
     counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
     about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
@@ -77,7 +86,7 @@ def _told(sentences: Sequence[str]) -> list[Html]:
     return [element("p", " ".join(sentences), class_="lead")]
 
 
-def _tiles(ladder: Ladder, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
+def _tiles(ladder: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
     whole = len(ladder.first.candidates)
     entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
     first = found[0].successes if found else 0
@@ -94,7 +103,7 @@ def _tiles(ladder: Ladder, found: Sequence[Change]) -> list[tuple[str, Child, st
     return entries
 
 
-def _again(ladder: Ladder, command_line: str) -> Html:
+def _again(ladder: GapSteps, command_line: str) -> Html:
     document = ladder.document
     facts = [("folder", str(ladder.path))]
     facts += [

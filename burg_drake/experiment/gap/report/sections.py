@@ -8,19 +8,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core.figures import percent
-from burg_drake.core.outcome import Outcome
-from burg_drake.evaluation.report.charts import interval_mark
-from burg_drake.evaluation.report.markup import Child, Html, command, element, join, section, table
-from burg_drake.evaluation.summary import PUSH, pushes
-from burg_drake.evaluation.trial import PUSHED
-from burg_drake.experiment.comparison.measures import Figure
-from burg_drake.experiment.gap.changes import Change, Move, successes_by_object
-from burg_drake.experiment.gap.report.flow_chart import Column, flow_chart
-from burg_drake.experiment.gap.report.story import TITLES, left_out, replay_command, words
-from burg_drake.experiment.gap.steps import Ladder
-from burg_drake.experiment.gap.steps_reality import StepAgreement
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.core.grasps import Outcome
+from burg_drake.core.terminal import percent
+from burg_drake.evaluation.records import PUSHED
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    command,
+    element,
+    interval_mark,
+    join,
+    section,
+    table,
+)
+from burg_drake.evaluation.results import PUSH, pushes
+from burg_drake.experiment.gap.changes import Change, OutcomeChange, successes_by_object
+from burg_drake.experiment.gap.report.flow import FlowColumn, flow_chart
+from burg_drake.experiment.gap.report.sentences import TITLES, left_out, replay_command, words
+from burg_drake.experiment.gap.step_agreement import StepAgreement
+from burg_drake.experiment.gap.steps import GapSteps
+from burg_drake.experiment.statistics import Estimate
+from burg_drake.experiment.trials import Success
 
 ROWS = 40
 """Grasps that a step's table lists."""
@@ -35,7 +43,7 @@ ABOUT = {
 }
 
 
-def flow_section(ladder: Ladder, found: Sequence[Change]) -> Html | None:
+def flow_section(ladder: GapSteps, found: Sequence[Change]) -> Html | None:
     """The picture of all steps."""
     if not found:
         return None
@@ -44,7 +52,7 @@ def flow_section(ladder: Ladder, found: Sequence[Change]) -> Html | None:
         outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
         plural = "" if len(step.runs) == 1 else "s"
         scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
-        columns.append(Column(TITLES[step.name] + scenes, outcomes))
+        columns.append(FlowColumn(TITLES[step.name] + scenes, outcomes))
         scale.append(1.0 / max(len(step.runs), 1))
     return section(
         "From step to step",
@@ -54,7 +62,7 @@ def flow_section(ladder: Ladder, found: Sequence[Change]) -> Html | None:
     )
 
 
-def objects_section(ladder: Ladder, success: Success) -> Html:
+def objects_section(ladder: GapSteps, success: Success) -> Html:
     """Successes of each object in each step."""
     by_step = [successes_by_object(step, success) for step in ladder.steps]
     whole = by_step[0]
@@ -147,7 +155,7 @@ def _listing(change: Change) -> Html:
     return element("details", element("summary", f"The grasps that change{more}"), inside)
 
 
-def _listed(move: Move) -> Html:
+def _listed(move: OutcomeChange) -> Html:
     line = shlex.join(replay_command(move.run, move.grasp))
     return element(
         "tr",
@@ -159,7 +167,7 @@ def _listed(move: Move) -> Html:
     )
 
 
-def push_section(ladder: Ladder) -> Html | None:
+def push_section(ladder: GapSteps) -> Html | None:
     """By how much the hand pushes objects before it closes."""
     arm = next((step.runs[0] for step in ladder.steps if step.name == "arm"), None)
     told = None if arm is None else pushes(arm.results)
@@ -226,7 +234,7 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     )
 
 
-def _estimate(found: Figure) -> Child:
+def _estimate(found: Estimate) -> Child:
     if found.value is None or found.low is None or found.high is None:
         return "-"
     return join(interval_mark(found.value, found.low, found.high), f" {percent(found.value)}")

@@ -7,23 +7,21 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from burg_drake.core.figures import percent
-from burg_drake.core.schema import plain_data
-from burg_drake.core.text_table import TextTable
-from burg_drake.evaluation.summary import pushes
-from burg_drake.experiment.comparison.measures import Figure
-from burg_drake.experiment.comparison.record import plain
-from burg_drake.experiment.comparison.wording import interval
+from burg_drake.core.documents import plain_data
+from burg_drake.core.terminal import TextTable, percent
+from burg_drake.evaluation.results import pushes
+from burg_drake.experiment.comparison import interval, plain
 from burg_drake.experiment.gap.changes import Change, successes_by_object
-from burg_drake.experiment.gap.report.story import TITLES, replay_command, story, words
-from burg_drake.experiment.gap.steps import Ladder
-from burg_drake.experiment.gap.steps_reality import StepAgreement
-from burg_drake.experiment.trials.sheet import Success
+from burg_drake.experiment.gap.report.sentences import TITLES, replay_command, step_sentences, words
+from burg_drake.experiment.gap.step_agreement import StepAgreement
+from burg_drake.experiment.gap.steps import GapSteps
+from burg_drake.experiment.statistics import Estimate
+from burg_drake.experiment.trials import Success
 
 FIGURES = ("precision", "recall", "accuracy")
 
 
-def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
+def steps_view(ladder: GapSteps, found: Sequence[Change]) -> TextTable:
     """What each step keeps and loses."""
     table = TextTable("Where grasps are lost", caption=_caption(ladder))
     table.names("step").numbers(
@@ -45,7 +43,7 @@ def steps_view(ladder: Ladder, found: Sequence[Change]) -> TextTable:
     return table
 
 
-def _caption(ladder: Ladder) -> str:
+def _caption(ladder: GapSteps) -> str:
     document = ladder.document
     if not document.samples:
         return ""
@@ -68,14 +66,14 @@ def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     return table
 
 
-def _share(found: Figure) -> str:
+def _share(found: Estimate) -> str:
     if found.value is None:
         return "-"
     return f"{100 * found.value:.0f} {interval(found, percent=True)} %"
 
 
 def gap_json(
-    ladder: Ladder,
+    ladder: GapSteps,
     found: Sequence[Change],
     agreement: Sequence[StepAgreement],
     success: Success,
@@ -86,7 +84,7 @@ def gap_json(
     return {
         "success": success,
         "asked": plain_data(ladder.document),
-        "story": story(ladder, found, success),
+        "story": step_sentences(ladder, found, success),
         "steps": [
             {
                 "name": step.name,

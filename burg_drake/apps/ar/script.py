@@ -1,0 +1,74 @@
+"""What `burg-drake ar` tells a script in the end."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from burg_drake.apps.ar.session_status import placement_row
+from burg_drake.cameras.live import LiveSession, ViewActions, pose_line
+from burg_drake.cameras.overlay import OverlayStyle
+from burg_drake.cameras.placement import PlacementCheck
+
+
+def finish(live: LiveSession, actions: ViewActions, *, check: bool, snapshot: str | None) -> None:
+    """Tells what was found, and does what is to be done with the last frame that gave a pose.
+
+    Args:
+        live: the session, closed.
+        actions: on it.
+        check: measure how far objects are off.
+        snapshot: folder for a snapshot, if one is wanted.
+    """
+    sight, counts = live.last_sight, live.counts
+    if sight is None:
+        return
+    if counts.frames > 1:
+        print(f"{live.source.name}: {counts.valid} of {counts.frames} frames gave a pose")
+    estimate = sight.estimate
+    print(f"{sight.frame.name}: {pose_line(estimate, live.session.scene.board)}")
+    if estimate.valid:
+        x, y, z = 1e3 * estimate.X_SC[:3, 3]
+        print(
+            f"camera at x {x:.2f}, y {y:.2f}, z {z:.2f} mm of the board,"
+            f" reprojection error {estimate.reprojection_error:.3f} px"
+        )
+    placement = None
+    if check and estimate.valid:
+        placement = live.session.check(sight)
+        for line in placement_lines(placement, live.session.style):
+            print(line)
+    if snapshot is not None:
+        actions.snapshot(snapshot, live.picture_of(sight, placement))
+
+
+def placement_exit_code(live: LiveSession) -> int:
+    """The exit code of a script; says why if no frame gave a pose."""
+    if live.counts.valid:
+        return 0
+    reason = live.counts.reason or live.reader.fault or "no picture came"
+    print(f"burg-drake: no frame gave a pose: {reason}", file=sys.stderr)
+    return 1
+
+
+def placement_lines(check: PlacementCheck, style: OverlayStyle) -> list[str]:
+    """A placement check in words, a line an object."""
+    if not check.instances:
+        return [f"placement: {check.reason}"]
+    width = max(map(len, check.instances))
+    return [
+        f"  {name:{width}}  {_words(placement_row(placed, style))}"
+        for name, placed in check.instances.items()
+    ]
+
+
+def _words(row: dict[str, Any]) -> str:
+    if row["mm"] is None:
+        return ": ".join(filter(None, (row["status"].replace("_", " "), row["reason"])))
+    x, y = row["xy_mm"]
+    words = f"{row['mm']:5.2f} mm off (x {x:+.2f}, y {y:+.2f})"
+    if row["deg"] is not None:
+        words += f", turned {row['deg']:+.2f} deg"
+    if row["status"] != "measured":
+        return f"{words}; {row['status']}: {row['reason']}"
+    return f"{words}; {'placed' if row['within'] else 'not in its place'}"

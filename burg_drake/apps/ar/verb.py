@@ -1,0 +1,278 @@
+"""`burg-drake ar`: the scene over the picture of a camera, live in the browser, or in a script."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    add_scene,
+    add_verb,
+    measured_mm,
+    number,
+    port,
+    positive,
+    positive_int,
+)
+from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.cameras.live import Event, LiveSession, ViewActions
+    from burg_drake.cameras.optics import Intrinsics
+    from burg_drake.cameras.sources import FrameSource
+    from burg_drake.scene.document import Scene
+
+SIMULATED = "sim:"
+IDLE_AFTER = 3.0
+"""The camera is not looked at when no browser has asked for a picture for so long [s]."""
+RULER_MM = 100.0
+"""Length of the rulers on printouts."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "ar",
+        run_ar,
+        "draw a scene over the picture of a camera, live in the browser",
+        "burg-drake ar my_scene.yaml --camera 0 --intrinsics camera.yaml",
+        "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml",
+        "burg-drake ar tabletop_six --camera sim:panda_tabletop/board",
+        "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml --no-browser"
+        " --check --snapshot trial_7",
+    )
+    add_scene(parser)
+    parser.add_argument(
+        "--camera",
+        metavar="SOURCE",
+        default="0",
+        help="number of a camera, address of a stream, video, image, folder or pattern of images,"
+        " or sim:STATION/CAMERA (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--intrinsics",
+        metavar="FILE",
+        help="of the camera, ours or a camera_info file of ROS; see burg-drake camera calibrate."
+        " Simulated cameras know theirs",
+    )
+    parser.add_argument("--fps", type=positive, metavar="N", help="images a second of the camera")
+    parser.add_argument(
+        "--measured-mm",
+        type=measured_mm,
+        metavar="X[,Y]",
+        default=(RULER_MM, RULER_MM),
+        help="what the printed board's rulers of 100 mm measure, along x and along y",
+    )
+    _add_view(parser)
+    _add_results(parser)
+
+
+def _add_view(parser: Any) -> None:
+    view = parser.add_argument_group("view")
+    view.add_argument(
+        "--opacity", type=share, metavar="X", help="of the objects, 0 (outlines) to 1"
+    )
+    view.add_argument(
+        "--tolerance-mm", type=positive, metavar="X", help="objects placed within it are green"
+    )
+    view.add_argument(
+        "--tolerance-deg", type=positive, metavar="X", help="the same for how they are turned"
+    )
+    view.add_argument(
+        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+    )
+    view.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 all of"
+        " the network can see and use it, such as a tablet beside the board",
+    )
+    view.add_argument("--open", action="store_true", help="open the page in the browser")
+    view.add_argument(
+        "--no-browser",
+        action="store_true",
+        help="serve no page: look at all frames, print what was found, and end",
+    )
+
+
+def _add_results(parser: Any) -> None:
+    results = parser.add_argument_group("results")
+    results.add_argument(
+        "--record", metavar="FILE", help="video (.mp4, .avi) of all frames, poses beside it"
+    )
+    results.add_argument(
+        "--plain", action="store_true", help="recordings also get a video without overlay"
+    )
+    results.add_argument(
+        "--snapshot",
+        metavar="FOLDER",
+        help="at the end, save the last frame that had a pose: picture, overlay, pose",
+    )
+    results.add_argument(
+        "--check", action="store_true", help="at the end, measure how far objects are off in it"
+    )
+    results.add_argument("--frames", type=positive_int, metavar="N", help="end after N frames")
+    results.add_argument("--seconds", type=positive, metavar="N", help="end after N seconds")
+    results.add_argument(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        default=".",
+        help="where the page's buttons put snapshots and recordings (default: here)",
+    )
+
+
+def run_ar(arguments: argparse.Namespace) -> int:
+    """Looks at frames until told to end; 1 if a script's frames had no pose."""
+    from burg_drake.scene.document import load_scene
+
+    scene = load_scene(arguments.scene)
+    _require_places(arguments)
+    intrinsics = _intrinsics(arguments)
+    source = _open(arguments, scene, intrinsics)
+    with terminated_as_interrupted():
+        try:
+            live, actions = _session(arguments, scene, intrinsics, source)
+        except BaseException:
+            source.close()
+            raise
+        return _run(arguments, live, actions)
+
+
+def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions) -> int:
+    from burg_drake.apps.ar.script import finish, placement_exit_code
+
+    scripted = _is_scripted(arguments)
+    interrupted = False
+    with contextlib.ExitStack() as closing:
+        closing.callback(actions.stop_recording)
+        closing.callback(live.close)
+        if not arguments.no_browser:
+            _serve(arguments, live, actions, closing)
+        if arguments.record is not None:
+            actions.start_recording(arguments.record)
+        try:
+            live.start(arguments.frames)
+            live.wait(seconds=arguments.seconds, to_end=arguments.no_browser)
+        except KeyboardInterrupt:
+            interrupted = True
+            print(file=sys.stderr)
+        with deaf_to_interrupts():
+            closing.close()
+        actions.wait_for_check()  # OpenCV must not be at work when Python ends
+    if scripted or arguments.check or arguments.snapshot:
+        finish(live, actions, check=arguments.check, snapshot=arguments.snapshot)
+    if interrupted and (arguments.frames or arguments.seconds):
+        raise KeyboardInterrupt
+    return placement_exit_code(live) if scripted else 0
+
+
+def _is_scripted(arguments: argparse.Namespace) -> bool:
+    """Frames are counted or timed, or looked at without a page."""
+    return bool(arguments.no_browser or arguments.frames or arguments.seconds)
+
+
+def _serve(
+    arguments: argparse.Namespace,
+    live: LiveSession,
+    actions: ViewActions,
+    closing: contextlib.ExitStack,
+) -> None:
+    """Serves the page until all is closed."""
+    from burg_drake.apps.ar.server import ViewServer
+
+    server = ViewServer(live, actions, host=arguments.host, port=arguments.port)
+    server.start()
+    closing.callback(server.close)
+    scene = live.session.scene
+    print(f"{scene.name} over {live.source.name}: open {server.url} in a browser", flush=True)
+    print("Press Ctrl-C to end.", flush=True)
+    if arguments.open:
+        open_in_browser(server.url)
+
+
+def _session(
+    arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics, source: FrameSource
+) -> tuple[LiveSession, ViewActions]:
+    from dataclasses import replace
+
+    from burg_drake.cameras.live import (
+        EventLog,
+        FrameProcessor,
+        LiveSession,
+        ViewActions,
+        ViewSettings,
+    )
+    from burg_drake.cameras.overlay import OverlayStyle
+
+    style, settings = OverlayStyle(), ViewSettings()
+    if arguments.tolerance_mm is not None:
+        style = replace(style, tolerance=1e-3 * arguments.tolerance_mm)
+    if arguments.tolerance_deg is not None:
+        style = replace(style, angle_tolerance=math.radians(arguments.tolerance_deg))
+    if arguments.opacity is not None:
+        settings = replace(settings, opacity=arguments.opacity)
+    x_mm, y_mm = arguments.measured_mm
+    print_scale = (x_mm / RULER_MM, y_mm / RULER_MM)
+    always = _is_scripted(arguments) or arguments.check or arguments.snapshot
+    live = LiveSession(
+        FrameProcessor(scene, intrinsics, print_scale=print_scale, style=style),
+        source,
+        events=EventLog(_print_event),
+        settings=settings,
+        paced=not arguments.no_browser,
+        idle_after=math.inf if always else IDLE_AFTER,
+    )
+    return live, ViewActions(live, arguments.output, plain=arguments.plain)
+
+
+def _print_event(event: Event) -> None:
+    print(f"burg-drake: {event.text}", file=sys.stderr, flush=True)
+
+
+def _open(arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics) -> FrameSource:
+    """Opens the source; a camera of this computer in the resolution that was calibrated."""
+    from burg_drake.cameras.sources import open_source
+
+    size = (intrinsics.width, intrinsics.height)
+    return open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
+
+
+def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
+    from burg_drake.cameras.optics import load_intrinsics
+
+    if arguments.intrinsics is not None:
+        return load_intrinsics(arguments.intrinsics)
+    if not arguments.camera.startswith(SIMULATED):
+        raise InvalidInputError(
+            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
+            " one"
+        )
+    return load_intrinsics(arguments.camera)
+
+
+def _require_places(arguments: argparse.Namespace) -> None:
+    """Refuses results that cannot be written, before anything else is done."""
+    from burg_drake.cameras.live import require_new_folder, require_video_path
+    from burg_drake.core.files import writable_folder
+
+    if arguments.record is not None:
+        require_video_path(arguments.record, plain=arguments.plain)
+    if arguments.snapshot is not None:
+        require_new_folder(arguments.snapshot)
+    if not arguments.no_browser:
+        writable_folder(arguments.output)
+
+
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = number(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
+    return value

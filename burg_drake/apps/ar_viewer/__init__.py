@@ -1,1 +1,0 @@
-"""The live view's page and its server."""

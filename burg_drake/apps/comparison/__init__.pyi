@@ -1,0 +1,4 @@
+from . import (
+    compare as compare,
+    gap as gap,
+)

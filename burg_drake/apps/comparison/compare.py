@@ -1,0 +1,162 @@
+"""`burg-drake compare`: simulated outcomes against real ones, or against another simulation."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.comparison.rejudge import (
+    add_rejudge,
+    rejudge_for,
+    rejudge_words,
+    rejudged_json,
+    rejudged_sections,
+    show_rejudged,
+)
+from burg_drake.apps.options import add_verb, not_negative, seed
+from burg_drake.core import InvalidInputError, shown
+
+if TYPE_CHECKING:
+    from burg_drake.experiment.comparison import Comparison
+    from burg_drake.experiment.gap import Rejudging
+
+# Kept in step with experiment.comparison, which imports too much for a help text; a test compares
+# them.
+SUCCESSES = ("lifted", "held")
+DEFAULT_LIMIT_MM = 2.0
+TRIALS = (".yaml", ".yml")
+"""Suffixes of trials files."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "compare",
+        run_compare,
+        "compare simulated grasps with trials on the robot, or with another simulation",
+        "burg-drake compare runs/first trials.yaml --html compare.html",
+        "burg-drake compare runs/first trials.yaml --json",
+        "burg-drake compare runs/first trials.yaml --rejudge --html compare.html",
+        "burg-drake compare runs/screening runs/standard",
+        "burg-drake compare runs/screening runs/standard trials.yaml",
+        "",
+        "Of two runs the second is what the first is measured by. With trials both are measured by",
+        "them, and McNemar's test tells whether one is right more often.",
+    )
+    parser.add_argument("run_folder", metavar="RUN", help="folder of a run: its verdicts")
+    parser.add_argument(
+        "others",
+        metavar="RUN|TRIALS",
+        nargs="+",
+        help="trials file (.yaml), or folder of another run of the same grasps, or both",
+    )
+    parser.add_argument(
+        "--success",
+        choices=SUCCESSES,
+        help="what counts: lifted, or held, also where another object was disturbed (default: what"
+        " the trials were planned with, or lifted)",
+    )
+    parser.add_argument(
+        "--placement-limit-mm",
+        metavar="MM",
+        type=not_negative,
+        default=DEFAULT_LIMIT_MM,
+        help="how far off every object may be in trials with good placement (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--robustness",
+        metavar="FILE",
+        help="table of robustness whose shares of success are a predicted probability (default:"
+        " robustness.csv in RUN, if it is there)",
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=seed, default=0, help="of the intervals (default: %(default)s)"
+    )
+    parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
+    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_rejudge(parser)
+
+
+def run_compare(arguments: argparse.Namespace) -> int:
+    """Compares."""
+    from burg_drake.core.files import atomic_write, require_writable
+    from burg_drake.experiment.comparison import compare
+
+    second, trials = _others(arguments.run_folder, arguments.others)
+    if arguments.html is not None:
+        require_writable(arguments.html)
+    found = compare(
+        arguments.run_folder,
+        second,
+        trials,
+        success=arguments.success,
+        placement_limit_mm=arguments.placement_limit_mm,
+        robustness=arguments.robustness,
+        seed=arguments.seed,
+    )
+    again = rejudge_for(arguments)
+    if arguments.html is not None:
+        from burg_drake.experiment.comparison.report import comparison_page
+
+        line, more = command_line(arguments), rejudged_sections(again)
+        page = comparison_page(found, Path(arguments.html), line, more)
+        atomic_write(arguments.html, page)
+    _print(found, again, arguments)
+    return 0
+
+
+def command_line(arguments: argparse.Namespace) -> str:
+    """The command that makes this comparison again."""
+    import shlex
+
+    words = ["burg-drake", "compare", arguments.run_folder, *arguments.others]
+    words += [] if arguments.success is None else ["--success", arguments.success]
+    if arguments.placement_limit_mm != DEFAULT_LIMIT_MM:
+        words += ["--placement-limit-mm", f"{arguments.placement_limit_mm:g}"]
+    words += [] if arguments.robustness is None else ["--robustness", arguments.robustness]
+    words += [] if arguments.seed == 0 else ["--seed", str(arguments.seed)]
+    words += rejudge_words(arguments)
+    return shlex.join([*words, "--html", arguments.html])
+
+
+def _print(found: Comparison, again: Rejudging | None, arguments: argparse.Namespace) -> None:
+    if arguments.json:
+        from burg_drake.experiment.comparison import comparison_json
+
+        print(comparison_json(found, rejudged_json(again)), end="")
+        return
+    from rich.console import Console
+
+    from burg_drake.experiment.comparison import comparison_tables
+
+    console = Console(markup=False, highlight=False)
+    for part in comparison_tables(found):
+        console.print(part, crop=False)
+        if not isinstance(part, str) or not part.startswith(("differs", "note")):
+            console.print()
+    show_rejudged(again)
+    if arguments.html is not None:
+        print(f"page    {arguments.html}")
+
+
+def _others(first: str, paths: list[str]) -> tuple[str, str | None]:
+    """What the run is compared with, and the trials if that is another run."""
+    if len(paths) > 2:
+        raise InvalidInputError(
+            f"{len(paths) + 1} things to compare; give RUN TRIALS, RUN RUN, or RUN RUN TRIALS"
+        )
+    if Path(first).suffix in TRIALS and Path(first).is_file():
+        raise InvalidInputError(f"{shown(first)} is no run; give the run first, then the trials")
+    kinds = [Path(path).suffix in TRIALS for path in paths]
+    if kinds == [True, False]:
+        raise InvalidInputError(
+            f"{shown(paths[0])} is before {shown(paths[1])}; give the trials file last"
+        )
+    if len(paths) == 2 and kinds != [False, True]:
+        raise InvalidInputError(
+            f"of {shown(paths[0])} and {shown(paths[1])} the last one has to be a trials file"
+            " (.yaml), and it alone"
+        )
+    return paths[0], paths[1] if len(paths) == 2 else None

@@ -1,0 +1,265 @@
+"""`burg-drake gap`: where grasps are lost between a hand alone and a robot in a real scene."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    DEFAULT_APPROACH_ANGLE,
+    DEFAULT_ENGINE,
+    DEFAULT_STATION,
+    ENGINE_NAMES,
+    NAMES,
+    SCENE_NAMES,
+    Parser,
+    add_cluster,
+    add_given,
+    add_motion,
+    add_quiet,
+    add_sampling,
+    add_verb,
+    chosen_cluster,
+    chosen_motion,
+    grasps_per_object,
+    not_negative,
+    positive_int,
+    read_given,
+    require_file,
+    require_sampled,
+    workers,
+)
+from burg_drake.apps.runs import MODES
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.store import Run
+    from burg_drake.evaluation.workers import Executor
+    from burg_drake.experiment.gap import GapSteps
+    from burg_drake.experiment.trials import TrialSheet
+
+DEFAULT_GRASPS = 20
+# Kept in step with experiment.gap, which imports too much for a help text; a test compares them.
+DEFAULT_SAMPLES, DEFAULT_MM, DEFAULT_DEG = 5, 2.0, 2.0
+OF_SCENES = ("station", "grasps_per_object", "blind", "only", "approach_angle", "engine", "grasps")
+"""Options that a run answers itself."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "gap",
+        run_gap,
+        "judge the same grasps by the hand alone, with the arm, by the whole arm, and with objects"
+        " displaced: what each step loses",
+        "burg-drake gap tabletop_six -o gap",
+        "burg-drake gap runs/first -o gap",
+        "burg-drake gap tabletop_six -n 50 --placement-sd-mm 5 --samples 10 -o gap",
+        "burg-drake gap runs/first --trials trials.yaml -o gap",
+        "burg-drake gap tabletop_six --mode reach --samples 0 -o gap",
+        "",
+        "The same command goes on where an interrupted one stopped. Every step is an ordinary run.",
+    )
+    parser.add_argument(
+        "source",
+        metavar="SCENE|RUN",
+        help="folder of a run, whose grasps are judged; or a scene file, or name of a built-in one:"
+        f" {', '.join(SCENE_NAMES)}",
+    )
+    parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder for the steps")
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        help=f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+    )
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        help="the last step before objects are displaced (default: arm, or hand without an arm)",
+    )
+    _add_displaced(parser)
+    which = parser.add_mutually_exclusive_group()
+    add_sampling(parser, DEFAULT_GRASPS, which)
+    add_given(parser, which)
+    parser.add_argument(
+        "--engine", choices=ENGINE_NAMES, help=f"with a scene (default: {DEFAULT_ENGINE})"
+    )
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
+    )
+    add_cluster(who)
+    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    add_motion(parser)
+    add_quiet(parser)
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def _add_displaced(parser: Parser) -> None:
+    group = parser.add_argument_group("displaced objects")
+    group.add_argument(
+        "--placement-sd-mm",
+        metavar="MM",
+        type=not_negative,
+        default=DEFAULT_MM,
+        help="standard deviation of each object along x and along y (default: %(default)g)",
+    )
+    group.add_argument(
+        "--placement-sd-deg",
+        metavar="DEG",
+        type=not_negative,
+        default=DEFAULT_DEG,
+        help="standard deviation of its turn about the vertical (default: %(default)g)",
+    )
+    group.add_argument(
+        "--samples",
+        metavar="K",
+        type=_samples,
+        default=DEFAULT_SAMPLES,
+        help="number of displaced scenes; 0 leaves the step out (default: %(default)s)",
+    )
+    group.add_argument(
+        "--trials", metavar="FILE", help="real trials, to compare each step's verdicts with"
+    )
+
+
+def run_gap(arguments: argparse.Namespace) -> int:
+    """Judges step by step and reports; 1 if some grasps could not be simulated."""
+    from burg_drake.core.files import atomic_write
+    from burg_drake.evaluation.store import RUN_FILE, is_campaign, load_run, load_runs
+    from burg_drake.experiment.gap import agreement_by_step, gap_changes, tried_grasps
+    from burg_drake.experiment.gap.report import (
+        REPORT_FILE,
+        gap_json,
+        reality_view,
+        step_sentences,
+        steps_view,
+        write_gap_report,
+    )
+    from burg_drake.experiment.trials import load_trials
+
+    sheet = None if arguments.trials is None else load_trials(arguments.trials)
+    of_run = (Path(arguments.source) / RUN_FILE).is_file()
+    if is_campaign(arguments.source):
+        raise InvalidInputError(
+            f"{arguments.source} is a run over many scenes; give the run of one of them, such as"
+            f" {load_runs(arguments.source)[0].path}"
+        )
+    run = load_run(arguments.source) if of_run else None
+    if sheet is not None and run is not None:
+        tried_grasps(sheet, arguments.trials, run)  # refuses other grasps before any work
+    with chosen_cluster(arguments) as cluster:
+        ladder = _measure(arguments, run, sheet, cluster)
+    success = "lifted" if sheet is None else sheet.selection.success
+    tried = [] if sheet is None else tried_grasps(sheet, arguments.trials, ladder.first)
+    agreement = agreement_by_step(ladder, tried, success) if tried else ()
+    found = gap_changes(ladder, success)
+    line = shlex.join(["burg-drake", *sys.argv[1:]])
+    write_gap_report(ladder, success, agreement, line)
+    text = json.dumps(gap_json(ladder, found, agreement, success), indent=1) + "\n"
+    atomic_write(ladder.path / "gap.json", text)
+    if arguments.json:
+        sys.stdout.write(text)
+    else:
+        for sentence in step_sentences(ladder, found, success):
+            print(sentence)
+        print()
+        steps_view(ladder, found).show()
+        if agreement:
+            reality_view(agreement).show()
+        elif sheet is not None:
+            print(f"{arguments.trials} has no trials of these grasps in this scene")
+        print(f"report  {ladder.path / REPORT_FILE}")
+    return _failures(ladder)
+
+
+def _measure(
+    arguments: argparse.Namespace,
+    run: Run | None,
+    sheet: TrialSheet | None,
+    cluster: Executor | None,
+) -> GapSteps:
+    from burg_drake.core.workers import default_workers
+    from burg_drake.evaluation.workers import LocalExecutor
+    from burg_drake.experiment.gap import PlacementNoise, measure_gap
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.document import load_station
+
+    noise = PlacementNoise(
+        place=arguments.placement_sd_mm / 1000.0,
+        turn=math.radians(arguments.placement_sd_deg),
+        seed=arguments.seed,
+    )
+    tried = () if sheet is None else tuple(dict.fromkeys(t.grasp for t in sheet.trials))
+    options: dict[str, Any] = {
+        "last": arguments.mode,
+        "noise": noise,
+        "samples": arguments.samples,
+        "tried": tried,
+        "executor": cluster or LocalExecutor(arguments.workers or default_workers()),
+        "progress": not arguments.quiet,
+    }
+    require_file(arguments)
+    if run is not None:
+        _require_own(arguments, run)
+        return measure_gap(run, arguments.output, **options)
+    require_sampled(arguments)
+    scene = load_scene(arguments.source)
+    station = load_station(arguments.station or DEFAULT_STATION)
+    given = None if arguments.grasps is None else read_given(arguments, scene, station)
+    for note in given.notes if given else ():
+        print(f"note: {note}", file=sys.stderr)
+    return measure_gap(
+        scene,
+        arguments.output,
+        station=station,
+        engine=arguments.engine or DEFAULT_ENGINE,
+        motion=chosen_motion(arguments, station),
+        seed=arguments.seed,
+        grasps=given.by_instance if given else None,
+        grasps_per_object=grasps_per_object(arguments),
+        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+        blind=arguments.blind,
+        only=arguments.only,
+        **options,
+    )
+
+
+def _require_own(arguments: argparse.Namespace, run: Run) -> None:
+    """Refuses options that the run answers itself.
+
+    Raises:
+        InvalidInputError: names the option.
+    """
+    for name in (*OF_SCENES, *NAMES.values()):
+        if getattr(arguments, name) not in (None, False):
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} is about a scene; {run.path} is a run, which has"
+                " grasps, station, engine and motion of its own: leave it away"
+            )
+
+
+def _samples(text: str) -> int:
+    """A whole number from 0."""
+    return 0 if text == "0" else positive_int(text)
+
+
+def _failures(ladder: GapSteps) -> int:
+    runs = [run for step in ladder.steps for run in step.runs] + list(ladder.tried)
+    failed = [(run, id) for run in runs for id in run.failures]
+    if not failed:
+        return 0
+    run, id = failed[0]
+    again = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", id])
+    print(
+        f"burg-drake: {len(failed)} trials could not be simulated, such as {id} in {run.path}"
+        f" ({again} tries it again)",
+        file=sys.stderr,
+    )
+    return 1

@@ -1,0 +1,169 @@
+"""`burg-drake grasps stats`: what a set of grasps holds, and how it compares with another one."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    add_file_options,
+    add_hand,
+    add_renaming,
+    add_verb,
+    gripper_for,
+    not_negative,
+)
+from burg_drake.core import InvalidInputError
+from burg_drake.core.files import atomic_write, require_writable
+
+if TYPE_CHECKING:
+    from burg_drake.formats.common import ImportedGrasps
+    from burg_drake.grasping.similarity import Tolerance
+
+# Kept in step with grasping.pose_search and grasping.similarity, which import too much for a help
+# text; a test compares them.
+DEFAULT_TRANSLATION_MM = 15.0
+DEFAULT_ANGLE_DEG = 15.0
+DEFAULT_MM_PER_DEG = 1.0
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        group,
+        "stats",
+        run_stats,
+        "print what grasps there are, and how far one set covers another",
+        "burg-drake grasps stats grasps.h5",
+        "burg-drake grasps stats reference.h5 mine.h5 --translation-mm 10 --angle-deg 20",
+        "burg-drake grasps stats reference.h5 mine.h5 --distance-mm 15 --angle-deg 180",
+        "burg-drake grasps stats runs/first --ap outcome --json stats.json",
+        "",
+        "Distances do not tell the two fingers apart, and join grasps of the same object only (and",
+        "of the same instance, where both sets name instances).",
+    )
+    parser.add_argument("a", metavar="A", help="grasp file of any format, or folder of a run")
+    parser.add_argument("b", metavar="B", nargs="?", help="another one, to compare with A")
+    add_file_options(parser)
+    add_hand(parser, default=None)
+    add_renaming(parser)
+    match = parser.add_argument_group("what counts as a match of A and B (all must hold)")
+    for name, unit, default, what in (
+        ("translation", "mm", DEFAULT_TRANSLATION_MM, "distance of the grasp frames"),
+        ("angle", "deg", DEFAULT_ANGLE_DEG, "angle between them"),
+        ("distance", "mm", math.inf, "sum of the two, with --mm-per-deg for each degree"),
+    ):
+        shown = "not bounded" if math.isinf(default) else f"{default:g}"
+        match.add_argument(
+            f"--{name}-{unit}",
+            metavar=unit.upper(),
+            type=not_negative,
+            default=default,
+            help=f"largest {what} (default: {shown})",
+        )
+    parser.add_argument(
+        "--mm-per-deg",
+        metavar="MM",
+        type=not_negative,
+        default=DEFAULT_MM_PER_DEG,
+        help="what one degree counts in combined distances (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--ap",
+        metavar="COLUMN",
+        help="average precision of the scores, judged by a column: friction_needed (where what"
+        " collides is bad, by clearance, screened or outcome), outcome, or one of 0 and 1",
+    )
+    parser.add_argument("--json", metavar="FILE", help="write all figures to this file")
+
+
+def run_stats(arguments: argparse.Namespace) -> int:
+    """Prints the figures of one set or two."""
+    from burg_drake.apps.grasps.stats_tables import print_comparison, print_ranking, print_summary
+    from burg_drake.evaluation.grasp_sets import read_input
+    from burg_drake.grasping.comparison import compare_grasps, rank_by, summarize
+
+    if arguments.json is not None:
+        require_writable(arguments.json)
+    tolerance, column = _tolerance(arguments), arguments.ap
+    paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
+    told = arguments.hand or arguments.gripper_link
+    gripper = gripper_for(arguments) if told else None
+    sets = [read_input(path, arguments.source, gripper) for path in paths]
+    sets = _renamed(sets, dict(arguments.rename))
+    _check_frames(paths, sets)
+    summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]
+    rankings = [] if column is None else [rank_by(s.grasps, column) for s in sets]
+    comparison = (
+        compare_grasps(sets[0].grasps, sets[1].grasps, tolerance) if len(sets) == 2 else None
+    )
+    for k, path in enumerate(paths):
+        print_summary(path, summaries[k], sets[k].notes, sets[k].frame)
+        if rankings:
+            print_ranking(rankings[k])
+    if comparison is not None:
+        print_comparison(comparison)
+    if arguments.json is not None:
+        inputs = [{"file": p, "frame": s.frame} for p, s in zip(paths, sets, strict=True)]
+        figures = {"sets": inputs, "summaries": summaries, "rankings": rankings}
+        text = json.dumps(_plain({**figures, "comparison": comparison}), indent=2)
+        atomic_write(arguments.json, text + "\n")
+        print(f"wrote {arguments.json}")
+    return 0
+
+
+def _tolerance(arguments: argparse.Namespace) -> Tolerance:
+    from burg_drake.grasping.similarity import Tolerance
+
+    return Tolerance(
+        translation=1e-3 * arguments.translation_mm,
+        angle=math.radians(arguments.angle_deg),
+        distance=1e-3 * arguments.distance_mm,
+        lever=1e-3 * arguments.mm_per_deg / math.radians(1.0),
+    )
+
+
+def _renamed(sets: list[ImportedGrasps], names: dict[str, str]) -> list[ImportedGrasps]:
+    """The sets with other names of their objects; one that no set has is refused."""
+    from burg_drake.formats.common import with_objects_renamed
+
+    known = [set(imported.grasps.object.tolist()) for imported in sets]
+    everywhere = set().union(*known)
+    found = []
+    for imported, own in zip(sets, known, strict=True):
+        others = everywhere - own  # may be in one set only
+        mine = {theirs: ours for theirs, ours in names.items() if theirs not in others}
+        found.append(
+            dataclasses.replace(imported, grasps=with_objects_renamed(imported.grasps, mine))
+        )
+    return found
+
+
+def _check_frames(paths: list[str], sets: list[ImportedGrasps]) -> None:
+    if len({imported.frame for imported in sets}) > 1:
+        frames = " and ".join(f"{p} ({s.frame})" for p, s in zip(paths, sets, strict=True))
+        raise InvalidInputError(
+            f"grasps are measured in different frames: {frames}; place them first with"
+            " `burg-drake grasps convert --scene`"
+        )
+
+
+def _plain(value: Any) -> Any:
+    """JSON values: shares with their value, null for what is not finite."""
+    from burg_drake.grasping.comparison import Share, TopPrecision
+
+    if isinstance(value, TopPrecision):
+        figures = {"ap": value.ap, "attainable": value.attainable, "kept": len(value.kept)}
+        by_criterion = value.by_criterion.tolist()
+        return _plain({**figures, "by_criterion": by_criterion, "version": value.version})
+    if dataclasses.is_dataclass(value):
+        fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        return _plain({**fields, "share": value.value} if isinstance(value, Share) else fields)
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,160 @@
+"""Tables of `burg-drake grasps stats`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeVar
+
+from burg_drake.apps.terminal import QUANTILES as SHOWN_QUANTILES, print_numbers
+from burg_drake.core.terminal import TextTable, count, figure, percent
+from burg_drake.grasping.comparison import (
+    FRICTION_NEEDED,
+    QUANTILES,
+    Distribution,
+    Ranking,
+    SetComparison,
+    SetSummary,
+)
+from burg_drake.grasping.similarity import Tolerance
+
+MOST_VALUES = 6
+"""Different values of a text column that are printed."""
+
+ALL = "all"
+
+Row = TypeVar("Row")
+
+
+def print_summary(
+    title: str, summary: SetSummary, notes: Sequence[str] = (), frame: str = "object"
+) -> None:
+    """Prints the figures of one set: by object, then by column.
+
+    Args:
+        title: names the set.
+        summary: its figures.
+        notes: what was left behind as it was read.
+        frame: what its poses are measured in.
+    """
+    summary_table(title, summary).show()
+    numbers = {name: values for name, values in summary.numbers.items() if values.count}
+    print_numbers("", {name: (of.count, _figures(of)) for name, of in numbers.items()}, frame)
+    for name, share in summary.truths.items():
+        print(f"{name}: {share.count:,} of {share.total:,} ({percent(share.value)})")
+    for name, counts in summary.texts.items():
+        if 1 < len(counts) < summary.overall.grasps or name == "outcome":
+            print(f"{name}: {_occurrences(counts)}")
+    for note in notes:
+        print(note)
+
+
+def summary_table(title: str, summary: SetSummary) -> TextTable:
+    """Figures of one set by object."""
+    table = TextTable(title).names("object").numbers("grasps", "inst.", "equal")
+    table.numbers("width\n[mm]", "score", "nearest\n[mm]")
+    table.caption = "Means of width, score, and combined distance to the nearest other grasp."
+    for name, one in _with_all(summary.objects, summary.overall):
+        table.row(
+            name or "-",
+            count(one.grasps),
+            count(one.instances or None),
+            count(one.duplicates),
+            figure(1e3 * one.width.mean, 1),
+            figure(one.score.mean, 3),
+            figure(1e3 * one.neighbour.mean, 1),
+        )
+    return table
+
+
+def comparison_table(comparison: SetComparison) -> TextTable:
+    """How two sets compare, by object."""
+    table = TextTable("A and B").names("object").numbers("A", "B", "A has\nB near", "B has\nA near")
+    table.numbers("A to B\n[mm]", "95 %\n[mm]", "shift\n[mm]", "turn\n[deg]", "B to A\n[mm]")
+    table.caption = (
+        f"Near is {_bounds(comparison.tolerance)}. Medians of distances to the nearest grasp, where"
+        " a degree counts"
+        f" {1e3 * comparison.tolerance.lever * math.radians(1.0):g} mm."
+    )
+    for name, one in _with_all(comparison.objects, comparison.overall):
+        table.row(
+            name or "-",
+            count(one.coverage.total),
+            count(one.precision.total),
+            percent(one.coverage.value),
+            percent(one.precision.value),
+            figure(1e3 * one.to_grasps.median, 1),
+            figure(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)], 1),
+            figure(1e3 * one.translation.median, 1),
+            figure(math.degrees(one.angle.median), 1),
+            figure(1e3 * one.to_reference.median, 1),
+        )
+    return table
+
+
+def ranking_table(ranking: Ranking) -> TextTable:
+    """Average precision, by criterion."""
+    top = ranking.top
+    table = TextTable(f"scores judged by {ranking.column}").names("good if")
+    table.numbers("good", "AP", f"AP of the top {len(top.precision)}")
+    rows = zip(
+        ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
+    )
+    for name, good, ap, ap_top in rows:
+        of = f"{count(good)} of {count(ranking.grasps)}"
+        table.row(name, of, figure(ap, 3), figure(ap_top, 3))
+    return table
+
+
+def print_comparison(comparison: SetComparison) -> None:
+    """Prints how two sets compare, by object."""
+    comparison_table(comparison).show()
+    overall = comparison.overall
+    print(f"coverage: B has {percent(overall.coverage.value)} of A")
+    print(f"precision: A has {percent(overall.precision.value)} of B")
+    print(f"ids in both: {comparison.shared_ids:,}")
+
+
+def print_ranking(ranking: Ranking) -> None:
+    """Prints average precision, by criterion."""
+    ranking_table(ranking).show()
+    top = ranking.top
+    length = len(top.precision)
+    print(
+        f"AP is precision over recall. GraspNet-1Billion's AP of the top {length} is {top.ap:.3f};"
+        f" it would be {top.attainable:.3f} if all {len(top.kept)} grasps that suppression leaves"
+        " were good."
+    )
+    if ranking.colliding is not None:
+        print(f"{ranking.colliding:,} collide, counted as bad.")
+    elif ranking.column == FRICTION_NEEDED:
+        print("Collisions unknown, not counted: no column `clearance`, `screened` or `outcome`.")
+
+
+def _with_all(objects: dict[str, Row], overall: Row) -> list[tuple[str, Row]]:
+    """Rows by object, and one of all if there are several."""
+    rows = list(objects.items())
+    return rows if len(rows) == 1 else [*rows, (ALL, overall)]
+
+
+def _figures(values: Distribution) -> dict[str, float]:
+    """Mean and quantiles by name."""
+    shown = {f"{q:.0%}": values.quantiles[QUANTILES.index(q)] for q in SHOWN_QUANTILES}
+    return {"mean": values.mean, **shown}
+
+
+def _bounds(tolerance: Tolerance) -> str:
+    bounds = []
+    if math.isfinite(tolerance.translation):
+        bounds.append(f"{1e3 * tolerance.translation:g} mm")
+    if tolerance.angle < math.pi:
+        bounds.append(f"{math.degrees(tolerance.angle):g} degrees")
+    if math.isfinite(tolerance.distance):
+        bounds.append(f"{1e3 * tolerance.distance:g} mm combined")
+    return "within " + ", ".join(bounds) if bounds else "anything"
+
+
+def _occurrences(counts: dict[str, int]) -> str:
+    shown = [f"{name or '(none)'} {count:,}" for name, count in list(counts.items())[:MOST_VALUES]]
+    more = len(counts) - len(shown)
+    return ", ".join(shown) + (f" and {more:,} more" if more else "")

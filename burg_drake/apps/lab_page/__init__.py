@@ -1,1 +1,0 @@
-"""The page of the lab: trials are entered where they are carried out."""

@@ -1,0 +1,237 @@
+"""`burg-drake library`: the verbs that build, check and show object libraries."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from burg_drake.apps.library.building import run_add, run_build, run_import_burg, run_import_ycb
+from burg_drake.apps.library.viewing import run_check, run_list, run_show
+from burg_drake.apps.options import (
+    Parser,
+    add_group,
+    add_quiet,
+    add_verb,
+    add_view,
+    coefficient,
+    friction,
+    named_positive,
+    positive,
+    workers,
+)
+
+# Kept in step with objects.meshes and objects.library, which import too much for a help text; a
+# test compares them.
+UNIT_NAMES = ("mm", "cm", "m", "in")
+CONTACT_KINDS = ("pieces", "compliant_pieces", "mesh", "primitive")
+
+FORMATS_TEXT = """\
+meshes: up to 512 MB and 2,000,000 triangles (1,000,000 of an open surface, which becomes a wall),
+textures up to 8192 x 8192 pixels; larger ones are refused
+
+format of masses.yaml: 'NAME: KG' lines, NAME a mesh file without its suffix
+  mug: 0.118
+  cracker_box: 0.411
+
+format of objects.yaml, with all that can be said of an object:
+  version: 1
+  defaults: {unit: mm, friction: 0.4}
+  objects:
+    mug: {mesh: scans/mug.obj, mass: 0.118}
+    tin: {mesh: scans/tin.stl, mass: 0.05, wall_thickness: 0.0003}
+    rack: {mesh: scans/rack.stl, mass: 0.4, decomposition: {threshold: 0.02}}
+
+convex pieces: 'decomposition.threshold' says how finely a shape is cut into them (0.01 to 1,
+default 0.05). Pieces of more than 1.25 times the volume, or off by more than 5 % of the diagonal,
+are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 96 pieces, and
+build says what came of it"""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verbs."""
+    group = add_group(verbs, "library", "build, check and show object libraries")
+    _add_build(group)
+    _add_add(group)
+    _add_imports(group)
+    _add_views(group)
+
+
+def _add_build(group: Any) -> None:
+    build = add_verb(
+        group,
+        "build",
+        run_build,
+        "make simulation-ready objects from meshes; what has not changed is not built again",
+        "burg-drake library build scans/*.obj -o my_library",
+        "burg-drake library build mug.stl -o my_library --unit mm --mass mug=0.118",
+        "burg-drake library build scans/ -o my_library --masses masses.yaml --friction 0.4",
+        "burg-drake library build objects.yaml -o my_library",
+    )
+    build.epilog = f"{build.epilog}\n\n{FORMATS_TEXT}"
+    build.add_argument(
+        "meshes",
+        metavar="MESH",
+        nargs="+",
+        help="mesh files (obj, ply, stl, off, glb, gltf), folders of them, or an objects.yaml",
+    )
+    _add_output(build)
+    _add_named_values(build)
+    _add_common_values(build)
+
+
+def _add_add(group: Any) -> None:
+    add = add_verb(
+        group,
+        "add",
+        run_add,
+        "add one object to a library, or build it anew (what is not given gets its default)",
+        "burg-drake library add my_library mug.obj --mass 0.118 --friction 0.4",
+        "burg-drake library add my_library scan_7.ply --name towel --mass 0.2"
+        " --wall-thickness 0.005",
+    )
+    add.add_argument("library", metavar="LIBRARY", help="folder of the library")
+    add.add_argument("mesh", metavar="MESH", help="mesh file")
+    add.add_argument("--name", help="the object's name (default: that of the mesh file)")
+    add.add_argument("--mass", metavar="KG", type=positive, help="mass")
+    add.add_argument("--friction", metavar="MU", type=coefficient, help="default: 0.24")
+    add.add_argument("--description", metavar="TEXT", help="for people")
+    _add_common_values(add)
+
+
+def _add_imports(group: Any) -> None:
+    burg = add_verb(
+        group,
+        "import-burg",
+        run_import_burg,
+        "build a library from an object_library.yaml of BURG-Toolkit",
+        "burg-drake library import-burg object_library.yaml -o my_library",
+        "burg-drake library import-burg object_library.yaml -o my_library --mass table=4",
+    )
+    burg.add_argument("file", metavar="FILE", help="object_library.yaml, version 1.0")
+    burg.add_argument(
+        "--skip", metavar="NAME", action="append", default=[], help="leave an object out"
+    )
+    ycb = add_verb(
+        group,
+        "import-ycb",
+        run_import_ycb,
+        "build a library from a download of the YCB object set, with its published masses",
+        "burg-drake library import-ycb ~/data/ycb -o ycb_library",
+    )
+    ycb.add_argument(
+        "folder", metavar="DIR", help="folder that holds the objects' folders or files"
+    )
+    for verb, without in ((burg, " (default: they stay fixed, as background)"), (ycb, "")):
+        _add_output(verb)
+        _add_named_values(verb)
+        verb.add_argument(
+            "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
+        )
+        _add_effort(verb)
+
+
+def _add_views(group: Any) -> None:
+    listing = add_verb(
+        group,
+        "list",
+        run_list,
+        "list the objects of a library",
+        "burg-drake library list household",
+        "burg-drake library list my_library",
+    )
+    check = add_verb(
+        group,
+        "check",
+        run_check,
+        "say what is missing, stale or implausible (exit code 1 if something has to be mended)",
+        "burg-drake library check my_library",
+    )
+    show = add_verb(
+        group,
+        "show",
+        run_show,
+        "show objects, their convex pieces, contact surfaces and stable poses in Meshcat",
+        "burg-drake library show household",
+        "burg-drake library show my_library --only mug --only bowl",
+        "burg-drake library show my_library --html gallery.html --sheet sheet.html",
+    )
+    for verb in (listing, check, show):
+        verb.add_argument(
+            "library", metavar="LIBRARY", help="folder of a library, or name of a built-in one"
+        )
+    show.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help="this object alone; may be given several times",
+    )
+    show.add_argument(
+        "--sheet", metavar="FILE", help="write a contact sheet: one page with pictures and figures"
+    )
+    add_view(show)
+
+
+def _add_output(parser: Parser) -> None:
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", required=True, help="folder of the library"
+    )
+    parser.add_argument("--name", help="the library's name (default: that of its folder)")
+
+
+def _add_named_values(parser: Parser) -> None:
+    parser.add_argument(
+        "--mass",
+        metavar="NAME=KG",
+        type=named_positive,
+        action="append",
+        default=[],
+        help="mass of an object; may be given several times",
+    )
+    parser.add_argument(
+        "--masses", metavar="FILE", help="YAML file of 'NAME: KG' lines; --mass goes first"
+    )
+    parser.add_argument(
+        "--friction",
+        metavar="[NAME=]MU",
+        type=friction,
+        action="append",
+        default=[],
+        help="coefficient of one object or of all (default: 0.24)",
+    )
+
+
+def _add_common_values(parser: Parser) -> None:
+    parser.add_argument(
+        "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
+    )
+    scale = parser.add_mutually_exclusive_group()
+    scale.add_argument("--unit", choices=UNIT_NAMES, help="unit of the meshes (default: m)")
+    scale.add_argument(
+        "--scale", type=positive, help="factor from the meshes' unit to metres: 0.0005, for example"
+    )
+    parser.add_argument(
+        "--wall-thickness",
+        metavar="M",
+        type=positive,
+        help="closed surfaces are hollow, with such a wall; open ones become such a wall",
+    )
+    parser.add_argument(
+        "--openings",
+        choices=("wall", "close"),
+        help="large openings: make the surface a wall (default), or close them",
+    )
+    parser.add_argument(
+        "--contact",
+        choices=CONTACT_KINDS,
+        help="what touches others in simulation (default: by the object's shape)",
+    )
+    _add_effort(parser)
+
+
+def _add_effort(parser: Parser) -> None:
+    parser.add_argument(
+        "--no-confirm", action="store_true", help="do not simulate the stable poses"
+    )
+    parser.add_argument(
+        "--workers", type=workers, metavar="N", help="processes (default: one a processor)"
+    )
+    add_quiet(parser)

@@ -1,0 +1,72 @@
+from .arguments import (
+    DEFAULT_APPROACH_ANGLE as DEFAULT_APPROACH_ANGLE,
+    DEFAULT_ENGINE as DEFAULT_ENGINE,
+    DEFAULT_STATION as DEFAULT_STATION,
+    ENGINE_NAMES as ENGINE_NAMES,
+    SCENE_NAMES as SCENE_NAMES,
+    Parser as Parser,
+    add_group as add_group,
+    add_measured_board as add_measured_board,
+    add_only as add_only,
+    add_quiet as add_quiet,
+    add_renaming as add_renaming,
+    add_scene as add_scene,
+    add_station as add_station,
+    add_verb as add_verb,
+    add_view as add_view,
+    coefficient as coefficient,
+    examples as examples,
+    friction as friction,
+    measured_mm as measured_mm,
+    named_positive as named_positive,
+    not_negative as not_negative,
+    number as number,
+    port as port,
+    positive as positive,
+    positive_int as positive_int,
+    print_scale as print_scale,
+    seed as seed,
+    workers as workers,
+)
+from .cluster import (
+    add_cluster as add_cluster,
+    chosen_cluster as chosen_cluster,
+)
+from .given_grasps import (
+    add_given as add_given,
+    read_given as read_given,
+    require_file as require_file,
+)
+from .grasp_file import (
+    FRAMES as FRAMES,
+    add_camera_options as add_camera_options,
+    add_file_options as add_file_options,
+    add_file_station as add_file_station,
+    add_hand as add_hand,
+    gripper_for as gripper_for,
+    named_gripper as named_gripper,
+    station_for as station_for,
+)
+from .grasp_output import (
+    Output as Output,
+    add_format as add_format,
+    named as named,
+    output_of as output_of,
+    print_notes as print_notes,
+)
+from .hand_motion import (
+    NAMES as NAMES,
+    add_motion as add_motion,
+    chosen_motion as chosen_motion,
+    require_standoff_of_arm as require_standoff_of_arm,
+)
+from .retries import (
+    add_retry_failed as add_retry_failed,
+    how_to_retry as how_to_retry,
+)
+from .sampling import (
+    add_sampling as add_sampling,
+    grasps_per_object as grasps_per_object,
+    print_shortfalls as print_shortfalls,
+    require_sampled as require_sampled,
+)

@@ -1,0 +1,284 @@
+"""Arguments that several verbs share, and what values they accept."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import textwrap
+from typing import Any, NoReturn
+
+from burg_drake.core import did_you_mean, nearest, quoted, shown
+
+DEFAULT_STATION = "panda_tabletop"
+# Kept in step with station.engine, which imports too much for a help text; a test compares them.
+ENGINE_NAMES = ("reference", "standard", "screening")
+DEFAULT_ENGINE = "standard"
+# Likewise in step with evaluation.candidate_sampling.
+DEFAULT_APPROACH_ANGLE = 75.0
+# Likewise those that the package installs.
+SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
+
+
+MOST = 10_000_000
+"""What is counted: grasps, trials, rows."""
+MOST_WORKERS = 1024
+LARGEST_SEED = (1 << 64) - 1
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports an error in one line, and shows epilogs as they are written."""
+
+    def __init__(self, **options: Any) -> None:
+        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        options.setdefault("allow_abbrev", False)
+        super().__init__(**options)
+
+    def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
+        """Refuses what it does not know, for its verbs, too, which else leave that to the parser
+        of the whole command, whose help knows nothing of them."""
+        found, unknown = super().parse_known_args(*arguments, **named)
+        if unknown:
+            option = unknown[0].partition("=")[0]
+            known = self._option_string_actions if option.startswith("-") else ()
+            meant = did_you_mean(option, known)
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
+        return found, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Names the nearest of the choices, of verbs among them."""
+        if action.choices is not None and value not in action.choices:
+            known = nearest(str(value), map(str, action.choices))
+            raise argparse.ArgumentError(action, f"invalid choice: {quoted(value)}; {known}")
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the program with exit code 2."""
+        self.exit(2, f"burg-drake: error: {message} (see {self.prog} --help)\n")
+
+
+def examples(*lines: str) -> str:
+    """Epilog of a verb's help."""
+    return "examples:\n" + textwrap.indent("\n".join(lines), "  ")
+
+
+def add_verb(verbs: Any, name: str, run: Any, summary: str, *lines: str) -> Parser:
+    """Adds a verb.
+
+    Args:
+        verbs: what `add_subparsers` returned.
+        name: of the verb.
+        run: called with the parsed arguments; returns the exit code.
+        summary: one sentence.
+        lines: examples.
+    """
+    parser: Parser = verbs.add_parser(
+        name,
+        help=summary,
+        description=_sentence(summary),
+        epilog=examples(*lines),
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_group(verbs: Any, name: str, summary: str) -> Any:
+    """Adds a verb that has verbs of its own; returns what those are added to."""
+    parser = verbs.add_parser(name, help=summary, description=_sentence(summary))
+    return parser.add_subparsers(title="verbs", metavar="VERB", required=True)
+
+
+def _sentence(summary: str) -> str:
+    return f"{summary[0].upper()}{summary[1:]}."
+
+
+def add_scene(parser: Parser) -> None:
+    """The argument SCENE."""
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        help=f"scene file, or name of a built-in one: {', '.join(SCENE_NAMES)}",
+    )
+
+
+def add_measured_board(parser: Any) -> None:
+    """The option --measured-mm of verbs that look at a board that was printed already."""
+    parser.add_argument(
+        "--measured-mm",
+        metavar="X[,Y]",
+        type=measured_mm,
+        default=(100.0, 100.0),
+        help="what the printed board's rulers of 100 mm measure, along x and along y",
+    )
+
+
+def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
+    """Size of the print against the document along x and y, by --measured-mm."""
+    x, y = arguments.measured_mm
+    return x / 100.0, y / 100.0
+
+
+def add_station(parser: Parser) -> None:
+    """The option --station."""
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        default=DEFAULT_STATION,
+        help="station file or built-in name (default: %(default)s)",
+    )
+
+
+def add_only(parser: Parser, what: str) -> None:
+    """The option --only, by which all verbs choose objects.
+
+    Args:
+        parser: gets it.
+        what: is chosen, before "of this object".
+    """
+    parser.add_argument(
+        "--only",
+        metavar="OBJECT",
+        action="append",
+        help=f"{what} of this object, or instance of a scene, alone; may be given several times",
+    )
+
+
+def add_renaming(parser: Parser) -> None:
+    """The option --rename; evaluate, which is not about a file alone, calls it --grasps-object."""
+    parser.add_argument(
+        "--rename",
+        "--grasps-object",
+        metavar="[THEIRS=]OURS",
+        type=renaming,
+        action="append",
+        default=[],
+        help="call an object of the file otherwise; OURS alone is for all its grasps",
+    )
+
+
+def add_quiet(parser: Parser) -> None:
+    """The option --quiet of verbs that take long."""
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def add_view(parser: Parser) -> None:
+    """The options of verbs that show something."""
+    parser.add_argument(
+        "--html", metavar="FILE", help="write one self-contained page instead of a live view"
+    )
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="where the live view listens (default: first free)"
+    )
+    parser.add_argument(
+        "--no-wait", action="store_true", help="do not keep the live view open until Ctrl-C"
+    )
+
+
+def positive_int(text: str) -> int:
+    """A whole number from 1 that can be counted to."""
+    return _whole(text, 1, MOST)
+
+
+def workers(text: str) -> int:
+    """A number of processes."""
+    return _whole(text, 1, MOST_WORKERS)
+
+
+def _whole(text: str, low: int, high: int) -> int:
+    try:
+        value = int(text)
+    except ValueError:  # also of 4,300 digits
+        value = low - 1
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not a whole number from {low} to {high}"
+        )
+    return value
+
+
+def seed(text: str) -> int:
+    """A whole number from 0 with at most 64 bits, as documents have it."""
+    return _whole(text, 0, LARGEST_SEED)
+
+
+def port(text: str) -> int:
+    """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
+    return _whole(text, 1024, 65535)
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not above 0")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A finite number from 0."""
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
+    return value
+
+
+def approach_angle(text: str) -> float:
+    """An angle from straight down in degrees, above 0 to 180."""
+    value = number(text)
+    if not 0.0 < value <= 180.0:
+        raise argparse.ArgumentTypeError(
+            f"{shown(text)} is not an angle above 0, at most 180 degrees"
+        )
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not a finite number")
+    return value
+
+
+def named_positive(text: str) -> tuple[str, float]:
+    """`NAME=VALUE` with a value above 0."""
+    name, equals, value = text.rpartition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not NAME=VALUE, such as mug=0.118")
+    try:
+        return name, positive(value)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{name}: {error}") from error
+
+
+def friction(text: str) -> tuple[str, float]:
+    """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
+    name, _, value = text.rpartition("=")
+    return name, coefficient(value)
+
+
+def coefficient(text: str) -> float:
+    """A friction coefficient from 0."""
+    mu = number(text)
+    if mu < 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a friction coefficient from 0")
+    return mu
+
+
+def renaming(text: str) -> tuple[str, str]:
+    """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
+    theirs, _, ours = text.rpartition("=")
+    if not ours:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not THEIRS=OURS, such as Mug_3f2a=mug")
+    return theirs, ours
+
+
+def measured_mm(text: str) -> tuple[float, float]:
+    """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
+    values = [positive(part) for part in text.split(",")]
+    if len(values) > 2:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
+        )
+    return values[0], values[-1]

@@ -1,0 +1,88 @@
+"""Options by which `evaluate` takes grasps from files, of any origin."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options.arguments import Parser, renaming
+from burg_drake.apps.options.grasp_file import (
+    FRAMES,
+    add_camera_options,
+    add_gripper_link,
+    gripper_for,
+)
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.grasp_sets import GivenGrasps
+    from burg_drake.scene.document import Scene
+    from burg_drake.station.document import Station
+
+
+def add_given(parser: Parser, which: Any) -> None:
+    """Adds the options.
+
+    Args:
+        parser: gets a group of options.
+        which: group that --grasps is an alternative in.
+    """
+    which.add_argument(
+        "--grasps",
+        metavar="FILE|RUN",
+        help="judge the grasps of this file, ours or of another project, or those of the run in"
+        " this folder; sample none",
+    )
+    group = parser.add_argument_group(
+        "with --grasps",
+        "A file tells by its content what it is; see `burg-drake grasps convert --help`.",
+    )
+    group.add_argument("--grasps-format", metavar="NAME", help="format of the file, if it must be")
+    add_gripper_link(group)
+    group.add_argument(
+        "--grasps-object",
+        metavar="[THEIRS=]OURS",
+        action="append",
+        type=renaming,
+        default=[],
+        help="object or instance of the scene that grasps are of; once for each name in the file",
+    )
+    group.add_argument(
+        "--grasps-frame",
+        choices=tuple(FRAMES),
+        help="what poses are measured in, where that is not what the format says",
+    )
+    add_camera_options(group)
+
+
+def require_file(arguments: argparse.Namespace) -> None:
+    """Refuses options about a file where none is given.
+
+    Raises:
+        InvalidInputError: names the option.
+    """
+    names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
+    for name in (*names, "scene_id", "gripper_link"):
+        if getattr(arguments, name) and arguments.grasps is None:
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} is about a file; add --grasps FILE"
+            )
+
+
+def read_given(arguments: argparse.Namespace, scene: Scene, station: Station) -> GivenGrasps:
+    """The grasps of the file that --grasps names, on the instances of a scene."""
+    from burg_drake.evaluation.grasp_sets import read_grasps
+    from burg_drake.formats.common import read_poses
+
+    poses = arguments.camera_pose
+    return read_grasps(
+        scene,
+        arguments.grasps,
+        gripper_for(arguments, station),
+        format=arguments.grasps_format,
+        objects=dict(arguments.grasps_object),
+        frame=FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
+        X_SF=read_poses(poses) if poses else None,
+        object_ids=arguments.object_ids,
+        scene_id=arguments.scene_id,
+    )

@@ -1,0 +1,151 @@
+"""Options about grasp files that several verbs have, and the gripper that they tell."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser
+
+if TYPE_CHECKING:
+    from burg_drake.formats.common import Gripper
+    from burg_drake.station.document import Station
+
+DEFAULT_HAND = "panda_hand"
+
+FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
+"""What `formats` calls the choices of options about frames."""
+
+
+def add_file_options(parser: Parser) -> None:
+    """The options --from and --gripper-link, by which a file is read."""
+    parser.add_argument(
+        "--from", dest="source", metavar="FORMAT", help="format to read (default: by the content)"
+    )
+    add_gripper_link(parser)
+
+
+def add_gripper_link(parser: Any) -> None:
+    """The option --gripper-link."""
+    parser.add_argument(
+        "--gripper-link",
+        metavar="NAME",
+        help="what isaac_grasp files call the body of the hand (default: as its model does)",
+    )
+
+
+def add_hand(parser: Parser, default: str | None = DEFAULT_HAND) -> None:
+    """The option --hand, of verbs that have no station; without a default the file is asked."""
+    parser.add_argument(
+        "--hand",
+        metavar="HAND",
+        default=default,
+        help="hand that grasps are for: document or built-in name (default:"
+        f" {default or f'the one that a file of ours names, else {DEFAULT_HAND}'})",
+    )
+
+
+def add_camera_options(group: Any) -> None:
+    """The options --camera-pose, --object-ids and --scene-id, of files about a scene."""
+    group.add_argument(
+        "--camera-pose",
+        metavar="FILE",
+        nargs="+",
+        default=[],
+        help="where the scene frame has the file's camera (or world): 4x4 .npy, FILE:INDEX for one"
+        " of several, or YAML; several are multiplied",
+    )
+    group.add_argument(
+        "--object-ids",
+        metavar="ID=NAME,...",
+        type=numbering,
+        default={},
+        help="instances by object id; without, grasps go to what is between their fingers",
+    )
+    group.add_argument("--scene-id", metavar="ID", help="which one of a file of several scenes")
+
+
+def numbering(text: str) -> dict[int, str]:
+    """`ID=NAME,ID=NAME`."""
+    names: dict[int, str] = {}
+    for part in text.split(","):
+        number, _, name = part.partition("=")
+        if not number.strip().isdecimal() or not name.strip():
+            raise argparse.ArgumentTypeError(f"{part!r} is not ID=NAME, such as 5=mug")
+        names[int(number)] = name.strip()
+    return names
+
+
+def gripper_for(
+    arguments: argparse.Namespace, station: Station | None = None, path: str | None = None
+) -> Gripper:
+    """The hand of a station, or else the one that --hand or a file names, with the link of
+    --gripper-link."""
+    if station is None:
+        gripper = named_gripper(arguments.hand) if arguments.hand else _gripper_of_file(path)
+    else:
+        from burg_drake.station.world import station_gripper
+
+        gripper = station_gripper(station)
+    return replace(gripper, body=arguments.gripper_link) if arguments.gripper_link else gripper
+
+
+def add_file_station(parser: Parser) -> None:
+    """The option --station, of verbs whose files may name one."""
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        help="station file or built-in name (default: what the file names, else"
+        f" {DEFAULT_STATION})",
+    )
+
+
+def station_for(arguments: argparse.Namespace, path: str) -> Station:
+    """The station that --station names, or else a file or a run, or else the default.
+
+    Raises:
+        UnknownNameError: it is not there.
+    """
+    from burg_drake.core import UnknownNameError
+    from burg_drake.core.paths import is_resolved
+    from burg_drake.evaluation.grasp_sets import station_reference
+    from burg_drake.station.document import load_station
+
+    if arguments.station is not None:
+        return load_station(arguments.station)
+    told = station_reference(path)
+    if told is not None and not is_resolved(told, "stations"):
+        raise UnknownNameError(f"{path} names a station: {told} is not there; give --station")
+    try:
+        return load_station(told or DEFAULT_STATION)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
+
+
+def named_gripper(hand: str) -> Gripper:
+    """What formats know of a hand; of the Panda's without a look into its model."""
+    from burg_drake.formats.common import PANDA
+
+    if hand == DEFAULT_HAND:
+        return PANDA
+    from burg_drake.station.document import locate_hand
+    from burg_drake.station.world import gripper_of
+
+    return gripper_of(*locate_hand(hand))
+
+
+def _gripper_of_file(path: str | None) -> Gripper:
+    """The hand that a file or a run says its grasps are for, else the default."""
+    from burg_drake.core import BurgError, UnknownNameError
+    from burg_drake.evaluation.grasp_sets import hand_reference
+
+    reference = None if path is None else hand_reference(path)
+    if reference is None:
+        return named_gripper(DEFAULT_HAND)
+    try:
+        return named_gripper(reference)
+    except BurgError as error:
+        raise UnknownNameError(
+            f"{path} has grasps for a hand that cannot be used; name one (--hand): {error}"
+        ) from error

@@ -1,0 +1,176 @@
+"""`burg-drake evaluate` on several scenes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.runs.settings import asked_settings
+from burg_drake.apps.options import read_given
+from burg_drake.apps.options import chosen_motion, require_standoff_of_arm
+from burg_drake.apps.options import how_to_retry
+from burg_drake.core import InvalidInputError, listing
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.store import Campaign
+    from burg_drake.evaluation.workers import Executor
+    from burg_drake.evaluation.run import Given
+    from burg_drake.evaluation.results import Summary
+    from burg_drake.scene.document import Scene
+    from burg_drake.station.document import Station
+
+SHOWN = 20
+"""So many scenes have a row of their own."""
+
+
+def evaluate_many(
+    arguments: argparse.Namespace, references: Sequence[str], executor: Executor | None = None
+) -> int:
+    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated.
+
+    Args:
+        arguments: of the verb.
+        references: the scenes.
+        executor: judges in place of processes of this machine.
+    """
+    from burg_drake.evaluation import evaluate
+    from burg_drake.evaluation.stages import mode_for
+    from burg_drake.evaluation.records import motion_text
+    from burg_drake.station.document import GraspMotion
+    from burg_drake.station.document import load_station
+
+    if arguments.output is None:
+        raise InvalidInputError(f"{len(references)} scenes are given; say where to with -o RUN")
+    station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    require_standoff_of_arm(arguments, mode)
+    motion = chosen_motion(arguments, station)
+    campaign = evaluate(
+        list(references),
+        station,
+        arguments.output,
+        grasps=_given(arguments, station),
+        executor=executor,
+        mode=mode,
+        motion=motion,
+        scene_reports=arguments.scene_reports,
+        **asked_settings(arguments),
+    )
+    print_campaign(campaign)
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
+    return how_it_ended(campaign)
+
+
+def print_campaign(campaign: Campaign) -> None:
+    """Prints the tables of a run over many scenes, and where what is."""
+    from rich.console import Console
+
+    from burg_drake.evaluation.store import PARTS_FOLDER
+    from burg_drake.evaluation.store import REPORT_FILE
+    from burg_drake.evaluation.results import summarize
+    from burg_drake.evaluation.results import summary_view
+
+    summary = summarize(campaign)
+    Console().print(summary_view(summary))
+    _scene_table(summary).show()
+    if campaign.document.shard:
+        print(f"shard   {campaign.document.shard}; burg-drake merge unites all of them")
+    scenes = f"{campaign.path}/scenes/NAME"
+    if any(campaign.folder(name).joinpath(REPORT_FILE).exists() for name in campaign.names):
+        print(f"runs    {scenes}, each with a table and a report")
+    else:
+        print(f"runs    {scenes}, each with a table; burg-drake report {scenes} makes a report")
+    print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
+    if campaign.report_path.exists():
+        print(f"report  {campaign.report_path}")
+
+
+def how_it_ended(campaign: Campaign) -> int:
+    """Says what could not be judged; the exit code."""
+    states = campaign.states.values()
+    failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
+    for name, why in campaign.failed.items():
+        print(f"burg-drake: scene {name} could not be judged: {why}", file=sys.stderr)
+    if failed:
+        where = listing([s.scene for s in states if s.failed])
+        print(
+            f"burg-drake: {failed} grasps could not be simulated (scenes {where});"
+            f" {how_to_retry(interrupted, failed)}",
+            file=sys.stderr,
+        )
+    return 1 if failed or campaign.failed else 0
+
+
+def _scene_table(summary: Summary) -> Any:
+    """The scenes in which the smallest share of the executed grasps was lifted."""
+    from burg_drake.core.terminal import count, percent
+    from burg_drake.core.terminal import TextTable
+
+    def share(group: Any) -> float:
+        return group.lifted / group.executed if group.executed else -1.0
+
+    groups = sorted(summary.scenes, key=share)[:SHOWN]
+    more = len(summary.scenes) - len(groups)
+    title = f"Scenes, the {SHOWN} with the least success" if more else "Scenes"
+    table = TextTable(title).names("scene")
+    table.numbers(*summary.steps, "success")
+    for group in groups:
+        success = percent(share(group)) if group.executed else "-"
+        table.row(group.name, *(count(group.funnel[name]) for name in summary.steps), success)
+    if more:
+        table.caption = f"{more:,} more scenes are in the columns of the store"
+    return table
+
+
+def _given(arguments: argparse.Namespace, station: Station) -> Given | None:
+    """The grasps of the file: those in the frames of their objects as a set for all scenes."""
+    from burg_drake.apps.options import FRAMES, gripper_for
+    from burg_drake.evaluation.grasp_sets import read_input
+    from burg_drake.formats.common import with_objects_renamed
+
+    if arguments.grasps is None:
+        return None
+    imported = read_input(
+        arguments.grasps, arguments.grasps_format, gripper_for(arguments, station)
+    )
+    for note in imported.notes:
+        print(f"note: {note}")
+    frame = FRAMES.get(arguments.grasps_frame) or imported.frame
+    if frame != "object":
+        return _FileOfScenes(arguments, station)
+    return with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
+
+
+@dataclass(frozen=True)
+class _FileOfScenes:
+    """Grasps in the frame of a scene or camera: each scene gets those that a file has of it, by
+    the column `scene_id`.
+
+    Attributes:
+        arguments: of the verb.
+        station: has the hand.
+    """
+
+    arguments: argparse.Namespace
+    station: Station
+
+    def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
+        from burg_drake.core import UnknownNameError
+        from burg_drake.evaluation.grasp_sets import NoSceneIdsError
+
+        chosen = argparse.Namespace(**{**vars(self.arguments), "run": None})
+        chosen.scene_id = scene.name
+        try:
+            return read_given(chosen, scene, self.station).by_instance
+        except UnknownNameError:
+            return {}
+        except NoSceneIdsError as error:
+            raise InvalidInputError(
+                f"{self.arguments.grasps} has grasps that are measured in the frame of one scene or"
+                " camera, and does not say of which; evaluate that scene alone"
+            ) from error

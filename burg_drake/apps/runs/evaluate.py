@@ -1,0 +1,184 @@
+"""`burg-drake evaluate`: the main job, from a scene to judged grasps."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    DEFAULT_ENGINE,
+    ENGINE_NAMES,
+    SCENE_NAMES,
+    add_quiet,
+    add_station,
+    add_verb,
+    workers,
+)
+from burg_drake.apps.options import add_cluster, chosen_cluster
+from burg_drake.apps.runs.campaign import evaluate_many
+from burg_drake.apps.runs.settings import asked_settings
+from burg_drake.apps.options import add_given, read_given, require_file
+from burg_drake.apps.options import add_motion, chosen_motion, require_standoff_of_arm
+from burg_drake.apps.options import add_retry_failed, how_to_retry
+from burg_drake.apps.options import add_sampling, require_sampled
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.store import Run
+
+DEFAULT_OUTPUT = "runs"
+DEFAULT_GRASPS = 100
+"""Sampled for each object, unless grasps are given."""
+# Kept in step with evaluation.mode, which imports too much for a help text; a test compares them.
+MODES = ("hand", "reach", "arm")
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "evaluate",
+        run_evaluate,
+        "judge grasps of scenes on a station: clear, reachable, planned, executed",
+        "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
+        "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
+        "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
+        "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
+        "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
+        "burg-drake evaluate my_scene.yaml --station panda_shelf --least-lift-mm 20",
+        "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
+        "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
+        "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
+        "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
+        "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
+        "",
+        "The same command goes on where an interrupted one stopped.",
+    )
+    parser.add_argument(
+        "scenes",
+        metavar="SCENE",
+        nargs="+",
+        help="scene file, folder of scenes, or name of a built-in one:"
+        f" {', '.join(SCENE_NAMES)}; several make one run over all of them",
+    )
+    add_station(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="RUN",
+        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE; for several scenes"
+        " it has to be given)",
+    )
+    which = parser.add_mutually_exclusive_group()
+    add_sampling(parser, DEFAULT_GRASPS, which)
+    add_given(parser, which)
+    parser.add_argument(
+        "--engine",
+        choices=ENGINE_NAMES,
+        default=DEFAULT_ENGINE,
+        help="how time is stepped: for truth, for results, for a first look (default: %(default)s)",
+    )
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument(
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
+    )
+    add_cluster(who)
+    parser.add_argument(
+        "--table",
+        choices=("csv", "parquet"),
+        default="csv",
+        help="format of the table of results (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        help="hand: the hand alone executes grasps in simulation; reach: those that the arm can"
+        " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
+        " there is no arm)",
+    )
+    parser.add_argument(
+        "--shard",
+        metavar="K/N",
+        help="judge a share of the work, such as 2/8, on one of several machines: every N-th scene,"
+        " or of fewer than N scenes every N-th grasp; burg-drake merge unites them",
+    )
+    add_motion(parser)
+    add_retry_failed(parser, "grasps")
+    parser.add_argument(
+        "--scene-reports",
+        action=argparse.BooleanOptionalAction,
+        help="write a report for each of several scenes, too; if not said, where there are at most"
+        " a hundred. burg-drake report RUN/scenes/NAME makes one later",
+    )
+    add_quiet(parser)
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def run_evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluates; 1 if some grasps could not be simulated."""
+    from burg_drake.evaluation import evaluate
+    from burg_drake.evaluation.stages import mode_for
+    from burg_drake.evaluation.records import motion_text
+    from burg_drake.motion.workspace import require_usable_arm
+    from burg_drake.scene.document import load_scene
+    from burg_drake.scene.document import scene_references
+    from burg_drake.station.document import GraspMotion
+    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.document import load_station
+
+    require_file(arguments)
+    require_sampled(arguments)
+    references = scene_references(arguments.scenes)
+    if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
+        with chosen_cluster(arguments) as executor:
+            return evaluate_many(arguments, references, executor=executor)
+    scene = load_scene(references[0])
+    station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    require_standoff_of_arm(arguments, mode)
+    motion = chosen_motion(arguments, station)
+    given = None if arguments.grasps is None else read_given(arguments, scene, station)
+    for note in given.notes if given else ():
+        print(f"note: {note}")
+    if mode != "hand":
+        require_sound_scene(scene, station)
+        for warning in require_usable_arm(scene, station):
+            print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    with chosen_cluster(arguments) as executor:
+        run = evaluate(
+            scene,
+            station,
+            arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
+            grasps=given.by_instance if given else None,
+            executor=executor,
+            mode=mode,
+            motion=motion,
+            **asked_settings(arguments),
+        )
+    print_summary(run)
+    if run.document.shard:
+        print(f"shard   {run.document.shard}; burg-drake merge unites all of them")
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
+    print(f"table   {run.table_path}")
+    print(f"report  {run.report_path}")
+    if run.failures:
+        print(
+            f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
+            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
+            f" {how_to_retry(len(run.interrupted), len(run.failures))}",
+            file=sys.stderr,
+        )
+        return 1
+    return 0
+
+
+def print_summary(run: Run) -> None:
+    """Prints the tables of a run."""
+    from rich.console import Console
+
+    from burg_drake.evaluation.results import summarize
+    from burg_drake.evaluation.results import summary_view
+
+    Console().print(summary_view(summarize(run)))

@@ -1,0 +1,45 @@
+"""`burg-drake merge`: one run of shards, or of copies that were interrupted."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from burg_drake.apps.options import add_verb
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "merge",
+        run_merge,
+        "unite shards of a run, or copies of it that were interrupted",
+        "burg-drake merge runs/shard* -o runs/whole",
+    )
+    parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
+    parser.add_argument(
+        "-o", "--output", metavar="RUN", required=True, help="folder for the united run"
+    )
+
+
+def run_merge(arguments: argparse.Namespace) -> int:
+    """Unites runs and prints what is in them; 1 if grasps could not be simulated."""
+    from burg_drake.apps.runs.evaluate import print_summary
+    from burg_drake.apps.runs.campaign import how_it_ended, print_campaign
+    from burg_drake.evaluation.store import Campaign
+    from burg_drake.evaluation.merge import unite
+
+    merged = unite(arguments.runs, arguments.output)
+    result = merged.result
+    if isinstance(result, Campaign):
+        print_campaign(result)
+        code = how_it_ended(result)
+    else:
+        print_summary(result)
+        print(f"table   {result.table_path}")
+        print(f"report  {result.report_path}")
+        code = 1 if result.failures else 0
+    for note in merged.notes:
+        print(f"note: {note}")
+    return code

@@ -1,0 +1,246 @@
+"""`burg-drake reach`: which grasps the arm can execute, and what hinders it at the others."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    add_quiet,
+    add_scene,
+    add_station,
+    add_verb,
+    workers,
+)
+from burg_drake.apps.options import add_given, read_given, require_file
+from burg_drake.apps.options import Output, add_format, output_of
+from burg_drake.apps.options import add_motion, chosen_motion
+from burg_drake.apps.runs.reach_tables import print_tables
+from burg_drake.apps.options import add_retry_failed, how_to_retry
+from burg_drake.apps.options import (
+    add_sampling,
+    grasps_per_object,
+    print_shortfalls,
+    require_sampled,
+)
+from burg_drake.core import InvalidInputError
+from burg_drake.core.files import require_writable
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import GraspSet
+    from burg_drake.scene.document import Scene
+    from burg_drake.station.document import Station
+
+DEFAULT_GRASPS = 100
+"""Sampled for each object, unless grasps are given."""
+FRAME = "x, y, z: the grasp frame's origin in the frame of its object"
+TABLES = (".csv", ".parquet")
+"""Suffixes of tables, which have a row for each grasp and no provenance."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "reach",
+        run_reach,
+        "ask which grasps the arm can execute, and what hinders it at the others",
+        "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
+        "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
+        "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
+        "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
+        "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
+        "",
+        "A grasp is reachable if the open hand is clear, also on the straight way in, and with",
+        "the object in it on the straight ways back and up, the arm can follow them, and it finds",
+        "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
+        "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
+        "does that.",
+    )
+    add_scene(parser)
+    which = parser.add_mutually_exclusive_group()
+    add_sampling(parser, DEFAULT_GRASPS, which)
+    add_given(parser, which)
+    add_station(parser)
+    add_motion(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="table (.csv, .parquet) or grasp file (such as .npz, .h5), or folder for one file an"
+        " object (default: only print)",
+    )
+    add_format(parser)
+    parser.add_argument(
+        "--only-reachable", action="store_true", help="write only grasps that the arm can execute"
+    )
+    parser.add_argument(
+        "--plans",
+        metavar="DIR",
+        help="folder for the timed motion of each grasp that the arm can execute, about 1.5 MB"
+        " each; the same command goes on where an interrupted one stopped",
+    )
+    parser.add_argument(
+        "--plan-format",
+        choices=("json", "csv"),
+        help="of these: JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python"
+        " reads both (default: json)",
+    )
+    parser.add_argument(
+        "--screening",
+        action="store_true",
+        help="decide by quick bounds instead of Drake's CollisionChecker: twice as fast, and wrong"
+        " about one or two grasps in a hundred, either way",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
+    )
+    add_retry_failed(parser, "grasps")
+    add_quiet(parser)
+
+
+def run_reach(arguments: argparse.Namespace) -> int:
+    """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
+    from burg_drake.core.grasps import Outcome
+    from burg_drake.evaluation import reach
+    from burg_drake.evaluation.candidates import chosen_instances
+    from burg_drake.evaluation.records import motion_text
+    from burg_drake.evaluation.results import ungiven_note
+    from burg_drake.evaluation.results import short_lifts
+    from burg_drake.motion.workspace import require_usable_arm
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.document import GraspMotion
+    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.document import load_station
+
+    require_file(arguments)
+    require_sampled(arguments)
+    if arguments.plan_format and not arguments.plans:
+        raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
+    if arguments.retry_failed and not arguments.plans:
+        raise InvalidInputError("--retry-failed is about a folder of plans; add --plans DIR")
+    if arguments.only_reachable and arguments.output is None:
+        raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
+    if arguments.plans:
+        require_writable(Path(arguments.plans) / "plan")
+        arguments.after_interrupt = "; the same command goes on from here"
+    output = _output(arguments)
+    scene, station = load_scene(arguments.scene), load_station(arguments.station)
+    require_sound_scene(scene, station)
+    motion = chosen_motion(arguments, station)
+    grasps = _grasps(arguments, scene, station)
+    if isinstance(output, Output):
+        output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
+    for warning in require_usable_arm(scene, station):
+        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    judged = reach(
+        scene,
+        station,
+        grasps,
+        motion=motion,
+        exact=not arguments.screening,
+        plans=arguments.plans,
+        plan_format=arguments.plan_format or "json",
+        retry_failed=arguments.retry_failed,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    answered = judged.column("outcome") != ""
+    names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
+    print_tables(judged.select(answered), names, motion)
+    if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
+        print(f"note: {note}")
+    if motion != GraspMotion():
+        print(f"motion: {motion_text(motion)}")
+    lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
+    if lifts is not None:
+        print(lifts)
+    yes = judged.column("outcome") == Outcome.REACHABLE
+    unplanned = yes & (judged.column("reason") != "")
+    if arguments.plans is not None:
+        print(f"{(yes & ~unplanned).sum()} plans are in {arguments.plans}")
+    if output is not None:
+        _write(judged.select(yes) if arguments.only_reachable else judged, output, station)
+    failed = judged.select(~answered)
+    retry = f"; {how_to_retry(0, len(failed))}" if arguments.plans else ""
+    _print_failures(failed, "could not be judged", len(judged), retry)
+    _print_failures(judged.select(unplanned), "have no plan", int(yes.sum()))
+    return 0 if answered.all() and not unplanned.any() else 1
+
+
+def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:
+    """A line about grasps whose computation has failed, if there are any."""
+    if len(failed):
+        reason = failed.column("reason")[0].removeprefix("no plan: ")
+        id = f"{failed.column('instance')[0]}-{failed.id[0]}"
+        print(
+            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}{retry}",
+            file=sys.stderr,
+        )
+
+
+def _grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> Mapping[str, GraspSet]:
+    """The grasps of the file, or sampled ones, by instance."""
+    from burg_drake.evaluation.candidates import on_chosen
+
+    if arguments.grasps is not None:
+        given = read_given(arguments, scene, station)
+        for note in given.notes:
+            print(f"note: {note}")
+        return on_chosen(scene, given.by_instance, arguments.only)
+    return sampled_grasps(arguments, scene, station)
+
+
+def sampled_grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> dict[str, GraspSet]:
+    """Grasps by instance as the options ask for them; says what is missing."""
+    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.evaluation.candidates import sample_scene
+    from burg_drake.evaluation.candidates import chosen_instances
+    from burg_drake.evaluation.candidates import SamplingSettings
+
+    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
+    count, seed = grasps_per_object(arguments), arguments.seed
+    sampled = {}
+    total = len(chosen_instances(scene, arguments.only))
+    with Reporter(not arguments.quiet) as reporter:
+        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
+        for name, grasps in sample_scene(scene, station, count, seed, settings, arguments.only):
+            sampled[name] = grasps
+            pace.step(note=name)
+    print_shortfalls(sampled, count)
+    return sampled
+
+
+def _output(arguments: argparse.Namespace) -> Path | Output | None:
+    """Where to write: a table, a grasp file, or nowhere; a place that cannot be written to is
+    refused before any work."""
+    if arguments.output is None:
+        return None
+    path = Path(arguments.output)
+    if arguments.target is None and path.suffix in TABLES and not path.is_dir():
+        from burg_drake.evaluation.records import require_table
+
+        require_table(path)
+        return path
+    return output_of(arguments.output, arguments.target, frame="object")
+
+
+def _write(grasps: GraspSet, output: Path | Output, station: Station) -> None:
+    from burg_drake.core.paths import with_shareable_references
+    from burg_drake.evaluation import reach_columns
+    from burg_drake.evaluation.records import write_table
+    from burg_drake.station.world import station_gripper
+
+    if isinstance(output, Output):
+        output.write(grasps, station_gripper(station))
+        return
+    provenance = with_shareable_references(grasps.provenance, output.absolute().parent)
+    write_table(output, reach_columns(grasps), provenance)
+    print(f"wrote {len(grasps)} grasps to {output}; {FRAME}")

@@ -1,0 +1,208 @@
+"""`burg-drake replay`: one trial again, from a run or from its row alone, compared and recorded."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import add_only, add_verb, add_view, positive_int
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.store import Inputs
+    from burg_drake.evaluation.stages import Verdict
+    from burg_drake.evaluation.records import TrialOrigin
+    from burg_drake.evaluation.records import Columns
+    from burg_drake.evaluation.records import RecordedTrial
+    from burg_drake.simulation.trials import TrialResult
+
+
+@dataclass(frozen=True)
+class ReplaySource:
+    """What is to be replayed."""
+
+    trial: RecordedTrial
+    origin: TrialOrigin
+    inputs: Inputs
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "replay",
+        run_replay,
+        "execute one recorded trial again, compare it with the record, and show it in Meshcat",
+        "burg-drake replay runs/first --best",
+        "burg-drake replay runs/first --grasp mug-0123456789 --html replay.html",
+        "burg-drake replay results.csv --row 17",
+        "burg-drake replay one_row.csv --scene runs/first/scene.yaml",
+        "",
+        "A row and its header are enough, wherever they were copied to.",
+    )
+    parser.add_argument(
+        "results",
+        metavar="RESULTS",
+        help="folder of a run, or a table of results (.csv, .parquet), or a few rows of one",
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--grasp", metavar="ID", help="id of a grasp, from the table of results")
+    which.add_argument(
+        "--row", metavar="N", type=positive_int, help="row of the table, the first one is 1"
+    )
+    which.add_argument(
+        "--best",
+        action="store_true",
+        help="the lifted grasp with the most room around the open hand, which most likely lifts"
+        " again when things are not quite where they should be; of equal ones (to 0.5 mm) that"
+        " which slipped, tilted and pushed others least",
+    )
+    add_only(parser, "with --best, the best grasp")
+    parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
+    parser.add_argument("--station", metavar="FILE", help="where its station is now")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="replay even if the scene or station is not the one of the trial",
+    )
+    add_view(parser)
+
+
+def run_replay(arguments: argparse.Namespace) -> int:
+    """Executes a trial once more, recorded; 1 if it ends unlike the record."""
+    from burg_drake.apps.terminal import open_view, present
+    from burg_drake.evaluation import (
+        arm_figures,
+        as_result,
+        comparison,
+        differences,
+        motion_figures,
+    )
+    from burg_drake.visualization.scenes import describe
+
+    if arguments.only and not arguments.best:
+        raise InvalidInputError("--only is about the best grasp; add --best")
+    path = Path(arguments.results)
+    is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
+    if path.is_file() and not is_table:
+        raise InvalidInputError(
+            f"{path} is neither the folder of a run nor a table of results (.csv, .parquet)"
+        )
+    source = _from_table(path, arguments) if is_table else _from_run(path, arguments)
+    for note in source.inputs.notes:
+        print(f"burg-drake: {note}", file=sys.stderr)
+    meshcat = open_view(arguments)
+    verdict, shown, who = _execute(source, meshcat)
+    lines = [*describe(as_result(verdict)), *arm_figures(verdict)]
+    lines += motion_figures(source.trial, source.origin)
+    recorded = source.trial.verdict
+    found = [] if recorded is None else differences(recorded, verdict)
+    lines += [] if recorded is None else comparison(found, source.origin)
+    if shown.outcome is not verdict.outcome:
+        lines += [f"shown is {who}, to the end:", *describe(shown)]
+    for line in lines:
+        print(line)
+    if arguments.html is None and shown.margins.end_time == 0.0:
+        print("nothing moves: the trial ended at its start", file=sys.stderr)
+    title = f"{source.inputs.scene.name}: {source.trial.id}"
+    present(meshcat, arguments, title=title, caption=lines)
+    return 0 if all(difference.rounding for difference in found) else 1
+
+
+def _execute(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, str]:
+    """The verdict as the row's engine gives it, and the whole trial as shown, of what.
+
+    An engine that ends trials early is run twice: as recorded, and to the end for the picture. So
+    is a trial of the arm, which is shown from its home posture on.
+    """
+    from burg_drake.evaluation.stages import trial_verdict
+    from burg_drake.evaluation import decisive_mode, rerun
+    from burg_drake.visualization.scenes import record_arm_trial
+    from burg_drake.visualization.scenes import record_trial
+
+    trial, origin = source.trial, source.origin
+    scene, station = source.inputs.scene, source.inputs.station
+    like: dict[str, Any] = {
+        "engine": origin.engine,
+        "settings": origin.settings(),
+        "friction": trial.friction,
+        "mass": trial.mass,
+    }
+    by_hand = like | {"lift": trial.lift}
+    what = (scene, station, trial.instance, trial.X_OG)
+    if decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
+        shown = record_trial(*what, meshcat, **by_hand)
+        return trial_verdict(shown), shown, "the hand alone"
+    verdict, plan = rerun(scene, station, trial, origin)
+    if plan is not None:
+        return verdict, record_arm_trial(*what, plan, meshcat, **like), "the arm from home on"
+    return verdict, record_trial(*what, meshcat, **by_hand), "the hand alone"
+
+
+def _from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
+    from burg_drake.evaluation.store import Inputs, find_inputs
+    from burg_drake.evaluation.records import origin_of
+    from burg_drake.evaluation.store import RUN_FILE, load_run
+
+    run = load_run(path)
+    if arguments.grasp is not None:
+        id = arguments.grasp
+    else:
+        id = str(run.results["id"][_choose(run.results, path, arguments)])
+    trial, origin = run.trial(id), origin_of(run.document)
+    origin.settings(f"{path / RUN_FILE}: trial")
+    if arguments.scene is None and arguments.station is None and not arguments.force:
+        return ReplaySource(trial, origin, Inputs(run.scene(), run.station()))
+    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return ReplaySource(trial, origin, find_inputs(origin, f"{path}, {id},", path, **options))
+
+
+def _from_table(path: Path, arguments: argparse.Namespace) -> ReplaySource:
+    from burg_drake.evaluation.store import find_inputs
+    from burg_drake.evaluation.records import read_origin
+    from burg_drake.evaluation.records import table_row
+    from burg_drake.evaluation.records import read_table
+    from burg_drake.evaluation.records import read_trial
+
+    columns = read_table(path)
+    if "id" not in columns:
+        raise InvalidInputError(f"{path} is not a results table (it has no column id)")
+    index = _choose(columns, path, arguments)
+    where, row = f"{path}, row {index + 1}", table_row(columns, index)
+    trial, origin = read_trial(row, where), read_origin(row, where)
+    options = {"scene": arguments.scene, "station": arguments.station, "force": arguments.force}
+    return ReplaySource(trial, origin, find_inputs(origin, where, path.parent, **options))
+
+
+def _choose(columns: Columns, path: Path, arguments: argparse.Namespace) -> int:
+    """Index of the row that is asked for."""
+    from burg_drake.evaluation.records import best_rows, rows_of
+
+    ids = columns["id"].tolist()
+    if not ids:
+        raise InvalidInputError(f"{path} has no rows")
+    if arguments.row is not None:
+        if arguments.row > len(ids):
+            raise InvalidInputError(f"{path} has no row {arguments.row}; it has {len(ids)}")
+        return int(arguments.row) - 1
+    if arguments.grasp is not None:
+        rows = rows_of(columns, arguments.grasp, str(path))
+        if len(rows) > 1:
+            raise InvalidInputError(
+                f"{path} has {len(rows)} rows of {arguments.grasp}, the first is row"
+                f" {rows[0] + 1}; choose one with --row"
+            )
+        return rows[0]
+    if arguments.best:
+        best = best_rows(columns, only=arguments.only)
+        if not best:
+            raise InvalidInputError(
+                f"{path}: no grasp was lifted; choose one with --grasp ID or --row N"
+            )
+        return best[0]
+    if len(ids) != 1:
+        raise InvalidInputError(f"{path} has {len(ids)} rows; give --grasp ID, --row N or --best")
+    return 0

@@ -1,0 +1,171 @@
+"""`burg-drake robustness`: how hard lifted grasps can be tugged, how much goes wrong with noise."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    add_only,
+    add_quiet,
+    add_verb,
+    not_negative,
+    positive_int,
+    seed,
+    workers,
+)
+from burg_drake.apps.options import add_retry_failed, how_to_retry
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.robustness import RobustnessSettings
+
+# Kept in step with evaluation.probes and evaluation.robustness, which import too much for a help
+# text; a test compares them.
+TESTS = ("tug", "shake", "friction", "noise")
+DEFAULT_BEST = 3
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "robustness",
+        run_robustness,
+        "test how robust the lifted grasps of a run are: tug, shake, friction, noise",
+        "burg-drake robustness runs/first",
+        "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
+        "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
+        "",
+        "The same command goes on where an interrupted one stopped. The table keeps what earlier",
+        "commands found about the same grasps with the same settings.",
+    )
+    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--grasp",
+        metavar="ID",
+        nargs="+",
+        action="extend",
+        help="ids of lifted grasps, from the table of results",
+    )
+    which.add_argument(
+        "--best",
+        metavar="N",
+        type=positive_int,
+        default=DEFAULT_BEST,
+        help="the N best lifted grasps of each object: those with the most room around the open"
+        " hand, as `replay --best` ranks them (default: %(default)s)",
+    )
+    add_only(parser, "the best grasps")
+    parser.add_argument(
+        "--tests",
+        metavar="LIST",
+        type=_tests,
+        default=TESTS,
+        help=f"some of {','.join(TESTS)} (default: all)",
+    )
+    noise = parser.add_argument_group("noise, as standard deviations")
+    noise.add_argument(
+        "--repeats",
+        metavar="K",
+        type=positive_int,
+        default=20,
+        help="perturbed repeats of each grasp (default: %(default)s)",
+    )
+    for name, unit, default, what in (
+        ("translation", "mm", 5.0, "of the grasp along each axis"),
+        ("rotation", "deg", 5.0, "of the grasp about each axis"),
+        ("mass", "percent", 10.0, "of the object's mass"),
+        ("friction", "percent", 20.0, "of the object's friction coefficient"),
+    ):
+        noise.add_argument(
+            f"--{name}-{unit}",
+            metavar=unit.upper(),
+            type=not_negative,
+            default=default,
+            help=f"{what} (default: %(default)g)",
+        )
+    noise.add_argument("--seed", metavar="N", type=seed, help="(default: the run's)")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="table, .csv or .parquet (default: robustness.csv in the run's folder)",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
+    )
+    add_retry_failed(parser, "tests")
+    add_quiet(parser)
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def run_robustness(arguments: argparse.Namespace) -> int:
+    """Tests; 1 if something could not be simulated."""
+    from pathlib import Path
+
+    from rich.console import Console
+
+    from burg_drake.evaluation.records import require_table
+
+    if arguments.output is not None:
+        require_table(Path(arguments.output))
+    from burg_drake.evaluation.robustness import assess_robustness
+    from burg_drake.evaluation.robustness import robustness_view
+    from burg_drake.evaluation.store import load_run
+
+    if arguments.only and arguments.grasp:
+        raise InvalidInputError("--only is about the best grasps; leave it or --grasp away")
+    run = load_run(arguments.run_folder)
+    settings = _settings(arguments, run.document.seed)
+    found = assess_robustness(
+        run,
+        grasps=arguments.grasp,
+        best=arguments.best,
+        only=arguments.only,
+        settings=settings,
+        out=arguments.output,
+        workers=arguments.workers,
+        retry_failed=arguments.retry_failed,
+        progress=not arguments.quiet,
+    )
+    Console().print(robustness_view(found.grasps, settings))
+    print(f"table   {found.table_path}")
+    if found.failures:
+        id, reason = next(iter(found.failures.items()))
+        print(
+            f"burg-drake: {len(found.failures)} tests could not be simulated, such as {id}:"
+            f" {reason}; {how_to_retry(found.interrupted, len(found.failures))}",
+            file=sys.stderr,
+        )
+        return 1
+    return 0
+
+
+def _settings(arguments: argparse.Namespace, seed: int) -> RobustnessSettings:
+    from burg_drake.evaluation.robustness import RobustnessSettings
+    from burg_drake.simulation.robustness import Noise
+
+    return RobustnessSettings(
+        tests=arguments.tests,
+        noise=Noise(
+            translation=arguments.translation_mm * 1e-3,
+            rotation=math.radians(arguments.rotation_deg),
+            mass=arguments.mass_percent / 100.0,
+            friction=arguments.friction_percent / 100.0,
+        ),
+        repeats=arguments.repeats,
+        seed=seed if arguments.seed is None else arguments.seed,
+    )
+
+
+def _tests(text: str) -> tuple[str, ...]:
+    """Names of tests, each once, in the usual order."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in TESTS:
+            raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(TESTS)}")
+    return tuple(test for test in TESTS if test in names)

@@ -1,0 +1,69 @@
+"""`burg-drake scene export`: scenes for other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from burg_drake.apps.options import add_scene, add_verb
+
+# Kept in step with export.export, which imports too much for a help text; a test compares them.
+FORMATS = {
+    "sdf": "an SDFormat world, for Gazebo and Drake",
+    "dmd": "Drake's model directives",
+    "mjcf": "MuJoCo's XML",
+    "usd": "USD with rigid-body physics, as for Isaac Sim; needs pip install 'burg-drake[usd]'",
+}
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        group,
+        "export",
+        run_export,
+        "write a scene for another program",
+        "burg-drake scene export tabletop_six --to sdf -o tabletop_sdf",
+        "burg-drake scene export my_scene.yaml --station my_station.yaml --to mjcf -o my_mjcf",
+        "",
+        "The folder has all that it needs, and can be moved or zipped.",
+        *(f"{name:5}{text}" for name, text in FORMATS.items()),
+    )
+    add_scene(parser)
+    parser.add_argument("--to", choices=FORMATS, required=True, help="format")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        required=True,
+        help="new folder, or an earlier export, which is replaced",
+    )
+    parser.add_argument(
+        "--station",
+        metavar="STATION",
+        help="station file or built-in name: its table and obstacles are exported, too, in its"
+        " world (default: the objects alone, in the frame of the board)",
+    )
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Writes the folder of an export, however faulty the scene; what is wrong goes to stderr."""
+    from burg_drake.export import export_scene
+    from burg_drake.scene.document import load_scene, validate_scene
+    from burg_drake.station.checks import check_scene
+    from burg_drake.station.document import load_station
+
+    scene = load_scene(arguments.scene)
+    station = load_station(arguments.station) if arguments.station is not None else None
+    for issue in validate_scene(scene) if station is None else check_scene(scene, station):
+        print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
+    exported = export_scene(scene, arguments.output, arguments.to, station)
+    for note in exported.notes:
+        print(note)
+    fixed = len(scene.background)
+    parts = [f"{len(scene.instances)} objects"]
+    parts += [f"{fixed} fixed"] if fixed else []
+    parts += list(exported.layout.boxes)
+    print(f"wrote {exported.main}: {', '.join(parts)}")
+    return 0

@@ -1,0 +1,94 @@
+"""`burg-drake printout`: the board of a scene as a PDF."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from burg_drake.apps.options import add_scene, add_verb, measured_mm, not_negative
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "printout",
+        run_printout,
+        "print the board of a scene: markers at true scale, and where its objects stand",
+        "burg-drake printout tabletop_six -o board.pdf",
+        "burg-drake printout tabletop_six --page A2 -o board.pdf",
+        "burg-drake printout tabletop_six --measured-mm 98.5 -o board.pdf",
+        "",
+        "Print at 100 % and hold a ruler to the two printed ones. If they are not 100 mm long,",
+        "give what they measure: --measured-mm 98.5, or along x and y --measured-mm 98.5,99.2.",
+    )
+    add_scene(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"
+    )
+    parser.add_argument(
+        "--page",
+        metavar="PAGE",
+        default="A4",
+        help="A4 to A0, letter, legal, tabloid, or WxH in mm; upright or across, whichever takes"
+        " fewer pages (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--margin-mm",
+        metavar="MM",
+        type=not_negative,
+        default=5.0,
+        help="what the printer leaves white on all sides (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--measured-mm",
+        metavar="X[,Y]",
+        type=measured_mm,
+        default=(100.0, 100.0),
+        help="length of the printed rulers of 100 mm along x and y of the page; all is drawn larger"
+        " by what is missing",
+    )
+    parser.add_argument("--no-height-map", action="store_true", help="print the markers alone")
+    parser.add_argument(
+        "--no-names", action="store_true", help="do not write the objects' names beside them"
+    )
+
+
+def require_pdf(path: str) -> None:
+    """Refuses names of other files."""
+    from burg_drake.core import InvalidInputError
+
+    if not path.lower().endswith(".pdf"):
+        raise InvalidInputError(f"{path}: only PDF is written; end the name with .pdf")
+
+
+def run_printout(arguments: argparse.Namespace) -> int:
+    """Writes the PDF; what is not on it as in the scene goes to stderr."""
+    from burg_drake.core.files import require_writable
+    from burg_drake.printout import PAPERS, PrintSettings, print_board
+    from burg_drake.scene.document import load_scene
+
+    require_pdf(arguments.output)
+    x, y = arguments.measured_mm
+    settings = PrintSettings(
+        page=arguments.page,
+        margin=arguments.margin_mm * 1e-3,
+        measured=(x * 1e-3, y * 1e-3),
+        height_map=not arguments.no_height_map,
+        names=not arguments.no_names,
+    )
+    scene = load_scene(arguments.scene)
+    require_writable(arguments.output)
+    printout = print_board(scene, settings)
+    printout.save(arguments.output)
+    for warning in printout.warnings:
+        print(f"burg-drake: warning: {scene.path}: {warning}", file=sys.stderr)
+    tiling = printout.tiling
+    columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
+    across = " landscape" if tiling.paper.width > tiling.paper.height else " portrait"
+    if tiling.paper.name not in PAPERS:
+        across = ""
+    pages = f"{columns} x {rows} pages" if columns * rows > 1 else "1 page"
+    print(f"wrote {arguments.output}: {pages} {tiling.paper.name}{across}")
+    return 0

@@ -1,0 +1,185 @@
+"""Options of `burg-drake scene sample` that make its recipe."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import add_station, positive_int, seed, workers
+
+if TYPE_CHECKING:
+    from burg_drake.objects.library import ObjectLibrary
+    from burg_drake.scene.document import SceneRecipe
+    from burg_drake.station.document import Station
+
+# In step with scene.recipe and scene.layout, which import numpy; a test compares them.
+DEFAULT_COUNT, DEFAULT_TRIES, DEFAULT_ATTEMPTS = 6, 100, 100
+MOST_OBJECTS = 1000
+SPACINGS = ("wide", "close", "touching")
+
+
+def add_recipe(parser: Any) -> None:
+    """Adds them."""
+    _add_objects(parser)
+    _add_layout(parser)
+    _add_rules(parser)
+
+
+def recipe_defaults() -> dict[str, Any]:
+    """Values of the options that nobody gave, by name."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_recipe(parser)
+    return vars(parser.parse_args([]))
+
+
+def written(name: str) -> str:
+    """How the option of a value is written."""
+    return "-n" if name == "objects" else f"--{name.replace('_', '-')}"
+
+
+def _add_objects(parser: Any) -> None:
+    group = parser.add_argument_group("objects")
+    group.add_argument(
+        "-n",
+        metavar="N",
+        dest="objects",
+        type=positive_int,
+        default=DEFAULT_COUNT,
+        help="objects in a scene (default: %(default)d)",
+    )
+    group.add_argument("--only", metavar="A,B", help="draw from these objects alone")
+    group.add_argument(
+        "--repeat", action="store_true", help="an object may be in a scene several times"
+    )
+    group.add_argument(
+        "--poses",
+        choices=("probability", "uniform"),
+        default="probability",
+        help="how stable poses are drawn (default: %(default)s)",
+    )
+    group.add_argument("--seed", metavar="N", type=seed, default=0, help="(default: %(default)d)")
+    group.add_argument(
+        "--count",
+        metavar="N",
+        type=positive_int,
+        default=1,
+        help="number of scenes (default: %(default)d)",
+    )
+    group.add_argument(
+        "--workers", metavar="N", type=workers, default=1, help="processes (default: %(default)d)"
+    )
+
+
+def _add_layout(parser: Any) -> None:
+    group = parser.add_argument_group("layout")
+    group.add_argument(
+        "--size",
+        metavar="SIZE",
+        default="A2",
+        help="of the board: A4 to A0, or WxH in mm (default: %(default)s)",
+    )
+    group.add_argument("--portrait", action="store_true", help="a board A4 to A0 upright")
+    how = group.add_mutually_exclusive_group()
+    how.add_argument(
+        "--spacing",
+        choices=SPACINGS,
+        help="40 mm apart, 2 to 10 mm beside another one, or in contact (default: anywhere)",
+    )
+    how.add_argument("--packed", action="store_true", help="side by side, as dense as it gets")
+    how.add_argument("--heap", action="store_true", help="dropped on the middle of the board")
+    group.add_argument(
+        "--tries",
+        metavar="K",
+        type=positive_int,
+        default=DEFAULT_TRIES,
+        help="random places for each object (default: %(default)d)",
+    )
+    group.add_argument(
+        "--fewer",
+        action="store_true",
+        help="accept a scene in which not all objects found a place; they are reported",
+    )
+    group.add_argument("--no-settle", action="store_true", help="leave objects as they were placed")
+
+
+def _add_rules(parser: Any) -> None:
+    group = parser.add_argument_group("rules")
+    add_station(group)
+    group.add_argument(
+        "--within-reach", action="store_true", help="the arm can grasp every object where it is"
+    )
+    group.add_argument(
+        "--clear-grasps",
+        metavar="K",
+        type=positive_int,
+        default=0,
+        help="every object has so many grasps at which the hand touches nothing else",
+    )
+    group.add_argument(
+        "--visible-from",
+        metavar="CAMERA",
+        default="",
+        help="this camera of the station sees half of every object, at least",
+    )
+    group.add_argument(
+        "--attempts",
+        metavar="N",
+        type=positive_int,
+        default=DEFAULT_ATTEMPTS,
+        help="scenes that are drawn until one is accepted (default: %(default)d)",
+    )
+
+
+def recipe_of(
+    arguments: argparse.Namespace, library: ObjectLibrary, station: Station, folder: Path
+) -> SceneRecipe:
+    """The recipe that the options ask for, with references that start from a folder."""
+    from burg_drake.apps.scene.references import library_reference, station_reference
+    from burg_drake.core import InvalidInputError
+    from burg_drake.scene.document import Board, SceneRecipe
+
+    if arguments.objects > MOST_OBJECTS:
+        raise InvalidInputError(
+            f"-n {arguments.objects}: a scene has {MOST_OBJECTS} objects at most"
+        )
+    names = [name.strip() for name in (arguments.only or "").split(",")]
+    layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
+    return SceneRecipe(
+        library=library_reference(arguments.library, library, folder),
+        count=arguments.objects,
+        only=tuple(sorted(set(filter(None, names)))),
+        repeat=arguments.repeat,
+        board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
+        layout=layout or "random",
+        poses=arguments.poses,
+        tries=arguments.tries,
+        fewer=arguments.fewer,
+        seed=arguments.seed,
+        station=station_reference(arguments.station, station, folder),
+        settle=not arguments.no_settle,
+        attempts=arguments.attempts,
+        within_reach=arguments.within_reach,
+        clear_grasps=arguments.clear_grasps,
+        visible_from=arguments.visible_from,
+    )
+
+
+def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
+    """Extents along x and y of a board [m]: A4 to A0, across unless upright, or WxH in mm.
+
+    Raises:
+        UnknownNameError: there is no such size.
+    """
+    from burg_drake.compose.commands import BOARD_SIZES, board_size
+    from burg_drake.core import UnknownNameError, nearest
+
+    own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", size.lower())
+    if own:
+        return float(own[1]) * 1e-3, float(own[2]) * 1e-3
+    if size.upper() not in BOARD_SIZES:
+        raise UnknownNameError(
+            f"no board has size {size!r}; {nearest(size, BOARD_SIZES)}; or WxH in mm: 700x500"
+        )
+    return board_size(size.upper(), upright=upright)

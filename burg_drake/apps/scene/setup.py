@@ -1,0 +1,137 @@
+"""`burg-drake setup`: composes a scene in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import SCENE_NAMES, add_station, add_verb, port
+from burg_drake.apps.terminal import (
+    deaf_to_interrupts,
+    open_in_browser,
+    terminated_as_interrupted,
+    wait_for_interrupt,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.compose import ComposeSession
+    from burg_drake.ui.server import Door
+
+DEFAULT_LIBRARY = "household"
+LARGEST_PICTURE = 1 << 27
+"""Pixels of an uploaded picture. OpenCV's own limit is 2**30, three gigabytes, for which a file of
+a few megabytes is enough."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        verbs,
+        "setup",
+        run_setup,
+        "compose a scene in the browser: place, check, settle, save, print",
+        "burg-drake setup",
+        "burg-drake setup my_scene.yaml --station my_station.yaml",
+        "burg-drake setup my_library",
+        "burg-drake setup tabletop_six --open",
+        "burg-drake setup my_scene.yaml --host 0.0.0.0",
+    )
+    parser.add_argument(
+        "what",
+        metavar="SCENE|LIBRARY",
+        nargs="?",
+        default=DEFAULT_LIBRARY,
+        help="scene file, which is opened in its folder; or the start of a new scene in the working"
+        f" directory: a library's folder, or a built-in name ({', '.join(SCENE_NAMES)},"
+        f" {DEFAULT_LIBRARY}) (default: %(default)s)",
+    )
+    add_station(parser)
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 any"
+        " other can open it, by an address that is printed and good for one browser",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+
+
+def run_setup(arguments: argparse.Namespace) -> int:
+    """Serves the page until told to end."""
+    from burg_drake.ui.server import require_viser
+
+    require_viser()  # before anything that takes time
+    bound_pictures()
+    with terminated_as_interrupted():
+        closing = contextlib.ExitStack()
+        try:
+            session = closing.enter_context(_open(arguments))
+            closing.callback(_say_what_is_left, session)
+            door = _serve(arguments, session, closing)
+            _tell(door, session)
+            if arguments.open:
+                open_in_browser(door.url)
+            wait_for_interrupt()
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            with deaf_to_interrupts():
+                closing.close()
+    return 0
+
+
+def bound_pictures() -> None:
+    """Has OpenCV refuse larger pictures; it looks when it is imported."""
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(LARGEST_PICTURE))
+
+
+def _open(arguments: argparse.Namespace) -> ComposeSession:
+    from burg_drake.compose import ComposeSession
+    from burg_drake.station.document import load_station
+
+    return ComposeSession.open(arguments.what, load_station(arguments.station))
+
+
+def _serve(
+    arguments: argparse.Namespace, session: ComposeSession, closing: contextlib.ExitStack
+) -> Door:
+    """Serves the page until all is closed."""
+    from burg_drake.ui import SetupPage
+    from burg_drake.ui.server import serve
+
+    door = closing.enter_context(serve(arguments.host, arguments.port, title="burg_drake: setup"))
+    closing.callback(SetupPage(door.server, session).close)
+    session.announce(door.address)
+    door.admission.on_admitted = lambda address: _tell_next(door, address)
+    return door
+
+
+def _tell(door: Door, session: ComposeSession) -> None:
+    view = session.view
+    count = len(view.instances)
+    objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
+    where = view.path or f"not saved yet, to be saved in {session.folder}"
+    print(f"{view.document.name} ({objects}, {where}): open {door.url} in a browser", flush=True)
+    for notice in view.notices:
+        print(f"burg-drake: {notice}", file=sys.stderr, flush=True)
+    print("Press Ctrl-C to end.", flush=True)
+
+
+def _say_what_is_left(session: ComposeSession) -> None:
+    view = session.view
+    if not view.saved and (view.undo_label or view.redo_label):
+        print(
+            f"burg-drake: changes of {view.document.name} are not saved; they are there when the"
+            " same is opened again",
+            file=sys.stderr,
+        )
+
+
+def _tell_next(door: Door, address: str) -> None:
+    print(f"opened by {address}; another browser: open {door.url}", flush=True)

@@ -1,0 +1,220 @@
+"""`burg-drake scene`: show, validate and settle; `scene_sample`, `scene_export` and `scene_import`
+have the rest."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    ENGINE_NAMES,
+    add_group,
+    add_quiet,
+    add_scene,
+    add_station,
+    add_verb,
+    add_view,
+    positive,
+)
+from burg_drake.apps.scene import export, importing, sample
+from burg_drake.core.terminal import TextTable, figure
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.rest import Displacement
+    from burg_drake.simulation.settling import SettledScene
+
+DEFAULT_TIME_LIMIT = 10.0
+"""In step with simulation.settle_scene, which imports too much for a help text."""
+SETTLING_ENGINE = "screening"
+"""Likewise."""
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verbs."""
+    group = add_group(verbs, "scene", "show, validate, settle, sample, export and import scenes")
+    show = add_verb(
+        group,
+        "show",
+        run_show,
+        "show a scene on its station in Meshcat",
+        "burg-drake scene show tabletop_six",
+        "burg-drake scene show my_scene.yaml --station my_station.yaml",
+        "burg-drake scene show tabletop_six --html scene.html",
+    )
+    add_scene(show)
+    add_station(show)
+    show.add_argument("--no-robot", action="store_true", help="leave the arm out")
+    add_view(show)
+    validate = add_verb(
+        group,
+        "validate",
+        run_validate,
+        "check a scene: bounds of the board, ground, overlaps (exit code 1 if anything is wrong)",
+        "burg-drake scene validate my_scene.yaml",
+    )
+    add_scene(validate)
+    add_station(validate)
+    _add_settle(group)
+    sample.add_to(group)
+    export.add_to(group)
+    importing.add_to(group)
+
+
+def _add_settle(group: Any) -> None:
+    settle = add_verb(
+        group,
+        "settle",
+        run_settle,
+        "let the objects of a scene fall and come to rest, and write the scene that this gives",
+        "burg-drake scene settle heap.yaml -o settled.yaml",
+        "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
+        "",
+        "Exit code 1, and no file without --keep, if something still moves, fell off the table, or",
+        "came to rest where `scene validate` refuses it.",
+    )
+    add_scene(settle)
+    add_station(settle)
+    settle.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
+    )
+    settle.add_argument(
+        "--time-limit",
+        metavar="S",
+        type=positive,
+        default=DEFAULT_TIME_LIMIT,
+        help="simulated time allowed (default: %(default)g)",
+    )
+    settle.add_argument(
+        "--keep",
+        action="store_true",
+        help="write the scene all the same, without what fell off the table",
+    )
+    settle.add_argument(
+        "--engine",
+        choices=ENGINE_NAMES,
+        default=SETTLING_ENGINE,
+        help="how time is stepped while objects fall (default: %(default)s)",
+    )
+    add_quiet(settle)
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Shows a scene, however faulty; what is wrong goes to stderr."""
+    from burg_drake.apps.terminal import open_view, present
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.checks import check_scene
+    from burg_drake.station.document import load_station
+    from burg_drake.visualization.scenes import show_scene
+
+    scene = load_scene(arguments.scene)
+    station = load_station(arguments.station)
+    issues = check_scene(scene, station)
+    for issue in issues:
+        print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
+    meshcat = open_view(arguments)
+    with_arm = station.document.arm is not None and not arguments.no_robot
+    show_scene(scene, station, meshcat, robot="arm" if with_arm else "none")
+    caption = [f"{len(scene.instances)} objects on station {station.name}"]
+    present(
+        meshcat, arguments, title=scene.name, caption=caption + [f"⚠ {i.message}" for i in issues]
+    )
+    return 0
+
+
+def run_validate(arguments: argparse.Namespace) -> int:
+    """Prints what is wrong with a scene."""
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.checks import check_scene
+    from burg_drake.station.document import load_station
+
+    scene = load_scene(arguments.scene)
+    station = load_station(arguments.station)
+    issues = check_scene(scene, station)
+    for issue in issues:
+        print(f"{'error' if issue.is_error else 'warning'}: {issue.message}")
+    if not issues:
+        print(
+            f"{scene.path}: {len(scene.instances)} objects stand free and in bounds"
+            f" on station {station.name}"
+        )
+    return 1 if any(issue.is_error for issue in issues) else 0
+
+
+def run_settle(arguments: argparse.Namespace) -> int:
+    """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
+    from burg_drake.apps.scene.references import require_another_file
+    from burg_drake.core.files import require_writable
+    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.scene.document import load_scene
+    from burg_drake.simulation.settling import settle_scene
+    from burg_drake.station.checks import check_scene
+    from burg_drake.station.document import engine_preset, load_station
+
+    require_writable(arguments.output)
+    scene = load_scene(arguments.scene)
+    require_another_file(scene.path, arguments.output)
+    station = load_station(arguments.station)
+    with Reporter(not arguments.quiet) as reporter:
+        whole = Progress("settling", 0.0, arguments.time_limit, unit="s at most")
+        pace = Pace(reporter.show, whole)
+        settled = settle_scene(
+            scene,
+            station,
+            engine=engine_preset(arguments.engine),
+            time_limit=arguments.time_limit,
+            progress=lambda time, moving: pace.step(time, note=f"{moving} moving"),
+        )
+    faults = _faults(settled, arguments.time_limit, kept=arguments.keep)
+    faults += [i.message for i in check_scene(settled.scene, station) if i.is_error]
+    written = arguments.keep or not faults
+    if written:
+        _write_settled(settled, arguments.output)
+    displacement_table(settled.displacements).show()
+    if settled.at_rest:
+        print(f"at rest after {settled.duration:.2f} s")
+    if written:
+        print(f"wrote {arguments.output}")
+    for line in faults:
+        print(f"burg-drake: {scene.path}: {line}", file=sys.stderr)
+    return 1 if faults else 0
+
+
+def _write_settled(settled: SettledScene, output: str) -> None:
+    """Writes a scene so that its library is found from there, too."""
+    import dataclasses
+    from pathlib import Path
+
+    from burg_drake.apps.scene.references import library_reference
+    from burg_drake.scene.document import save_scene
+
+    path, scene = Path(output), settled.scene
+    library = library_reference(scene.document.library, scene.library, path.parent)
+    save_scene(dataclasses.replace(scene.document, library=library, origin=None), path)
+
+
+def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:
+    """How far each object has come."""
+    table = TextTable().names("object").numbers("moved [mm]", "turned [deg]")
+    for name, moved in displacements.items():
+        table.row(name, figure(1e3 * moved.distance, 1), figure(math.degrees(moved.angle), 1))
+    return table
+
+
+def _faults(settled: SettledScene, time_limit: float, *, kept: bool) -> list[str]:
+    """What keeps a scene from being settled, a line each."""
+    lines = []
+    if settled.moving:
+        moving = ", ".join(
+            f"{name!r} at {v.speed * 1e3:.2f} mm/s and {math.degrees(v.turning):.2f} deg/s"
+            for name, v in settled.moving.items()
+        )
+        in_time = settled.duration < time_limit - 1e-9
+        advice = "place it otherwise" if in_time else "give a longer --time-limit"
+        advice += "" if kept else ", or --keep"
+        lines.append(f"after {settled.duration:g} s something still moves: {moving}; {advice}")
+    if settled.fallen:
+        lines.append(f"fell off the table: {', '.join(settled.fallen)}")
+    return lines

@@ -1,0 +1,1 @@
+from .verbs import add_to as add_to

@@ -1,0 +1,33 @@
+"""Arguments that verbs of `burg-drake trials` share."""
+
+from __future__ import annotations
+
+import argparse
+
+from burg_drake.apps.options import Parser
+from burg_drake.core import quoted
+
+
+def add_sheet(parser: Parser) -> None:
+    """The argument TRIALS."""
+    parser.add_argument("trials", metavar="TRIALS", help="trials file of `trials plan`")
+
+
+def add_moved(parser: Parser) -> None:
+    """The option --run, for folders that have moved."""
+    parser.add_argument(
+        "--run",
+        dest="moved",
+        metavar="KEY=FOLDER",
+        type=_moved,
+        action="append",
+        default=[],
+        help="folder of a run that is not where the trials file says",
+    )
+
+
+def _moved(text: str) -> tuple[str, str]:
+    key, equals, folder = text.partition("=")
+    if not key or not equals or not folder:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not KEY=FOLDER")
+    return key, folder

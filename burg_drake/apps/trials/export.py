@@ -1,0 +1,100 @@
+"""`burg-drake trials export`: the timed motion of each trial, for the robot."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import add_quiet, add_retry_failed, add_verb, workers
+from burg_drake.apps.trials.arguments import add_moved, add_sheet
+from burg_drake.core import shown
+
+if TYPE_CHECKING:
+    from burg_drake.experiment.trials import ExportedMotion
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        group,
+        "export",
+        run_export,
+        "write the timed motion of each trial for the robot, one file a trial",
+        "burg-drake trials export trials.yaml -o plans/",
+        "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
+        "",
+        "Files begin with the number of the trial; index.csv lists all trials, with what hinders",
+        "the arm where there is no file. The same command goes on where an interrupted one",
+        "stopped. Exit code 1 if a trial could not be judged.",
+    )
+    add_sheet(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        required=True,
+        help="folder for the motions, about 1.5 MB each",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("json", "csv"),
+        default="json",
+        help="JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python reads both"
+        " (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--station", metavar="STATION", help="with the arm (default: that of each run)"
+    )
+    add_moved(parser)
+    parser.add_argument(
+        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
+    )
+    add_retry_failed(parser, "trials")
+    add_quiet(parser)
+    parser.set_defaults(after_interrupt="; the same command goes on from here")
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Plans and writes; 1 if a trial could not be judged."""
+    from burg_drake.experiment.trials import INDEX_FILE, export_trials
+
+    rows = export_trials(
+        arguments.trials,
+        arguments.output,
+        format=arguments.format,
+        station=arguments.station,
+        moved=dict(arguments.moved),
+        retry_failed=arguments.retry_failed,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    _print_hindered(rows)
+    written = sum(bool(row.file) for row in rows)
+    print(f"{written} of {len(rows)} motions are in {arguments.output}, listed in {INDEX_FILE}")
+    failed = [row for row in rows if row.reason and not row.file]
+    if failed:
+        first = failed[0]
+        print(
+            f"burg-drake: {len(failed)} trials have no motion because a computation failed, such"
+            f" as {first.number}: {shown(first.reason, 200)}",
+            file=sys.stderr,
+        )
+    return 1 if failed else 0
+
+
+def _print_hindered(rows: list[ExportedMotion]) -> None:
+    """Trials that the arm cannot execute, and why."""
+    from burg_drake.core.terminal import TextTable
+
+    hindered = [row for row in rows if not row.file and not row.reason]
+    if not hindered:
+        return
+    table = TextTable("The arm cannot execute").numbers("trial").texts("grasp", "because of")
+    for row in hindered:
+        table.row(str(row.number), row.grasp, f"{row.answer} {row.blocker}".strip())
+    counts = Counter(row.answer for row in hindered)
+    told = ", ".join(f"{count} {answer}" for answer, count in counts.most_common())
+    table.caption = f"{told}; record them as such, or plan with --among reachable or executed"
+    table.show()

@@ -1,0 +1,294 @@
+"""Serves the page of the lab to browsers.
+
+    GET  /                    the page, with its style sheet and scripts
+    GET  /plan                JSON: trials in their order, outcomes; does not change
+    GET  /states              JSON: what was entered so far; with ?after=VERSION 204 if it is that
+    GET  /picture/NAME.jpg    grasp/NUMBER, above/BLOCK or front/BLOCK, kept by browsers
+    GET  /frame.jpg           the newest picture of the camera; with ?epoch=E&after=N another one
+    GET  /camera              JSON, see `LabCamera.status`
+    POST /entry               an entry, see `entry_requests`; it is on the disk when this answers
+    POST /watch               {"number": 3}: the camera looks at the scene of that trial
+    POST /check               {"number": 3, "keep": true}: begins a placement check
+
+Other web sites that the browser has open can neither see nor do anything here: requests must name
+this machine as their host (which stops DNS rebinding), and what acts must come from this page.
+Where other machines can reach the page, a browser needs the token of the printed address, once.
+"""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import json
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from functools import partial
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from typing import Any
+
+from burg_drake.apps.trials.lab_page.entry_requests import lab_entry, trial_number
+from burg_drake.apps.web import address, json_body, picture_number
+from burg_drake.core import (
+    HEADERS as ACCESS_HEADERS,
+    LOCALHOST,
+    BrowserToken,
+    BurgError,
+    InvalidInputError,
+    RequestError,
+    page_url,
+    require_own_host,
+    taken,
+)
+from burg_drake.experiment.pages import (
+    EntryConflict,
+    LabBook,
+    LabCamera,
+    PictureCache,
+    entry_data,
+    plan_data,
+    states,
+)
+
+FIRST_PORT, PORTS = 7300, 50
+"""Without a port the first free one of these; those of the setup page begin at 7200."""
+PATIENCE = 1.0
+"""How long a request for a picture of the camera waits for a newer one [s]."""
+RENDERING = 20.0
+"""How long a request for a picture of a grasp waits until it is made [s]."""
+POLL = 0.05
+"""Between two looks of whether to stop serving [s]."""
+IDLE = 30.0
+"""A connection without requests is closed after this [s]."""
+SCRIPTS = ("page.js", "outbox.js", "troubles.js", "entering.js", "list.js", "camera.js")
+PAGES = {
+    "/": ("page.html", "text/html; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+    **{f"/{name}": (name, "text/javascript; charset=utf-8") for name in SCRIPTS},
+}
+HEADERS = {
+    **ACCESS_HEADERS,
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
+    " base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+}
+KEPT = "private, max-age=86400"
+"""Of pictures of grasps, whose addresses name the plan."""
+NO_TOKEN = (
+    "this page opens by the address with a token that burg-drake printed last; each opens it in one"
+    " browser"
+)
+
+
+class LabServer(ThreadingHTTPServer):
+    """Serves trials until it is closed.
+
+    Args:
+        lab: the trials.
+        shelf: their pictures.
+        camera: over the board, if there is one.
+        host: address to listen on; only this machine can reach the default.
+        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        secret: of the cookie of browsers on other machines, for one that outlives the process; a
+            new one if None.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = sys.platform != "win32"
+
+    def __init__(
+        self,
+        lab: LabBook,
+        shelf: PictureCache,
+        camera: LabCamera | None = None,
+        *,
+        host: str = LOCALHOST,
+        port: int | None = None,
+        secret: str | None = None,
+    ) -> None:
+        self.lab, self.shelf, self.camera, self.host = lab, shelf, camera, host
+        self.plan = json.dumps(plan_data(lab) | {"camera": camera is not None}).encode()
+        if ":" in host:
+            self.address_family = socket.AF_INET6
+        ports = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else range(port, port + 1)
+        for candidate in ports:
+            try:
+                super().__init__((host, candidate), LabHandler)
+                break
+            except OSError as error:
+                failure = error
+                if error.errno != errno.EADDRINUSE:
+                    raise InvalidInputError(
+                        f"the page cannot be served on {host}: {error.strerror or error}"
+                    ) from error
+        else:
+            raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
+        bound, number = self.server_address[:2]
+        local = ipaddress.ip_address(str(bound)).is_loopback
+        self.token = None if local else BrowserToken(f"burg_drake_{number}", secret)
+        self.on_admitted: Callable[[str], None] = lambda peer: None
+
+    @property
+    def url(self) -> str:
+        """Address of the page for the next browser; with a token, good for one alone, if other
+        machines can reach it."""
+        page = page_url(self.host, self.server_address[1])
+        return page if self.token is None else f"{page}?token={self.token.token}"
+
+    def start(self) -> None:
+        """Serves in a thread of its own."""
+        serving = partial(self.serve_forever, poll_interval=POLL)
+        threading.Thread(target=serving, name="lab server", daemon=True).start()
+
+    def close(self) -> None:
+        """Stops serving; requests that are being answered end soon."""
+        self.shutdown()
+        self.server_close()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle of an answer is no error."""
+        if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
+            super().handle_error(request, client_address)
+
+
+class LabHandler(BaseHTTPRequestHandler):
+    """Answers one connection's requests."""
+
+    server: LabServer
+    protocol_version = "HTTP/1.1"
+    timeout = IDLE
+
+    def do_GET(self) -> None:
+        """Pages, pictures, what was entered."""
+        routes: dict[str, Callable[[dict[str, str]], None]] = {
+            "/plan": self._send_plan,
+            "/states": self._send_states,
+            "/frame.jpg": self._send_frame,
+            "/camera": self._send_camera,
+        }
+        routes |= {path: partial(self._send_page, path) for path in PAGES}
+        self._answer(routes)
+
+    def do_POST(self) -> None:
+        """Entries and actions."""
+        self._answer({"/entry": self._enter, "/watch": self._watch, "/check": self._check})
+
+    def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
+        try:
+            path, query = address(self.path)
+            require_own_host(self._header, served=self.server.host, is_page=path == "/")
+            self._require_browser(path, query)
+            if self.command == "GET" and path.startswith("/picture/"):
+                self._send_picture(path.removeprefix("/picture/").removesuffix(".jpg"))
+                return
+            if path not in routes:
+                raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path[:100]}")
+            routes[path](json_body(self.headers, self.rfile) if self.command == "POST" else query)
+        except RequestError as error:
+            self.close_connection = True  # its body may not have been read
+            self._send_json({"error": str(error)}, error.code)
+        except EntryConflict as error:
+            answer = {"error": str(error), "entry": entry_data(error.trial)}
+            self._send_json(answer, HTTPStatus.CONFLICT)
+        except BurgError as error:
+            self._send_json({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
+
+    def _header(self, name: str) -> str | None:
+        """A header; given twice it would mean one thing here and another thing there."""
+        values = self.headers.get_all(name, [])
+        if len(values) > 1:
+            raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
+        return values[0] if values else None
+
+    def _require_browser(self, path: str, query: dict[str, str]) -> None:
+        """Lets in who was admitted, or brings the token."""
+        token, self._new_cookie = self.server.token, ""
+        if token is None or token.admits(self._header("Cookie") or ""):
+            return
+        if path != "/" or not token.use(query.get("token", "")):
+            raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        self._new_cookie = token.set_cookie
+        self.server.on_admitted(str(self.client_address[0]))
+
+    def _send_page(self, path: str, query: dict[str, str]) -> None:
+        name, kind = PAGES[path]
+        page = (files("burg_drake.apps.trials.lab_page") / name).read_bytes()
+        cookie = {"Set-Cookie": self._new_cookie} if self._new_cookie else None
+        self._send(HTTPStatus.OK, kind, page, cookie)
+
+    def _send_plan(self, query: dict[str, str]) -> None:
+        self._send(HTTPStatus.OK, "application/json", self.server.plan)
+
+    def _send_states(self, query: dict[str, str]) -> None:
+        found = states(self.server.lab)
+        if "version" in found and found["version"] == query.get("after"):
+            self._send(HTTPStatus.NO_CONTENT)
+        else:
+            self._send_json(found)
+
+    def _send_picture(self, name: str) -> None:
+        picture = self.server.shelf.get(name, RENDERING)
+        if picture is None:
+            fault = self.server.shelf.fault or f"there is no picture {name[:100]}"
+            raise RequestError(HTTPStatus.NOT_FOUND, fault)
+        self._send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": KEPT})
+
+    def _send_frame(self, query: dict[str, str]) -> None:
+        after = picture_number(query)
+        epoch = picture_number({"after": query.get("epoch", "0")})
+        found = self._camera().next_picture(epoch, after, PATIENCE)
+        if found is None:
+            self._send(HTTPStatus.NO_CONTENT)
+            return
+        epoch, picture = found
+        headers = {"X-Picture": str(picture.number), "X-Epoch": str(epoch)}
+        self._send(HTTPStatus.OK, "image/jpeg", picture.jpeg, headers)
+
+    def _send_camera(self, query: dict[str, str]) -> None:
+        self._send_json(self._camera().status())
+
+    def _enter(self, body: dict[str, Any]) -> None:
+        entry = lab_entry(body, self.server.lab.plan)
+        self._send_json({"entry": entry_data(self.server.lab.enter(entry))})
+
+    def _watch(self, body: dict[str, Any]) -> None:
+        self._camera().watch(trial_number(body))
+        self._send_json({})
+
+    def _check(self, body: dict[str, Any]) -> None:
+        if not isinstance(body.get("keep"), bool):
+            raise RequestError(HTTPStatus.BAD_REQUEST, '"keep" must be true or false')
+        self._camera().check(trial_number(body), keep=body["keep"])
+        self._send_json({})
+
+    def _camera(self) -> LabCamera:
+        if self.server.camera is None:
+            raise RequestError(HTTPStatus.NOT_FOUND, "there is no camera; start with --camera")
+        return self.server.camera
+
+    def _send_json(self, data: Any, code: HTTPStatus = HTTPStatus.OK) -> None:
+        self._send(code, "application/json", json.dumps(data, allow_nan=False).encode())
+
+    def _send(
+        self,
+        code: HTTPStatus,
+        kind: str = "",
+        body: bytes = b"",
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        self.send_response(code)
+        for name, value in {**HEADERS, **(headers or {})}.items():
+            self.send_header(name, value)
+        if code != HTTPStatus.NO_CONTENT:
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not worth a line."""

@@ -1,0 +1,52 @@
+"""`burg-drake trials restore`: enters again what an editor has overwritten."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from burg_drake.apps.options import add_verb, positive_int
+from burg_drake.apps.trials.arguments import add_sheet
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb."""
+    parser = add_verb(
+        group,
+        "restore",
+        run_restore,
+        "enter recorded entries again that the file has lost, as to an editor with an old buffer",
+        "burg-drake trials restore trials.yaml",
+        "burg-drake trials restore trials.yaml --number 17",
+        "burg-drake trials restore trials.yaml --number 17 --keep",
+        "",
+        "What was edited by hand to something that was never recorded stays as it is.",
+    )
+    add_sheet(parser)
+    parser.add_argument(
+        "--number",
+        metavar="N",
+        type=positive_int,
+        action="append",
+        help="of a trial (default: all); may be given several times",
+    )
+    parser.add_argument(
+        "--keep", action="store_true", help="change nothing: the file is right, not the journal"
+    )
+
+
+def run_restore(arguments: argparse.Namespace) -> int:
+    """Restores, and says what."""
+    from burg_drake.experiment.trials import TrialBook
+
+    book = TrialBook(arguments.trials)
+    for number in arguments.number or ():
+        book.trial(number)
+    done = (book.keep if arguments.keep else book.restore)(arguments.number)
+    what = "kept as it is in the file" if arguments.keep else "restored"
+    for trial in done:
+        outcome = "no outcome" if trial.outcome is None else trial.outcome.value
+        print(f"trial {trial.number}: {what}, {outcome}")
+    if not done:
+        print("nothing to restore")
+    return 0

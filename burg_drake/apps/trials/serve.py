@@ -1,0 +1,192 @@
+"""`burg-drake trials serve`: a page for the lab, on which trials are entered as they are carried
+out."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import secrets
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    add_measured_board,
+    add_verb,
+    port,
+    positive,
+    print_scale,
+)
+from burg_drake.apps.terminal import terminated_as_interrupted, wait_for_interrupt
+from burg_drake.apps.trials.arguments import add_moved, add_sheet
+
+if TYPE_CHECKING:
+    from burg_drake.cameras.optics import Intrinsics
+    from burg_drake.experiment.pages import LabBook, LabCamera
+    from burg_drake.scene.document import Scene
+
+SIMULATED = "sim:"
+SECRET_BYTES = 24
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verb to the group `trials`."""
+    parser = add_verb(
+        verbs,
+        "serve",
+        run_serve,
+        "a page for the lab: the next trial, its picture, a button for each outcome; every entry"
+        " is saved at once",
+        "burg-drake trials serve trials.yaml --open",
+        "burg-drake trials serve trials.yaml --host 0.0.0.0",
+        "burg-drake trials serve trials.yaml --camera 0 --intrinsics camera.yaml",
+        "burg-drake trials serve trials.yaml --camera sim:panda_tabletop/board",
+    )
+    add_sheet(parser)
+    add_moved(parser)
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 tablets"
+        " on the network can open it, each by an address with a token that is printed",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    parser.add_argument(
+        "--show-simulated",
+        action="store_true",
+        help="show what was simulated; without, who carries out the trials does not know it",
+    )
+    camera = parser.add_argument_group("camera")
+    camera.add_argument(
+        "--camera",
+        metavar="SOURCE",
+        help="number of a camera, address of a stream, video, image, folder or pattern of images,"
+        " or sim:STATION/CAMERA: the page shows the scene over its picture, and how far objects"
+        " stand from their places",
+    )
+    camera.add_argument(
+        "--intrinsics",
+        metavar="FILE",
+        help="of the camera; see burg-drake camera calibrate. Simulated cameras know theirs",
+    )
+    camera.add_argument("--fps", type=positive, metavar="N", help="images a second of the camera")
+    add_measured_board(camera)
+
+
+def run_serve(arguments: argparse.Namespace) -> int:
+    """Serves the page until Ctrl-C."""
+    from burg_drake.apps.terminal import open_in_browser
+    from burg_drake.apps.trials.lab_page import LabServer
+    from burg_drake.experiment.pages import LabBook, PictureCache, TriedRuns
+
+    runs = TriedRuns(arguments.trials, dict(arguments.moved))
+    lab = LabBook(runs, show_simulated=arguments.show_simulated)
+    with terminated_as_interrupted(), contextlib.ExitStack() as closing:
+        camera = _camera(arguments, lab) if arguments.camera else None
+        if camera is not None:
+            closing.callback(camera.close)
+        shelf = PictureCache(runs)
+        server = LabServer(
+            lab,
+            shelf,
+            camera,
+            host=arguments.host,
+            port=arguments.port,
+            secret=_kept_secret(lab.plan),
+        )
+        server.on_admitted = lambda peer: _tell(
+            f"{peer} came in; for another browser: {server.url}"
+        )
+        closing.callback(shelf.close)
+        server.start()
+        closing.callback(server.close)
+        print(f"{len(runs.sheet.trials)} trials: open {server.url} in a browser", flush=True)
+        print("Press Ctrl-C to end. What the page says is saved is in the file.", flush=True)
+        if arguments.open:
+            open_in_browser(server.url)
+        with contextlib.suppress(KeyboardInterrupt):
+            wait_for_interrupt()
+    return 0
+
+
+def _tell(line: str) -> None:
+    print(f"burg-drake: {line}", file=sys.stderr, flush=True)
+
+
+def _camera(arguments: argparse.Namespace, lab: LabBook) -> LabCamera:
+    from burg_drake.cameras.sources import open_source
+    from burg_drake.experiment.pages import LabCamera
+
+    intrinsics = _intrinsics(arguments)
+    size = (intrinsics.width, intrinsics.height)
+
+    def opened(scene: Scene) -> Any:
+        return open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
+
+    camera = LabCamera(lab, opened, intrinsics, print_scale=print_scale(arguments))
+    trials = lab.sheet().trials
+    first = next((trial for trial in trials if trial.outcome is None), trials[0])
+    camera.watch(first.number)  # what does not work is said now
+    return camera
+
+
+def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
+    from burg_drake.cameras.optics import load_intrinsics
+    from burg_drake.core import InvalidInputError
+
+    if arguments.intrinsics is not None:
+        return load_intrinsics(arguments.intrinsics)
+    if not arguments.camera.startswith(SIMULATED):
+        raise InvalidInputError(
+            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
+            " one"
+        )
+    return load_intrinsics(arguments.camera)
+
+
+def _kept_secret(plan: str) -> str | None:
+    """The secret of the browsers that were let in to these trials, so that they need no new address
+    when the page is started again; None if it cannot be kept.
+
+    It lies in the user's cache, for the user alone to read.
+    """
+    from burg_drake.core import cache_folder
+
+    folder = cache_folder()
+    if folder is None:
+        return None
+    path = folder / f"lab_{plan}.secret"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not _secret_in(path):
+            _write_secret(path)
+        return _secret_in(path) or None
+    except OSError:
+        return None
+
+
+def _secret_in(path: Path) -> str:
+    """What the file holds; empty if that is no secret, or there is none."""
+    try:
+        text = path.read_text(encoding="ascii")
+    except (FileNotFoundError, UnicodeDecodeError):
+        return ""
+    return text if len(text) >= SECRET_BYTES else ""
+
+
+def _write_secret(path: Path) -> None:
+    """Writes a new one beside it, for the user alone to read, and renames it: whole or not."""
+    import os
+    import tempfile
+
+    file, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(file, "w", encoding="ascii") as stream:
+            stream.write(secrets.token_urlsafe(SECRET_BYTES))
+        os.replace(name, path)
+    finally:
+        Path(name).unlink(missing_ok=True)

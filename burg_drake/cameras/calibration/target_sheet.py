@@ -1,0 +1,132 @@
+"""A calibration target as a PDF, at true scale."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from reportlab.pdfgen.canvas import Canvas
+
+from burg_drake.cameras.calibration.target import CharucoTarget
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.core.files import atomic_write
+from burg_drake.printout import (
+    BLACK,
+    BOLD,
+    INK,
+    POINT,
+    Paper,
+    Pen,
+    PrintSettings,
+    cell_outlines,
+    orientations,
+    page_frame,
+    rectangle,
+)
+from burg_drake.scene.document import marker_dictionary
+
+QUIET = 0.3
+"""White around the squares, as a share of a square: edges need some to be seen as edges."""
+
+
+def write_target(
+    target: CharucoTarget, path: str | Path, settings: PrintSettings | None = None
+) -> Paper:
+    """Writes a target as a PDF of one page.
+
+    Args:
+        target: to print.
+        path: file to write.
+        settings: page and printer; A4 by default. Of these the height map and names do not count.
+
+    Returns:
+        The page, upright or across, whichever the target fits on.
+
+    Raises:
+        UnknownNameError: there is no such page.
+        InvalidInputError: the target does not fit on the page, or the file cannot be written.
+    """
+    settings = settings or PrintSettings()
+    papers = orientations(settings.page, settings.margin, settings.measured)
+    paper = next((p for p in papers if _fits(target, p)), None)
+    if paper is None:
+        raise InvalidInputError(
+            "a target of {} x {} squares of {:g} mm is {:.0f} x {:.0f} mm large and does not fit on"
+            " page {}, which has room for {:.0f} x {:.0f} mm; take a larger --page or smaller"
+            " squares".format(
+                *target.squares,
+                1e3 * target.square,
+                *(1e3 * side for side in target.size),
+                papers[0].name,
+                *(1e3 * side for side in papers[0].room),
+            )
+        )
+    stream = io.BytesIO()
+    stretch = 0.1 / np.array(settings.measured)
+    page_size = tuple((stretch * [paper.width, paper.height] / POINT).tolist())
+    canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)
+    canvas.setTitle("Calibration target")
+    canvas.setCreator("burg-drake")
+    canvas.setViewerPreference("PrintScaling", "None")
+    canvas.scale(*stretch.tolist())
+    pen = Pen(canvas)
+    page_frame.draw_rulers(pen, paper)
+    _draw_words(pen, target, paper)
+    _draw_squares(pen, target, upper_left(target, paper))
+    canvas.showPage()
+    canvas.save()
+    atomic_write(path, stream.getvalue())
+    return paper
+
+
+def upper_left(target: CharucoTarget, paper: Paper) -> Array:
+    """(2,) where the target's origin is on the page, from its lower left corner [m]."""
+    spare = (np.array(paper.room) - target.size) / 2.0
+    return np.array(paper.lower) + spare + [0.0, target.size[1]]
+
+
+def _fits(target: CharucoTarget, paper: Paper) -> bool:
+    needed = np.array(target.size) + 2.0 * QUIET * target.square
+    # Beyond the room there is the margin, which is white, too.
+    return bool((needed <= np.array(paper.room) + 1e-9).all())
+
+
+def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
+    """Black squares and markers; T has y down the page."""
+    flip = np.array([1.0, -1.0])
+    markers = np.asarray(target.board.getObjPoints())[:, 0, :2]
+    white = {tuple(at) for at in np.floor(markers / target.square).astype(int).tolist()}
+    columns, rows = target.squares
+    black = [(i, j) for j in range(rows) for i in range(columns) if (i, j) not in white]
+    squares = []
+    for at in black:
+        corner = np.array(at) * target.square
+        squares.append(
+            origin + flip * rectangle(corner.tolist(), (corner + target.square).tolist())
+        )
+    pen.area(squares, BLACK, holes=False)
+    dictionary = marker_dictionary(target.dictionary)
+    bits = int(dictionary.markerSize) + 2
+    for number, corner in zip(target.board.getIds().ravel(), markers, strict=True):
+        image = dictionary.generateImageMarker(int(number), bits)
+        loops = [loop * (target.marker / bits) for loop in cell_outlines(image < 128)]
+        pen.area([origin + flip * (corner + loop) for loop in loops], BLACK)
+
+
+def _draw_words(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
+    left, base = paper.lower[0] + 0.108, paper.margin
+    columns, rows = target.squares
+    command = (
+        f"--squares {columns}x{rows} --square-mm {1e3 * target.square:g}"
+        f" --marker-mm {1e3 * target.marker:g} --dictionary {target.dictionary}"
+    )
+    pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD, color=INK)
+    for k, line in enumerate(
+        (
+            "Print at 100 %, glue onto something flat and stiff, then",
+            "burg-drake camera calibrate PHOTOS -o K.yaml",
+            command + (" --legacy" if target.legacy else ""),
+        )
+    ):
+        pen.text(left, base + 5.9e-3 - 2.75e-3 * k, line, 5.5)

@@ -1,0 +1,217 @@
+"""What viewers of a live session can have made of it: snapshots, recordings, placement checks."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from burg_drake.cameras.live.frame_processing import FrameProcessor
+from burg_drake.cameras.live.picture import Picture
+from burg_drake.cameras.live.recording import Recording
+from burg_drake.cameras.live.recording_files import RecordingFiles
+from burg_drake.cameras.live.session import LiveSession
+from burg_drake.cameras.live.snapshot import (
+    Snapshot,
+    describe_snapshot,
+    numbered,
+    save_snapshot,
+    scene_document,
+)
+from burg_drake.core import BurgError, InvalidInputError
+
+DEFAULT_RATE = 30.0
+"""Of recordings from sources that do not tell theirs [frames a second]."""
+FRESH = 5.0
+"""How long an action waits for the first picture of a session that idled [s]."""
+LOWEST_RATE, HIGHEST_RATE = 1.0, 240.0
+"""Of recordings, whatever a source says of itself: files that count time in ticks of 1/90000 s may
+give that as their rate, which no codec takes [frames a second]."""
+
+
+class ViewActions:
+    """Acts on a live session; every method may be called from any thread.
+
+    Args:
+        live: the session.
+        folder: where snapshots and recordings are put that are not given a path.
+        plain: recordings also get the pictures without overlay.
+    """
+
+    def __init__(self, live: LiveSession, folder: str | Path = ".", *, plain: bool = False) -> None:
+        self.live, self.folder = live, Path(folder)
+        self.recording: Recording | None = None
+        """The one that is being written."""
+        self.checking = False
+        """A placement check is at work."""
+        self._plain = plain
+        self._lock = threading.RLock()
+        self._check: threading.Thread | None = None
+        live.on_frame(self._record)
+        live.keep_awake(lambda: self.recording is not None)
+
+    @property
+    def session(self) -> FrameProcessor:
+        """What looks at the frames."""
+        return self.live.session
+
+    def snapshot(self, folder: str | Path | None = None, picture: Picture | None = None) -> Path:
+        """Saves a picture.
+
+        Args:
+            folder: new folder to make; `SCENE_snapshot_001` and so on if not given.
+            picture: the newest if not given.
+
+        Raises:
+            InvalidInputError: there is no picture yet, or the folder cannot be written.
+        """
+        picture = picture or self._newest()
+        if picture is None:
+            raise InvalidInputError("there is no picture yet")
+        sight = picture.sight
+        document = describe_snapshot(
+            self.session.scene,
+            self.session.intrinsics,
+            sight.estimate,
+            source=sight.frame.name,
+            taken=_now(),
+            time=sight.frame.time,
+            X_SC_drawn=sight.X_SC,
+            placement=picture.placement,
+        )
+        snapshot = Snapshot(
+            document=document,
+            image=sight.frame.image,
+            overlay=picture.overlay,
+            depth=sight.frame.depth,
+        )
+        with self._lock:  # two at once must not choose the same number
+            place = Path(folder) if folder is not None else self._free("snapshot")
+            save_snapshot(snapshot, place)
+        self.live.events.tell(f"snapshot {place}")
+        return place
+
+    def start_recording(self, path: str | Path | None = None) -> Path:
+        """Records all frames from now on.
+
+        Args:
+            path: of the video; `SCENE_recording_001.mp4` and so on if not given.
+
+        Raises:
+            InvalidInputError: it cannot be written, files of that name exist, or a recording is
+                being written already.
+        """
+        with self._lock:
+            if self.recording is not None:
+                raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
+            if path is None:
+                path = self._free("recording", ".mp4", taken=self._is_recorded)
+            rate = self.live.source.fps or DEFAULT_RATE
+            self.recording = Recording(
+                path,
+                self.session.intrinsics,
+                scene_document(self.session.scene),
+                source=self.live.source.name,
+                started=_now(),
+                frames_per_second=min(max(rate, LOWEST_RATE), HIGHEST_RATE),
+                plain=self._plain,
+            )
+            self.live.attend()
+            self.live.events.tell(f"recording {path}")
+            return self.recording.path
+
+    def stop_recording(self) -> Path | None:
+        """Finishes the recording; None if there was none, or nothing in it.
+
+        Raises:
+            InvalidInputError: it could not be written whole.
+        """
+        with self._lock:
+            recording, self.recording = self.recording, None
+            if recording is None:
+                return None
+            path = recording.close()
+        if path is None:
+            self.live.events.tell(f"{recording.path}: nothing was recorded")
+        else:
+            seconds = recording.frames / recording.frames_per_second
+            self.live.events.tell(f"recorded {path}, {seconds:.1f} s")
+        return path
+
+    def start_check(self) -> None:
+        """Measures in a thread of its own how the objects of the newest picture stand.
+
+        Raises:
+            InvalidInputError: there is no picture with a pose, or a check is at work.
+        """
+        picture = self._newest()
+        if picture is None or not picture.sight.estimate.valid:
+            raise InvalidInputError(
+                "a placement check needs a picture that shows where the board is"
+            )
+        with self._lock:
+            if self.checking:
+                raise InvalidInputError("a placement check is at work already")
+            self.checking = True
+            self._check = threading.Thread(
+                target=self._measure, args=(picture,), name="placement check", daemon=True
+            )
+            self._check.start()
+
+    def wait_for_check(self, seconds: float | None = None) -> None:
+        """Until the placement check that is at work, if any, is done."""
+        if self._check is not None:
+            self._check.join(seconds)
+
+    def _newest(self) -> Picture | None:
+        """The newest picture; of a session that idled, the next one."""
+        stale = self.live.attend()
+        return self.live.next_picture(stale, FRESH) if stale else self.live.picture
+
+    def _measure(self, picture: Picture) -> None:
+        try:
+            check = self.session.check(picture.sight)
+        except BurgError as error:
+            self.live.events.tell(f"placement check: {error}", bad=True)
+        else:
+            self.live.placement = check
+            measured = sum(placed.status != "not_seen" for placed in check.instances.values())
+            self.live.events.tell(
+                f"placement of {measured} of {len(check.instances)} objects measured"
+                + (f"; {check.reason}" if check.reason else "")
+            )
+        finally:
+            self.checking = False
+
+    def _record(self, picture: Picture) -> None:
+        with self._lock:
+            if self.recording is None:
+                return
+            sight = picture.sight
+            try:
+                self.recording.add(
+                    picture.overlay, sight.estimate, sight.frame.time, sight.frame.image
+                )
+            except Exception as error:  # whatever it is, the view goes on
+                self.live.events.tell(f"recording ended: {error}", bad=True)
+                self._save_what_there_is()
+
+    def _save_what_there_is(self) -> None:
+        """Finishes a recording that cannot go on; whoever reads the events learns where it is."""
+        try:
+            self.stop_recording()
+        except Exception as error:
+            self.live.events.tell(str(error), bad=True)
+
+    def _is_recorded(self, path: Path) -> bool:
+        return RecordingFiles(path, self._plain).existing() is not None
+
+    def _free(
+        self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
+    ) -> Path:
+        return numbered(self.folder, f"{self.session.scene.name}_{what}", suffix, taken=taken)
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="seconds")

@@ -1,0 +1,327 @@
+"""A session that runs by itself: frames come, the newest is looked at and drawn over, and whoever
+wants takes the newest picture.
+
+Two threads: the source's reader, and one that looks and draws (alone, for the renderer). All that
+is public may be called from any thread.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from burg_drake.cameras.live.event_log import EventLog
+from burg_drake.cameras.live.frame_processing import (
+    FrameProcessor,
+    LocatedFrame,
+    ViewSettings,
+    changed_settings,
+    checked_settings,
+    pose_line,
+    timed,
+)
+from burg_drake.cameras.live.frame_reader import FrameReader
+from burg_drake.cameras.live.picture import Picture, encode_jpeg
+from burg_drake.cameras.placement import PlacementCheck
+from burg_drake.cameras.sources import Frame, FrameSource
+from burg_drake.core import BurgError
+
+RATE_OVER = 2.0
+"""The rate of frames is counted over the last of these [s]."""
+LASTING = 1.0
+"""A pose that comes or goes is an event when it lasts that long [s]."""
+LOOK = 0.5
+"""Between two looks of who waits for the end of a session [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counts:
+    """Of the frames that were looked at.
+
+    Attributes:
+        frames: all.
+        valid: those that gave a pose.
+        reason: why the last one without did not.
+    """
+
+    frames: int = 0
+    valid: int = 0
+    reason: str = ""
+
+
+class LiveSession:
+    """A running session; `start` it, and `close` it.
+
+    Args:
+        session: what looks at frames and draws.
+        source: of the frames; closed with this.
+        events: are told what happens to camera and pose, never once a frame.
+        settings: to begin with.
+        paced: play files as fast as they were taken; else as fast as they can be looked at.
+        idle_after: frames of a camera are neither read nor looked at when nobody has asked for a
+            picture, or kept it `awake`, for so long [s]. Whoever asks gets a new one.
+
+    Attributes:
+        picture: the newest; None before the first.
+        counts: of frames so far.
+        last_sight: the last frame that gave a pose; before one did, the last frame.
+
+    Raises:
+        InvalidInputError: the source has another resolution than the intrinsics.
+    """
+
+    def __init__(
+        self,
+        session: FrameProcessor,
+        source: FrameSource,
+        *,
+        events: EventLog,
+        settings: ViewSettings = ViewSettings(),  # noqa: B008 (frozen)
+        paced: bool = True,
+        idle_after: float = math.inf,
+    ) -> None:
+        session.intrinsics.require_size(*source.size, source.name)
+        self.session, self.source, self.events = session, source, events
+        self.picture: Picture | None = None
+        self.counts = Counts()
+        self.last_sight: LocatedFrame | None = None
+        self.reader = FrameReader(
+            source,
+            paced=paced,
+            on_change=self._wake,
+            events=events,
+            wanted=lambda: not self.is_idle,
+        )
+        self._idle_after = idle_after if source.live else math.inf
+        self._asked, self._waiting = math.inf, 0
+        self._awake: list[Callable[[], bool]] = []
+        self._settings = checked_settings(session.scene, settings)
+        self._placement: PlacementCheck | None = None
+        self._on_frame: list[Callable[[Picture], None]] = []
+        self._changed = threading.Condition(threading.RLock())
+        self._redraw = self._closed = self._busy = False
+        self._limit: int | None = None
+        self._failure: BaseException | None = None
+        self._moments: deque[float] = deque()
+        self._told: tuple[bool, bool] | None = None
+        self._same_since = (0.0, (False, False))
+        self._worker = threading.Thread(target=self._work, name="live session", daemon=True)
+
+    def start(self, frames: int | None = None) -> None:
+        """Begins to look at frames, no more than `frames` of them if given."""
+        self._limit, self._asked = frames, time.monotonic()
+        self.reader.start()
+        self._worker.start()
+
+    def close(self) -> None:
+        """Ends both threads, and the source."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self.reader.close()
+        if self._worker.ident is not None:
+            self._worker.join()
+
+    def on_frame(self, listener: Callable[[Picture], None]) -> None:
+        """Calls `listener` with the first picture of each frame, in the thread that draws."""
+        self._on_frame.append(listener)
+
+    def keep_awake(self, reason: Callable[[], bool]) -> None:
+        """Does not idle as long as `reason` says so, such as while something is recorded."""
+        self._awake.append(reason)
+
+    @property
+    def is_idle(self) -> bool:
+        """Nobody wants pictures."""
+        unasked = not self._waiting and time.monotonic() - self._asked > self._idle_after
+        return unasked and not any(reason() for reason in self._awake)
+
+    def attend(self) -> int:
+        """Somebody wants pictures from now on; wakes the session where it idles.
+
+        Returns:
+            The number of the newest picture, if it is from before an idle time, and stale; else 0.
+        """
+        with self._changed:
+            waits = self.picture is not None and self.is_idle and not self._settings.frozen
+            stale = self.picture.number if self.picture is not None and waits else 0
+            self._asked = time.monotonic()
+        self.reader.wake()
+        return stale
+
+    @property
+    def settings(self) -> ViewSettings:
+        """What viewers chose."""
+        return self._settings
+
+    def change(self, /, **settings: Any) -> None:
+        """Changes settings by name, see `ViewSettings`.
+
+        Raises:
+            InvalidInputError: no such setting, or not such a value.
+        """
+        with self._changed:
+            self._settings = changed_settings(self.session.scene, self._settings, settings)
+            self._redraw = True
+            self._changed.notify_all()
+
+    @property
+    def placement(self) -> PlacementCheck | None:
+        """How the objects stand, as it was measured last; shown in the overlay."""
+        return self._placement
+
+    @placement.setter
+    def placement(self, check: PlacementCheck | None) -> None:
+        with self._changed:
+            self._placement, self._redraw = check, True
+            self._changed.notify_all()
+
+    @property
+    def rate(self) -> float:
+        """Frames a second that were looked at, of late."""
+        now = time.monotonic()
+        return sum(now - moment <= RATE_OVER for moment in tuple(self._moments)) / RATE_OVER
+
+    def next_picture(self, after: int, seconds: float) -> Picture | None:
+        """The newest picture, as soon as its number is above `after`; None if that takes longer.
+
+        Of a session that idles it is the next one.
+        """
+        with self._changed:
+            after = max(after, self.attend())
+            self._waiting += 1
+            try:
+                self.reader.wake()
+                self._changed.wait_for(
+                    lambda: self._closed or (self.picture and self.picture.number > after), seconds
+                )
+            finally:
+                self._waiting -= 1
+            picture = self.picture
+        return picture if picture is not None and picture.number > after else None
+
+    def wait(self, *, seconds: float | None = None, to_end: bool = True) -> None:
+        """Until all frames were looked at, or so much time has gone by.
+
+        Args:
+            seconds: any time if None.
+            to_end: a file that has ended is an end.
+
+        Raises:
+            BaseException: what ended a thread of the session.
+        """
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        with self._changed:
+            # In pieces: an interrupt may have come in another thread, which does not wake this one.
+            while not self._is_over(to_end) and (left := end - time.monotonic()) > 0:
+                self._changed.wait(min(left, LOOK))
+        failure = self._failure or self.reader.failure
+        if failure is not None:
+            raise failure
+
+    def _is_over(self, to_end: bool) -> bool:
+        if self._closed or self._failure or self.reader.failure or self._enough:
+            return True
+        ended = self.reader.state == "ended" and self.reader.is_empty and not self._busy
+        return to_end and ended
+
+    @property
+    def _enough(self) -> bool:
+        return self._limit is not None and self.counts.frames >= self._limit
+
+    def _wake(self) -> None:
+        with self._changed:
+            self._changed.notify_all()
+
+    def _work(self) -> None:
+        try:
+            while not self._closed:
+                self._work_once()
+        except BaseException as error:  # ends the thread; who waits for it raises it
+            self._failure = error
+        self._wake()
+
+    def _work_once(self) -> None:
+        """Waits for something to do, and does it."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._redraw or self._wants_frame)
+            if self._closed:
+                return
+            frame = self.reader.take() if self._wants_frame else None
+            self._busy, self._redraw = True, False
+        try:
+            sight = self._look(frame) if frame is not None else None
+            if sight is not None:
+                self._show(sight, new=True)
+            elif self.picture is not None:
+                self._show(self.picture.sight, new=False)
+        finally:
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+
+    @property
+    def _wants_frame(self) -> bool:
+        frozen = self._settings.frozen and self.picture is not None
+        return not (self.reader.is_empty or frozen or self._enough)
+
+    def _look(self, frame: Frame) -> LocatedFrame | None:
+        try:
+            sight = self.session.look(frame, steady=self._settings.steady)
+        except BurgError as error:  # one image of a folder may have another size
+            self.events.tell(f"{error}; left out", bad=True)
+            self.counts = replace(self.counts, frames=self.counts.frames + 1, reason=str(error))
+            return None
+        estimate, counts = sight.estimate, self.counts
+        self.counts = Counts(
+            frames=counts.frames + 1,
+            valid=counts.valid + estimate.valid,
+            reason=counts.reason if estimate.valid else estimate.reason,
+        )
+        if estimate.valid or not counts.valid:
+            self.last_sight = sight
+        now = time.monotonic()
+        self._moments.append(now)
+        while now - self._moments[0] > RATE_OVER:
+            self._moments.popleft()
+        self._tell_of_pose(sight, now)
+        return sight
+
+    def picture_of(self, sight: LocatedFrame, placement: PlacementCheck | None) -> Picture:
+        """Draws a picture with the settings as they are."""
+        settings = self._settings
+        overlay, drawing = timed(lambda: self.session.draw(sight, settings, placement))
+        jpeg, encoding = timed(lambda: encode_jpeg(overlay))
+        return Picture(
+            number=1 if self.picture is None else self.picture.number + 1,
+            sight=sight,
+            overlay=overlay,
+            jpeg=jpeg,
+            settings=settings,
+            placement=placement,
+            milliseconds={**sight.milliseconds, "overlay": drawing, "jpeg": encoding},
+        )
+
+    def _show(self, sight: LocatedFrame, *, new: bool) -> None:
+        picture = self.picture_of(sight, self._placement)
+        with self._changed:
+            self.picture = picture
+            self._changed.notify_all()
+        for listener in self._on_frame if new else ():
+            listener(picture)
+
+    def _tell_of_pose(self, sight: LocatedFrame, now: float) -> None:
+        """An event when the pose comes or goes, and stays so for a while."""
+        state = (sight.estimate.valid, bool(sight.estimate.reason))
+        if self._same_since[1] != state:
+            self._same_since = (now, state)
+        lasting = now - self._same_since[0] >= LASTING
+        if self._told is None or (state != self._told and lasting):
+            self._told = state
+            line = pose_line(sight.estimate, self.session.scene.board)
+            self.events.tell(f"{sight.frame.name}: {line}", bad=not state[0])

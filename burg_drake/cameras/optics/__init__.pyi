@@ -1,0 +1,22 @@
+from .field_of_view import (
+    NEAR as NEAR,
+    FieldOfView as FieldOfView,
+)
+from .intrinsics import (
+    HALF_PIXEL as HALF_PIXEL,
+    Intrinsics as Intrinsics,
+    camera_info as camera_info,
+    of_camera as of_camera,
+)
+from .intrinsics_file import (
+    ROS_MODELS as ROS_MODELS,
+    load_intrinsics as load_intrinsics,
+    save_camera_info as save_camera_info,
+    save_intrinsics as save_intrinsics,
+)
+from .station_camera import (
+    DEFAULT_CAMERA as DEFAULT_CAMERA,
+    SIMULATED as SIMULATED,
+    simulated_camera as simulated_camera,
+)
+from .undistortion import Undistortion as Undistortion

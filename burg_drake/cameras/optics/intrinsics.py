@@ -1,0 +1,161 @@
+"""A camera's intrinsics, as OpenCV has them: pixel centres at integers.
+
+Drake's `CameraInfo` puts pixel edges at integers, so that its principal point is half a pixel
+further; `of_camera_info` and `camera_info` convert. `intrinsics_file` reads files of others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core import Array, FieldError, InvalidInputError
+from burg_drake.station.document import HALF_PIXEL, Camera
+
+DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
+"""Numbers of coefficients that OpenCV's model of a lens may have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Intrinsics:
+    """Schema of an intrinsics file.
+
+    Attributes:
+        camera: what camera they are of.
+        width, height: image size [pixels].
+        focal: fx, fy [pixels].
+        center: principal point cx, cy [pixels], pixel centres at integers.
+        distortion: OpenCV's k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tx, ty]]]]; none
+            for a pinhole camera.
+        residual: root mean square reprojection error of the calibration [pixels], if known.
+    """
+
+    version: int = 1
+    camera: str = ""
+    width: int
+    height: int
+    focal: tuple[float, float]
+    center: tuple[float, float]
+    distortion: tuple[float, ...] = ()
+    residual: float | None = None
+
+    def __post_init__(self) -> None:
+        numbers = [self.width, self.height, *self.focal, *self.center, *self.distortion]
+        if not np.isfinite(numbers).all():
+            raise InvalidInputError(
+                "width, height, focal, center and distortion of a camera must be finite"
+            )
+        if not float(self.width).is_integer() or not float(self.height).is_integer():
+            raise InvalidInputError(
+                f"width {self.width} and height {self.height} of a camera must be whole pixels"
+            )
+        if min(self.width, self.height, *self.focal) <= 0:
+            raise InvalidInputError("width, height and focal of a camera must be positive")
+        if len(self.distortion) not in DISTORTION_SIZES:
+            raise FieldError(
+                f"distortion has {len(self.distortion)} coefficients; OpenCV's model takes"
+                f" {', '.join(map(str, DISTORTION_SIZES))}",
+                "distortion",
+            )
+
+    @cached_property
+    def K(self) -> Array:
+        """(3, 3) camera matrix."""
+        (fx, fy), (cx, cy) = self.focal, self.center
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """Distortion as OpenCV's functions take it; zeros for a pinhole camera."""
+        return np.array(self.distortion or (0.0, 0.0, 0.0, 0.0), dtype=float)
+
+    @property
+    def is_pinhole(self) -> bool:
+        """There is no distortion."""
+        return not any(self.distortion)
+
+    def require_size(self, width: int, height: int, source: str) -> None:
+        """Refuses images of another size than the one that was calibrated.
+
+        Args:
+            width, height: of the image [pixels].
+            source: what the message calls it, such as `photo.png` or `camera 0`.
+
+        Raises:
+            InvalidInputError: the sizes differ.
+        """
+        if (width, height) != (self.width, self.height):
+            raise InvalidInputError(
+                f"{source} has {width} x {height} pixels, the intrinsics are of"
+                f" {self.width} x {self.height}; calibrate at that resolution (for another one"
+                " cameras scale, bin or cut)"
+            )
+
+    def project(self, p_CQ: Array) -> Array:
+        """Image points of points in the camera's frame, lens distortion included.
+
+        Args:
+            p_CQ: (..., 3) points before the camera (z > 0) [m].
+
+        Returns:
+            (..., 2) pixels.
+        """
+        import cv2
+
+        p = np.asarray(p_CQ, dtype=float)
+        if self.is_pinhole or not p.size:
+            return p[..., :2] / p[..., 2:] * self.focal + self.center
+        flat = np.ascontiguousarray(p.reshape(-1, 1, 3))
+        pixels, _ = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), self.K, self.coefficients)
+        return np.asarray(pixels).reshape(*p.shape[:-1], 2)
+
+    def undistort(self, pixels: Array) -> Array:
+        """(..., 2) pixels of the same camera without distortion, from those of the real one."""
+        import cv2
+
+        q = np.asarray(pixels, dtype=float)
+        if self.is_pinhole:
+            return q.copy()
+        # 40 rounds: OpenCV's 5 leave some hundredths of a pixel in the corners of a wide lens.
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
+        flat = np.ascontiguousarray(q.reshape(-1, 1, 2))
+        undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 4, OpenCV 5
+        straight = undistort(flat, self.K, self.coefficients, R=None, P=self.K, criteria=criteria)
+        return np.asarray(straight).reshape(q.shape)
+
+
+def of_camera(camera: Camera) -> Intrinsics:
+    """Intrinsics of a station's camera."""
+    return Intrinsics(
+        width=camera.width,
+        height=camera.height,
+        focal=camera.focal,
+        center=camera.principal_point,
+    )
+
+
+def of_camera_info(info: Any) -> Intrinsics:
+    """From Drake's `CameraInfo`."""
+    return Intrinsics(
+        width=info.width(),
+        height=info.height(),
+        focal=(info.focal_x(), info.focal_y()),
+        center=(info.center_x() - HALF_PIXEL, info.center_y() - HALF_PIXEL),
+    )
+
+
+def camera_info(intrinsics: Intrinsics) -> Any:
+    """Drake's `CameraInfo`.
+
+    Raises:
+        InvalidInputError: the camera has distortion, which Drake's does not.
+    """
+    from pydrake.systems.sensors import CameraInfo
+
+    if not intrinsics.is_pinhole:
+        raise InvalidInputError("Drake's cameras have no lens distortion; undistort the images")
+    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
+    return CameraInfo(intrinsics.width, intrinsics.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)

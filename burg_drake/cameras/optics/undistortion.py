@@ -1,0 +1,38 @@
+"""Images as the same camera would take them without lens distortion."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+
+
+class Undistortion:
+    """Straightens the images of one camera; of a pinhole camera they stay as they are.
+
+    Args:
+        intrinsics: of the camera; those of the straightened images have the same `K`.
+    """
+
+    def __init__(self, intrinsics: Intrinsics) -> None:
+        self._map = None
+        if not intrinsics.is_pinhole:
+            size = (intrinsics.width, intrinsics.height)
+            K = intrinsics.K
+            self._map = cv2.initUndistortRectifyMap(
+                K, intrinsics.coefficients, None, K, size, cv2.CV_32FC1
+            )
+
+    def color(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """(H, W, 3); black beyond the given image."""
+        if self._map is None:
+            return image
+        return np.asarray(cv2.remap(image, *self._map, cv2.INTER_CUBIC))
+
+    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(H, W); of the nearest pixel, as distances across an edge have no mean; 0 beyond."""
+        if self._map is None:
+            return depth
+        return np.asarray(cv2.remap(depth, *self._map, cv2.INTER_NEAREST))

@@ -1,0 +1,10 @@
+from .check import check_placement as check_placement
+from .document import (
+    CheckedScene as CheckedScene,
+    Placement as Placement,
+    PlacementCheck as PlacementCheck,
+    image_of_file as image_of_file,
+    load_placement as load_placement,
+    save_placement as save_placement,
+    software_versions as software_versions,
+)

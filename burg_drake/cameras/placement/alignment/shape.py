@@ -1,0 +1,168 @@
+"""Shapes of a scene's objects as the placement check needs them: mesh, reference point, and whether
+a turn about the vertical can be seen at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, cKDTree
+
+from burg_drake.cameras.projection import MeshOutline
+from burg_drake.core import Array, inverse, make_pose, rot_z, transform_points
+from burg_drake.geometry import RayCaster
+from burg_drake.objects.physics import sample_surface
+from burg_drake.scene.document import Scene
+
+SAMPLES = 12_000
+"""Points on a surface, for comparisons of it with itself and with depth."""
+TURNS = np.deg2rad((11.0, 37.0, 73.0, 117.0, 161.0))
+"""By which a shape is turned to see whether it looks the same; no symmetry of order up to 36 has
+all of them."""
+ROUND = 0.01
+"""Deviation, as a share of the diagonal, up to which a turned shape is the same: 1.3 mm for a can,
+about a pixel of a camera 0.8 m away, which no estimate of an angle should hang on."""
+ROUND_SHARE = 0.98
+"""Share of the surface that must be within `ROUND`."""
+
+
+@dataclass(frozen=True, eq=False)
+class TargetShape:
+    """An object where it should stand.
+
+    Attributes:
+        vertices: (V, 3) in O [m].
+        faces: (F, 3).
+        X_SO: (4, 4) the target.
+        p_OR: (3,) reference point, in the plane of the board at the target [m].
+        symmetric: a turn about the vertical through the reference point changes nothing.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    X_SO: Array
+    p_OR: Array
+    symmetric: bool
+
+    @cached_property
+    def p_SR(self) -> Array:
+        """(3,) reference point of the target in S [m]."""
+        return transform_points(self.X_SO, self.p_OR[None])[0]
+
+    @cached_property
+    def p_SV(self) -> Array:
+        """(V, 3) vertices at the target in S [m]."""
+        return transform_points(self.X_SO, self.vertices)
+
+    @cached_property
+    def outline(self) -> MeshOutline:
+        """The mesh at the target, in S, prepared for contours."""
+        return MeshOutline(self.p_SV, self.faces)
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """The mesh at the target, in S, prepared for rays."""
+        return RayCaster(self.p_SV, self.faces)
+
+    @cached_property
+    def surface(self) -> tuple[Array, Array]:
+        """Points (N, 3) spread over the surface at the target, and its normals there, in S."""
+        mesh = trimesh.Trimesh(self.p_SV, self.faces, process=False)
+        return sample_surface(mesh, SAMPLES)
+
+    def looks_alike(self, a: Array, b: Array) -> bool:
+        """Whether two displacements (3,) look the same: a box turned by half a turn."""
+        X_SS = inverse(self.displacement(a)) @ self.displacement(b)
+        points, _ = self.surface
+        return self._itself.holds(transform_points(X_SS, points[::12]))
+
+    @cached_property
+    def _itself(self) -> _SurfaceMatcher:
+        return _SurfaceMatcher(*self.surface)
+
+    def displacement(self, q: Array) -> Array:
+        """(4, 4) what `q` does to points in S: a turn about the vertical through the target's
+        reference point, then a translation.
+
+        Args:
+            q: (3,) x and y [m], and angle [rad].
+        """
+        R = rot_z(float(q[2]))
+        shift = np.array([q[0], q[1], 0.0])
+        return make_pose(R, self.p_SR - R @ self.p_SR + shift)
+
+    def placed(self, q: Array) -> Array:
+        """(4, 4) X_SO after the displacement `q`."""
+        return self.displacement(q) @ self.X_SO
+
+
+def target_shapes(scene: Scene) -> dict[str, TargetShape]:
+    """The shapes of all instances of a scene, free ones first.
+
+    Raises:
+        UnknownNameError: a mesh file is missing.
+    """
+    shapes: dict[str, TargetShape] = {}
+    for name in (*scene.instances, *scene.background):
+        mesh = scene.library.surface(scene.instance(name).object)
+        shapes[name] = target_shape(np.asarray(mesh.vertices), mesh.faces, scene.X_SO(name))
+    return shapes
+
+
+def target_shape(vertices: Array, faces: NDArray, X_SO: Array) -> TargetShape:
+    """The shape of a mesh at its target.
+
+    Args:
+        vertices: (V, 3) in O [m].
+        faces: (F, 3).
+        X_SO: (4, 4) target.
+    """
+    p_SV = transform_points(X_SO, vertices)
+    p_SR = np.array([*_middle(p_SV[:, :2]), 0.0])
+    p_OR = transform_points(inverse(X_SO), p_SR[None])[0]
+    surface = trimesh.Trimesh(p_SV - p_SR, faces, process=False)
+    return TargetShape(vertices, np.asarray(faces), X_SO, p_OR, _is_round(surface))
+
+
+def _middle(points: Array) -> Array:
+    """Centroid of the area inside the convex outline of points (N, 2); it turns with them."""
+    hull = points[ConvexHull(points).vertices]
+    scale = float(np.ptp(hull, axis=0).max())
+    origin = hull.mean(axis=0)
+    moments = cv2.moments(((hull - origin) / scale).astype(np.float32)[:, None])
+    middle = np.array([moments["m10"], moments["m01"]]) / moments["m00"]
+    return origin + scale * middle
+
+
+def _is_round(surface: trimesh.Trimesh) -> bool:
+    """Whether a surface looks the same after any turn about the z axis of its frame."""
+    points, normals = sample_surface(surface, SAMPLES)
+    itself = _SurfaceMatcher(points, normals)
+    return all(itself.holds(points[::12] @ rot_z(float(angle)).T) for angle in TURNS)
+
+
+class _SurfaceMatcher:
+    """Tells whether moved points of a surface are points of it.
+
+    Args:
+        points, normals: (N, 3) spread over the surface.
+    """
+
+    def __init__(self, points: Array, normals: Array) -> None:
+        self._points, self._normals = points, normals
+        self._tree = cKDTree(points)
+        self._tolerance = ROUND * float(np.linalg.norm(np.ptp(points, axis=0)))
+        apart = self._tree.query(points[::12], k=2)[0][:, 1]
+        self._beside = 6.0 * float(np.median(apart)) + self._tolerance
+
+    def holds(self, moved: Array) -> bool:
+        """Whether most of some moved points (M, 3) are on the surface."""
+        distance, near = self._tree.query(moved, k=3)
+        away = moved[:, None] - self._points[near]
+        off = np.abs(np.einsum("nki,nki->nk", self._normals[near], away)).min(axis=1)
+        same = (off < self._tolerance) & (distance[:, 0] < self._beside)
+        return bool(same.mean() >= ROUND_SHARE)

@@ -1,0 +1,103 @@
+"""Where the edges of markers appear in an image by a pose, and how they move with the pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.edges import MarkerEdges
+from burg_drake.core import Array
+
+MARGIN = 8
+"""Distance that an edge keeps from the image's border [pixels]."""
+NEAREST = 1e-3
+"""Distance before the camera from which on points count as seen [m]."""
+LENS_STEP = 1e-4
+"""For derivatives of the lens's distortion [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeViews:
+    """Edges as a camera sees them, by a pose.
+
+    Attributes:
+        which: (N,) indices into the table of edges.
+        at: (N, 2) middles in the image [pixels].
+        across, along: (N, 2) gradients of u and v in the image [cells per pixel].
+        motion: (N, 6) how far an edge moves along `across` [pixels] with a small rotation [rad] and
+            translation [m] of the camera, both in S as in `BoardEstimate.covariance`.
+        print: (N, 2) the same if the print is longer along y by a share and shorter by it along x,
+            about S's origin; and if its markers are larger by a share, each about its middle
+            [pixels].
+    """
+
+    which: NDArray[np.intp]
+    at: Array
+    across: Array
+    along: Array
+    motion: Array
+    print: Array
+
+
+def view_edges(
+    edges: MarkerEdges, which: NDArray[np.intp], intrinsics: Intrinsics, X_SC: Array
+) -> EdgeViews:
+    """Projects edges, and leaves out those that are not in the image."""
+    R_SC = X_SC[:3, :3]
+    q_S = edges.p_SE[which] - X_SC[:3, 3]
+    p_CE = q_S @ R_SC
+    keep = p_CE[:, 2] > NEAREST
+    if not keep.all():
+        which, q_S, p_CE = which[keep], q_S[keep], p_CE[keep]
+    at, by_C = image_points(intrinsics, p_CE)
+    limit = [intrinsics.width - 1 - MARGIN, intrinsics.height - 1 - MARGIN]
+    keep = np.asarray(((at > MARGIN) & (at < limit)).all(axis=1))
+    if not keep.all():
+        which, q_S, at, by_C = which[keep], q_S[keep], at[keep], by_C[keep]
+    by_S = by_C @ R_SC.T  # pixels per metre
+    across, along = _cell_gradients(edges, which, by_S)
+    normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
+    g = np.einsum("ni,nij->nj", normal, by_S)
+    # p_CE = R_SC^T (p_SE - p_SC): a rotation w and translation d give R_SC^T (q x w - d).
+    motion = np.hstack([cross(g, q_S), -g])
+    stretch = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
+    growth = (g * edges.from_center[which]).sum(axis=1)
+    return EdgeViews(which, at, across, along, motion, np.column_stack([stretch, growth]))
+
+
+def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
+    """Image points (N, 2) and their derivatives (N, 2, 3) by the points in the camera's frame."""
+    x = p_CQ[:, :2] / p_CQ[:, 2:]
+    by_C = np.zeros((len(x), 2, 3))
+    by_C[:, 0, 0] = by_C[:, 1, 1] = 1.0 / p_CQ[:, 2]
+    by_C[:, :, 2] = -x / p_CQ[:, 2:]
+    if intrinsics.is_pinhole:
+        focal = np.array(intrinsics.focal)
+        return x * focal + intrinsics.center, by_C * focal[:, None]
+    points = np.ones((3, len(x), 3))
+    points[:, :, :2] = x
+    points[1, :, 0] += LENS_STEP
+    points[2, :, 1] += LENS_STEP
+    at, right, down = intrinsics.project(points)
+    return at, np.stack([right - at, down - at], axis=2) / LENS_STEP @ by_C
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Vector products (..., 3), as `numpy.cross` in a third of its time for few vectors."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _cell_gradients(
+    edges: MarkerEdges, which: NDArray[np.intp], by_S: Array
+) -> tuple[Array, Array]:
+    """Gradients of u and v [cells per pixel]: the inverse of the sheet's affine map to pixels."""
+    cell = by_S[:, :, :2] * edges.cell
+    det = cell[:, 0, 0] * cell[:, 1, 1] - cell[:, 0, 1] * cell[:, 1, 0]
+    x = np.column_stack([cell[:, 1, 1], -cell[:, 0, 1]]) / det[:, None]
+    y = np.column_stack([-cell[:, 1, 0], cell[:, 0, 0]]) / det[:, None]
+    is_x = (edges.axis[which] == 0)[:, None]
+    return np.where(is_x, x, y), np.where(is_x, y, x)

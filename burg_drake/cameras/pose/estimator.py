@@ -1,0 +1,303 @@
+"""The pose of a camera over a board, from one image.
+
+Markers are found by OpenCV's detector, their corners give a first pose, the edges of all markers
+the exact one. What a picture shows never raises: an estimate that is not valid says why.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
+from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
+from burg_drake.cameras.pose.edges import marker_edges
+from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.pose.print_size import (
+    LEAST_DEVIATION,
+    deformation,
+    scale_by_depth,
+    scale_by_height,
+)
+from burg_drake.cameras.pose.refinement import EdgeRefinement, RefinedPose
+from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.scene.document import Board
+
+OTHER_GROWTH = 0.05
+"""From this deviation on, markers are too large or too small for their distances to look for their
+edges; corners tell it to some hundredths, edges to some thousandths [-]."""
+DECIDED = 30.0
+"""By how much the squared normalised residuals of the second pose must exceed those of the first
+for the first to be right (odds of exp(15) if they were normal)."""
+PLAUSIBLE = 0.3
+"""Share of the edges of markers that were read which must be seen for a pose to be right."""
+USED_EDGES = 6
+"""Edges of a marker that must have been seen for it to count as used."""
+DOUBTFUL_RESIDUAL = 0.3
+"""From this distance of markers from their places on, the camera's intrinsics are doubtful, or the
+board is not flat [pixels]."""
+
+
+class BoardPose:
+    """Estimates poses of one camera over one board.
+
+    Holds tables that take some milliseconds to make; keep it for images that follow each other.
+
+    Args:
+        board: the board.
+        intrinsics: of the camera.
+        scale: size of the print against the document along x and y, if it was measured. The origin
+            of S stays in the corner of the sheet.
+    """
+
+    def __init__(
+        self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float] = (1.0, 1.0)
+    ) -> None:
+        if min(scale) <= 0.0:
+            raise InvalidInputError(f"scale {list(scale)} of a print must be positive")
+        self.board = board
+        self.intrinsics = intrinsics
+        self.scale = scale
+        self._layout = board.layout
+        self._p_SQ = self._layout.p_SQ * [*scale, 1.0]
+        self._detector = MarkerDetector(self._layout)
+        self._edges = marker_edges(self._layout, scale)
+        self._refinement = EdgeRefinement(self._edges, self._p_SQ, intrinsics)
+        self._other_board = WrongBoardCheck(board, intrinsics, scale)
+
+    def estimate(
+        self,
+        image: NDArray[np.uint8],
+        *,
+        depth: NDArray[np.floating[Any]] | None = None,
+        X_SC_known: Array | None = None,
+    ) -> BoardEstimate:
+        """Estimates the pose.
+
+        Args:
+            image: (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
+            depth: (H, W) depth image of the same camera [m], to measure the print's size.
+            X_SC_known: (4, 4) where the camera is known to be, for the same purpose.
+
+        Raises:
+            InvalidInputError: not an image, or one of another size than the intrinsics.
+        """
+        grey = grey_image(image)
+        self.intrinsics.require_size(grey.shape[1], grey.shape[0], "the image")
+        if depth is not None and np.shape(depth) != grey.shape:
+            raise InvalidInputError(
+                f"the depth image is {np.shape(depth)}, the image {grey.shape}; give one of the"
+                " same camera"
+            )
+        try:
+            return self._look(grey, depth, X_SC_known)
+        except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
+            return BoardEstimate(reason="what is in sight of the board does not determine a pose")
+
+    def _look(
+        self,
+        grey: NDArray[np.uint8],
+        depth: NDArray[np.floating[Any]] | None,
+        X_SC_known: Array | None,
+    ) -> BoardEstimate:
+        """Finds markers, and from them the pose."""
+        seen = self._detector.detect(grey)
+        if not len(seen.index):
+            return BoardEstimate(reason=self._why_nothing(grey, seen))
+        coarse = coarse_pose(self._p_SQ[seen.index], seen.corners, self.intrinsics)
+        wrong = self._why_another(seen, coarse)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        found = seen.index[coarse.inliers]
+        refined, wrong = self._refine(grey, coarse.X_SC, found)
+        if refined is None:
+            return BoardEstimate(reason=wrong)
+        printed = deformation(refined)
+        if printed.growth:
+            return BoardEstimate(reason=self._other_size(1.0 + printed.growth))
+        return self._estimate(grey, refined, printed.stretch, depth, X_SC_known)
+
+    def _refine(
+        self, grey: NDArray[np.uint8], poses: list[Array], found: NDArray[np.intp]
+    ) -> tuple[RefinedPose | None, str]:
+        """The pose that fits the edges best, or why there is none."""
+        attempts = [self._refinement.refine(grey, X_SC, found) for X_SC in poses]
+        refined = sorted((r for r in attempts if r is not None), key=_misfit)
+        if not refined:
+            return (
+                None,
+                "the edges of the markers are too unclear (blur, contrast); see to the light",
+            )
+        best = refined[0]
+        if len(refined) > 1 and _differ(best, refined[1]):
+            advantage = (_misfit(refined[1]) - _misfit(best)) * len(best.weight)
+            if advantage < DECIDED:
+                return None, (
+                    f"{_markers(len(found))} in sight fit two poses alike;"
+                    " come nearer or show more of the board"
+                )
+        own = np.isin(self._edges.marker[best.views.which], found)
+        if (best.weight[own] > 0.0).mean() < PLAUSIBLE:
+            return None, "the markers' cells are not where their corners put them: another board?"
+        return best, ""
+
+    def _estimate(
+        self,
+        grey: NDArray[np.uint8],
+        refined: RefinedPose,
+        stretch: float,
+        depth: NDArray[np.floating[Any]] | None,
+        X_SC_known: Array | None,
+    ) -> BoardEstimate:
+        """What to tell about a pose."""
+        contrast = float(np.median(refined.fits.contrast[refined.weight > 0.0]))
+        wrong = self._other_board.beyond(grey, refined.X_SC, contrast)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        used, corners, error = self._seen_corners(refined)
+        p_SQ = self._p_SQ[used]
+        scale = float("nan")
+        if depth is not None:
+            scale = scale_by_depth(p_SQ, self.intrinsics, refined.X_SC, depth)
+        if X_SC_known is not None:
+            scale = scale_by_height(refined.X_SC, X_SC_known)
+        if abs(scale - 1.0) > LEAST_DEVIATION:
+            return BoardEstimate(reason=_scale_warning(scale), scale=scale)
+        blank = self._other_board.blank(grey, refined.X_SC, contrast, used) if len(used) else ""
+        return BoardEstimate(
+            X_SC=refined.X_SC,
+            valid=True,
+            reason=blank or _warnings(error, stretch),
+            reprojection_error=error,
+            covariance=refined.covariance,
+            ids=tuple(int(i) for i in self._layout.ids[used]),
+            corners=corners,
+            scale=scale,
+        )
+
+    def _seen_corners(self, refined: RefinedPose) -> tuple[NDArray[np.intp], Array, float]:
+        """Markers that were used, their corners (N, 4, 2) as their edges put them, and how far that
+        is from where the pose puts them, root mean square [pixels]."""
+        marker = self._edges.marker[refined.views.which]
+        weight = refined.weight / refined.sd**2
+        normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
+        count = np.bincount(marker[refined.weight > 0.0], minlength=len(self._p_SQ))
+        outer = weight[:, None, None] * normal[:, :, None] * normal[:, None]
+        total = np.zeros((len(self._p_SQ), 2, 2))
+        np.add.at(total, marker, outer)
+        toward = np.zeros((len(self._p_SQ), 2))
+        np.add.at(toward, marker, (weight * refined.residual)[:, None] * normal)
+        used = np.flatnonzero((count >= USED_EDGES) & (np.linalg.cond(total) < 1e3))
+        shift = np.linalg.solve(total[used], toward[used][..., None])[..., 0]
+        p_C = (self._p_SQ[used] - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3]
+        error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
+        return used, self.intrinsics.project(p_C) + shift[:, None], error
+
+    def _why_nothing(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+        """Why no marker of the board was found."""
+        layout = self._layout
+        other = other_markers(grey, layout) if seen.candidates else None
+        if other is None:
+            return "no marker of the board in sight"
+        start = f"another board: {_markers(len(other.ids))} of {other.dictionary}"
+        if other.dictionary == layout.dictionary:
+            listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
+            return (
+                f"{start} with ids {listed} in sight, this one has {layout.ids[0]} to"
+                f" {layout.ids[-1]}; is first_id right?"
+            )
+        return f"{start} in sight, this one has {layout.dictionary}"
+
+    def _why_another(self, seen: Detection, coarse: CoarsePose) -> str:
+        """Why the markers that were found are not this board; empty if they are."""
+        if abs(coarse.growth - 1.0) > OTHER_GROWTH:
+            return self._other_size(coarse.growth)
+        n, fit = len(seen.index), int(coarse.inliers.sum())
+        if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
+            return (
+                f"another board: only {fit} of {_markers(n)} in sight stand where this one has"
+                " them; are columns, rows and first_id right?"
+            )
+        return ""
+
+    def _other_size(self, growth: float) -> str:
+        markers = self.board.markers
+        return (
+            f"another board: its markers are {growth:.2f} times as large for their distances as"
+            f" this one's (side {1e3 * markers.side:g} mm, spacing {1e3 * markers.spacing:g} mm)"
+        )
+
+
+def estimate_board(
+    image: NDArray[np.uint8],
+    intrinsics: Intrinsics,
+    board: Board,
+    *,
+    depth: NDArray[np.floating[Any]] | None = None,
+    X_SC_known: Array | None = None,
+) -> BoardEstimate:
+    """The pose of a camera over a board, from one image; see `BoardPose.estimate`."""
+    return BoardPose(board, intrinsics).estimate(image, depth=depth, X_SC_known=X_SC_known)
+
+
+def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W) brightness of an image (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
+
+    Raises:
+        InvalidInputError: it is of another shape or type.
+    """
+    image = np.asarray(image)
+    if image.dtype != np.uint8 or image.ndim not in (2, 3):
+        raise InvalidInputError(
+            f"an image is (H, W), (H, W, 3) or (H, W, 4) of uint8, not {image.shape} of"
+            f" {image.dtype}"
+        )
+    if image.ndim == 2:
+        return np.ascontiguousarray(image)
+    codes = {3: cv2.COLOR_RGB2GRAY, 4: cv2.COLOR_RGBA2GRAY}
+    if image.shape[2] not in codes:
+        raise InvalidInputError(f"an image has 3 or 4 channels, not {image.shape[2]}")
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), codes[image.shape[2]]))
+
+
+def _misfit(refined: RefinedPose) -> float:
+    """Mean of the squared normalised residuals, those of what does not fit cut off at 3."""
+    return float(np.minimum((refined.residual / refined.sd) ** 2, 9.0).mean())
+
+
+def _differ(one: RefinedPose, other: RefinedPose) -> bool:
+    """Two refinements ended in different poses."""
+    difference = one.X_SC[:3, :3].T @ other.X_SC[:3, :3]
+    return bool(np.arccos(np.clip((np.trace(difference) - 1.0) / 2.0, -1.0, 1.0)) > 0.01)
+
+
+def _scale_warning(scale: float) -> str:
+    """What is wrong with a print of another size: distances by it are false by as much."""
+    return (
+        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give what its"
+        " rulers measure with --measured-mm"
+    )
+
+
+def _warnings(error: float, stretch: float) -> str:
+    """What is doubtful about a pose; empty if all is well."""
+    if stretch:
+        return (
+            f"the board is printed {1.0 + stretch:.3f} times as long along y as along x: measure it"
+            " and print with --measured-mm, or check the intrinsics"
+        )
+    if error > DOUBTFUL_RESIDUAL:
+        return (
+            f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"
+            " board is flat"
+        )
+    return ""
+
+
+def _markers(count: int) -> str:
+    return "1 marker" if count == 1 else f"{count} markers"

@@ -1,0 +1,283 @@
+"""Makes a pose exact by the edges of all markers: thousands of them instead of four corners each.
+
+Rounds of: project the edges by the present pose, fit each to the pixels across it (`edge_fit`),
+and move the camera by a robust least squares of the offsets, point to line. Edges that are hidden
+do not look as they should, and drop out. Markers that no detector can read, since something hides a
+part of them, take part as soon as the pose tells well enough where their edges are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
+from burg_drake.cameras.pose.edge_projection import (
+    NEAREST,
+    EdgeViews,
+    cross,
+    image_points,
+    view_edges,
+)
+from burg_drake.cameras.pose.edges import MarkerEdges
+from burg_drake.core import Array
+
+FIRST, LATER, LAST = 160, 320, 800
+"""Edges that the rounds look at: the pose is coarse at first, and a few suffice."""
+BLURS = (0.1, 0.5, 2.5)
+"""Variances of lens and pixel together to begin with [pixels^2]; a pixel alone has 1/12."""
+LEAST_BLUR, MOST_BLUR = 0.08, 9.0
+LONG = 0.3
+"""A first step that moves an edge by more is followed by another of its kind: edges are fitted best
+where they are expected [pixels]."""
+KNOWN = 0.5
+"""Standard deviation of an edge's predicted place up to which it is looked for [pixels]."""
+FEW = 0.25
+"""Markers in the image that were not read and are not worth a look, as a share of those read."""
+IN_SIGHT = 0.2
+"""Share of a marker's edges that must look as they should for it to take part."""
+SURE = 3
+"""Read markers from which on a pose puts the others well; with fewer, most of a marker's edges must
+look as they should: covers have edges, too."""
+FAINTEST = 0.25
+"""Least contrast, as a share of the upper quartile of all."""
+UNLIKE = 0.15
+"""Most that a fit may leave, as a share of the contrast, besides the image's noise."""
+FARTHEST = 1.5
+"""Largest offset that a fit can be trusted with [pixels]."""
+MODEL_SD = 0.01
+"""What an offset errs by in images without noise: cells and blur are not exactly as assumed
+[pixels]; the median in images of `synthetic`."""
+ALIKE_SD = 0.006
+"""Part of it that is alike for edges of one marker [pixels]: with it normalised errors of poses are
+about what they should be, with noise and without."""
+TUKEY = 4.685
+"""Tukey's biweight with 95 % efficiency on normal residuals."""
+REWEIGHTED = 3
+"""Rounds of robust weights in a step."""
+LEAST_EDGES = 24
+"""With fewer a pose does not count as refined."""
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPose:
+    """A pose by edges.
+
+    Attributes:
+        X_SC: (4, 4).
+        covariance: (6, 6), see `BoardEstimate`.
+        views, fits: edges of the last round, as seen by the pose before it.
+        weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
+        residual: (N,) of each edge [pixels].
+        sd: (N,) expected standard deviation of each edge's offset [pixels].
+        blur: variance of lens and pixel together [pixels^2].
+    """
+
+    X_SC: Array
+    covariance: Array
+    views: EdgeViews
+    fits: EdgeFits
+    weight: Array
+    residual: Array
+    sd: Array
+    blur: float
+
+
+class EdgeRefinement:
+    """Refines poses over one board with one camera."""
+
+    def __init__(self, edges: MarkerEdges, p_SQ: Array, intrinsics: Intrinsics) -> None:
+        """Takes the table of edges, the markers' corners (N, 4, 3), and the camera."""
+        self._edges = edges
+        self._corners = p_SQ
+        self._intrinsics = intrinsics
+
+    def refine(
+        self, grey: NDArray[np.uint8], X_SC: Array, markers: NDArray[np.intp]
+    ) -> RefinedPose | None:
+        """Refines a pose.
+
+        Args:
+            grey: (H, W) image.
+            X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
+            markers: those that were found, as indices of the layout's.
+
+        Returns:
+            The pose; None if too few edges look as they should.
+        """
+        read = np.zeros(len(self._corners), dtype=bool)
+        read[markers] = True
+        found = np.flatnonzero(read[self._edges.marker])
+        blur = self._first_blur(grey, X_SC, found[:FIRST])
+        result = self._round(grey, X_SC, found[:FIRST], blur)
+        if result and np.abs(result.fits.offset - result.residual).max() > LONG:
+            result = self._round(grey, result.X_SC, found[:FIRST], result.blur)
+        others = self._unread(result, read) if result else read
+        if result and others.sum() > FEW * read.sum():
+            unread = np.flatnonzero(others[self._edges.marker])
+            which = np.concatenate([found[:FIRST], unread[:LATER]])
+            result = self._round(grey, result.X_SC, which, result.blur)
+            found = found if result is None else self._seen(result, found)
+        return result and self._round(grey, result.X_SC, found[:LAST], result.blur)
+
+    def _first_blur(self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp]) -> float:
+        """The blur with which edges are most like what they should be."""
+        tried = np.tile(which[: FIRST // len(BLURS)], len(BLURS))
+        views = view_edges(self._edges, tried, self._intrinsics, X_SC)
+        if len(views.which) == 0:
+            return BLURS[0]
+        blurs = np.repeat(BLURS, len(views.which) // len(BLURS))
+        unlike = fit_edges(grey, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
+        return BLURS[int(np.argmin(np.median(unlike, axis=1)))]
+
+    def _unread(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) other markers that the image may show, whose place the pose tells well enough."""
+        at, variance = predicted_places(
+            self._corners, self._intrinsics, result.X_SC, result.covariance
+        )
+        size = [self._intrinsics.width, self._intrinsics.height]
+        in_image = np.asarray(((at > 0.0) & (at < size)).all(axis=2)).any(axis=1)
+        return np.asarray(~read & in_image & (variance < KNOWN**2).all(axis=1))
+
+    def _seen(self, result: RefinedPose, found: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Edges of the markers of which a part is in sight, and of those that were found."""
+        marker, n = self._edges.marker[result.views.which], len(self._corners)
+        good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
+        read = np.unique(self._edges.marker[found])
+        share = IN_SIGHT if len(read) >= SURE else 0.5
+        seen = np.asarray(good > share * np.maximum(np.bincount(marker, minlength=n), 1))
+        seen[read] = True
+        return np.flatnonzero(seen[self._edges.marker])
+
+    def _round(
+        self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp], blur: float
+    ) -> RefinedPose | None:
+        views = view_edges(self._edges, which, self._intrinsics, X_SC)
+        if len(views.which) < LEAST_EDGES:
+            return None
+        fits = fit_edges(grey, self._edges, views, blur)
+        good = _has_expected_profile(fits)
+        if good.sum() < LEAST_EDGES:
+            return None
+        noise = np.median(fits.noise[good])
+        safe = np.maximum(np.abs(fits.contrast), 1.0) ** 2 * np.maximum(fits.information, 1e-6)
+        sd = np.sqrt(noise**2 / safe + MODEL_SD**2)
+        step, weight = _robust_step(views.motion, fits.offset, sd, good)
+        residual = fits.offset - views.motion @ step
+        change, total = fits.widening[weight > 0.5].sum(axis=0)
+        blur = float(
+            np.clip(
+                blur + np.clip(change / max(total, 1e-9), -0.3 * blur, 0.5 * blur),
+                LEAST_BLUR,
+                MOST_BLUR,
+            )
+        )
+        return RefinedPose(
+            perturbed_pose(X_SC, step, self._edges.p_SE[views.which].mean(axis=0)),
+            self._covariance(views, residual, sd, weight) * variance_factor_of_blur(blur),
+            views,
+            fits,
+            weight,
+            residual,
+            sd,
+            blur,
+        )
+
+    def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
+        """Covariance (6, 6) of a step, by the residuals' own scale.
+
+        What the model errs by is alike within a marker, so that it counts once a marker, not once
+        an edge.
+        """
+        total = weight.sum()
+        markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
+        scale = (weight * (residual / sd) ** 2).sum() / max(total - 6.0, 1.0)
+        alike = max(total / max(markers, 1) - 1.0, 0.0) * ALIKE_SD**2
+        J = views.motion * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        return np.linalg.inv(J.T @ J)
+
+
+def variance_factor_of_blur(blur: float) -> float:
+    """By how much blur increases the variance of a pose: what is within its width is fitted with
+    each of several edges, so that their errors are alike.
+
+    Normalised errors of 24 views each with blurs of standard deviations of 1, 1.5, 2 and 2.5 pixels
+    are 1.1, 1.5, 2.1 and 2.4 without it: the variance of the blur in pixels^2 is the factor.
+    """
+    return max(1.0, blur)
+
+
+def predicted_places(
+    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
+) -> tuple[Array, Array]:
+    """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
+    larger axis [pixels^2]: infinite for points behind the camera."""
+    q_S = p_SQ.reshape(-1, 3) - X_SC[:3, 3]
+    p_C = q_S @ X_SC[:3, :3]
+    ahead = p_C[:, 2] > NEAREST
+    at, by_C = image_points(intrinsics, np.where(ahead[:, None], p_C, [0.0, 0.0, 1.0]))
+    by_S = by_C @ X_SC[:3, :3].T
+    motion = np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
+    spread = motion @ covariance @ motion.transpose(0, 2, 1)
+    variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
+    return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
+
+
+def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array:
+    """A pose after a small rotation and translation (6,), see `BoardEstimate.covariance`.
+
+    Args:
+        X_SC: (4, 4) pose.
+        step: (6,) rotation [rad] and translation [m].
+        p_SA: (3,) point about which the rotation turns the camera, shifted before; the camera
+            itself if None. To first order it makes no difference; a point in the middle of what is
+            seen makes longer steps hold.
+    """
+    R = Rotation.from_rotvec(step[:3]).as_matrix()
+    X = np.eye(4)
+    X[:3, :3] = R @ X_SC[:3, :3]
+    if p_SA is None:
+        X[:3, 3] = X_SC[:3, 3] + step[3:]
+    else:
+        arm = X_SC[:3, 3] - p_SA
+        X[:3, 3] = p_SA + R @ (arm + step[3:] - np.cross(step[:3], arm))
+    return X
+
+
+def _has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
+    """Edges with the right colors, enough contrast, and a profile that fits."""
+    right = fits.contrast > 0.0
+    if not right.any():
+        return right
+    usual = np.quantile(fits.contrast[right], 0.75)
+    noise = np.median(fits.noise[right])
+    return np.asarray(
+        (fits.contrast > FAINTEST * usual)
+        & (fits.noise < UNLIKE * fits.contrast + 2.0 * noise)
+        & (np.abs(fits.offset) < FARTHEST)
+        & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
+    )
+
+
+def _robust_step(
+    motion: Array, offset: Array, sd: Array, good: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Least squares with Tukey's weights: step (6,), and weights (N,)."""
+    J, e = motion / sd[:, None], offset / sd
+    weight = good.astype(float)
+    step = _weighted_step(J, e, weight)
+    for _ in range(REWEIGHTED):
+        rest = e - J @ step
+        scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
+        weight = good * np.maximum(1.0 - (rest / (TUKEY * scale)) ** 2, 0.0) ** 2
+        step = _weighted_step(J, e, weight)
+    return step, weight
+
+
+def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
+    weighted = J * weight[:, None]
+    return np.asarray(np.linalg.solve(weighted.T @ J, weighted.T @ e))

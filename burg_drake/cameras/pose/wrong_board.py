@@ -1,0 +1,204 @@
+"""Whether a sheet is another one than the document says, though its markers fit at a place.
+
+A sheet with another first id or another number of rows has markers that stand to each other as the
+document's do, so that a pose fits them exactly, whole gaps aside of the truth. What tells is what
+lies around: markers beyond those that the document has, or paper where it has some.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.detection import BORDER_ERRORS, CORRECTED
+from burg_drake.cameras.pose.edge_projection import NEAREST
+from burg_drake.cameras.pose.quadrilaterals import read_cells
+from burg_drake.core import Array
+from burg_drake.scene.document import Board, marker_dictionary
+
+FRAME = 0.4
+"""Least difference of a marker's border and the white around it, as a share of the contrast of the
+board's own; blur takes a part of it."""
+FRAME_SIDES = 3
+"""Sides of four on which a place must look like a marker's border to be read."""
+FEWEST = 2
+"""Markers beyond the document's that make another board: with other ids each, on its own grid,
+upright, they are no chance."""
+FEWEST_BLANK = 3
+"""Places of a row or column that must be in the image, or all, if it has fewer."""
+LOOKS = 4
+"""Points along both axes at which a place must be blank, the first and last on the border."""
+BLANK = 0.25
+"""Most that brightness in the place of a marker may differ from paper's, as a share of the
+contrast of ink and paper."""
+FIELD_OF_VIEW = 1.02
+"""Slopes of rays that are looked at, by those of the image's corners; the model of a lens may fold
+farther ones back into the image."""
+SIDES = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
+"""Directions from a marker's middle to its sides."""
+SQUARE = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+"""A marker's corners from its middle [half sides], in the order of the layout's."""
+
+
+class WrongBoardCheck:
+    """Looks for signs of another sheet in images of one board by one camera.
+
+    Args:
+        board: of the document.
+        intrinsics: of the camera.
+        scale: size of the print against the document along x and y.
+    """
+
+    def __init__(self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float]) -> None:
+        layout = board.layout
+        self._layout, self._intrinsics = layout, intrinsics
+        self._columns = len(np.unique(np.round(layout.p_SQ[:, 0, 0], 9)))
+        self._rows = len(layout.ids) // self._columns
+        self._half = 0.5 * layout.side * np.array(scale)
+        pitch = layout.side + board.markers.spacing
+        row, column = np.mgrid[-1 : self._rows + 1, -1 : self._columns + 1]
+        ring = (row < 0) | (row == self._rows) | (column < 0) | (column == self._columns)
+        first = layout.p_SQ[0].mean(axis=0)[:2]
+        self._around = (first + pitch * np.stack([column, -row], axis=-1)[ring]) * scale
+        self._inside = layout.p_SQ.mean(axis=1)[:, :2] * scale
+        corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * [
+            intrinsics.width - 1,
+            intrinsics.height - 1,
+        ]
+        slopes = (intrinsics.undistort(corners) - intrinsics.center) / intrinsics.focal
+        self._steepest = FIELD_OF_VIEW * float(np.linalg.norm(slopes, axis=1).max())
+        cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
+        # Middles of the border's cells, and the white beside them, in half sides.
+        self._frame = np.concatenate([(1.0 - cell) * SIDES, (1.0 + min(cell, gap)) * SIDES])
+        middles = np.linspace(cell - 1.0, 1.0 - cell, LOOKS)
+        self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
+
+    def beyond(self, grey: NDArray[np.uint8], X_SC: Array, contrast: float) -> str:
+        """Which markers stand around the grid, where the document has none.
+
+        Args:
+            grey: (H, W) image.
+            X_SC: (4, 4) pose that fits the markers.
+            contrast: between the board's paper and ink [8-bit levels].
+
+        Returns:
+            What is wrong; empty if nothing is.
+        """
+        at, seen = self._places(X_SC, self._around, self._frame)
+        if not seen.any():
+            return ""
+        values = _brightness(grey, at[seen])
+        darker = (values[:, 4:] - values[:, :4] > FRAME * contrast).sum(axis=1)
+        suspects = self._around[seen][darker >= FRAME_SIDES]
+        ids = self._read(grey, X_SC, suspects) if len(suspects) >= FEWEST else []
+        if len(ids) < FEWEST:
+            return ""
+        listed = ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
+        return (
+            f"another board: markers beyond those that the document has in sight, ids {listed};"
+            f" it has {self._columns} x {self._rows} from {self._layout.ids[0]} to"
+            f" {self._layout.ids[-1]}: are count and first_id right?"
+        )
+
+    def blank(
+        self, grey: NDArray[np.uint8], X_SC: Array, contrast: float, used: NDArray[np.intp]
+    ) -> str:
+        """Which row or column next to those in sight is blank paper.
+
+        Args:
+            grey, X_SC, contrast: see `beyond`.
+            used: markers that were seen, as indices of the layout's.
+
+        Returns:
+            What is doubtful; empty if nothing is.
+        """
+        rows, columns = np.divmod(used, self._columns)
+        for across, lines, count in ((True, rows, self._rows), (False, columns, self._columns)):
+            for line in (lines.min() - 1, lines.max() + 1):
+                if 0 <= line < count and self._is_blank(grey, X_SC, contrast, used, across, line):
+                    return self._doubt(across, int(line), int(lines.min()), int(lines.max()))
+        return ""
+
+    def _is_blank(
+        self,
+        grey: NDArray[np.uint8],
+        X_SC: Array,
+        contrast: float,
+        used: NDArray[np.intp],
+        across: bool,
+        line: int,
+    ) -> bool:
+        """All places of a row or column that are in the image are as light as paper all over."""
+        every = np.arange(len(self._inside)).reshape(self._rows, self._columns)
+        which = every[line] if across else every[:, line]
+        at, seen = self._places(X_SC, self._inside[which], self._looks)
+        if seen.sum() < min(FEWEST_BLANK, len(which)):
+            return False
+        values = _brightness(grey, at[seen])
+        if (np.ptp(values, axis=1) > 2.0 * BLANK * contrast).any():
+            return False
+        white, in_image = self._places(X_SC, self._inside[used], self._frame[4:])
+        if not in_image.any():
+            return False
+        paper = np.median(_brightness(grey, white[in_image]), axis=1)
+        # Light falls unevenly: the paper beside the nearest markers that are in sight counts.
+        away = self._inside[which][seen][:, None] - self._inside[used][in_image]
+        nearest = paper[(away**2).sum(axis=2).argmin(axis=1)]
+        return bool((np.abs(values - nearest[:, None]) < BLANK * contrast).all())
+
+    def _doubt(self, across: bool, line: int, first: int, last: int) -> str:
+        names = ("row", "from the top") if across else ("column", "from the left")
+        looks = ""
+        if across:
+            looks = (
+                f" (count [{self._columns}, {last - first + 1}], first_id"
+                f" {self._layout.ids[first * self._columns]}?)"
+            )
+        return (
+            f"blank paper where the document has {names[0]} {line + 1} of markers {names[1]}:"
+            f" covered, or another board{looks}"
+        )
+
+    def _places(self, X_SC: Array, middles: Array, offsets: Array) -> tuple[Array, Any]:
+        """Pixels (N, M, 2) of points around places on the sheet, and places (N,) of which all are
+        in the image.
+
+        Args:
+            X_SC: (4, 4).
+            middles: (N, 2) places [m].
+            offsets: (M, 2) of the points [half sides of a marker].
+        """
+        p_S = np.zeros((len(middles), len(offsets), 3))
+        p_S[..., :2] = middles[:, None] + offsets * self._half
+        p_C = (p_S - X_SC[:3, 3]) @ X_SC[:3, :3]
+        z = np.maximum(p_C[..., 2], NEAREST)
+        seen = (p_C[..., 2] > NEAREST) & (np.hypot(p_C[..., 0], p_C[..., 1]) < self._steepest * z)
+        at = self._intrinsics.project(np.where(seen[..., None], p_C, [0.0, 0.0, 1.0]))
+        limit = [self._intrinsics.width - 1, self._intrinsics.height - 1]
+        seen &= ((at >= 0.0) & (at <= limit)).all(axis=2)
+        return at, seen.all(axis=1)
+
+    def _read(self, grey: NDArray[np.uint8], X_SC: Array, middles: Array) -> list[int]:
+        """Numbers of markers that stand upright at places (N, 2), each once."""
+        at, _ = self._places(X_SC, middles, SQUARE)
+        black, _ = read_cells(grey, at, self._layout.cells)
+        border = np.pad(np.zeros((self._layout.cells - 2,) * 2, bool), 1, constant_values=True)
+        dictionary = marker_dictionary(self._layout.dictionary)
+        ids = set()
+        for cells in black[(~black[:, border]).mean(axis=1) <= BORDER_ERRORS]:
+            bits = np.ascontiguousarray(~cells[1:-1, 1:-1], dtype=np.uint8)
+            found, number, turns = dictionary.identify(bits, CORRECTED)
+            if found and turns == 0:
+                ids.add(int(number))
+        return sorted(ids)
+
+
+def _brightness(grey: NDArray[np.uint8], at: Array) -> Array:
+    """(N, M) brightness at pixels (N, M, 2), bilinear."""
+    import cv2
+
+    u, v = np.moveaxis(at.astype(np.float32), 2, 0)
+    return np.asarray(cv2.remap(grey, u, v, cv2.INTER_LINEAR), dtype=float)

@@ -1,0 +1,94 @@
+"""How much of each object of a scene a camera sees, by rays: exact outlines, without a renderer."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from burg_drake.cameras.optics import NEAR, Intrinsics, of_camera
+from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
+from burg_drake.core import Array, inverse, make_pose, transform_points
+from burg_drake.geometry import RayCaster
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+
+RAYS = 96
+"""Rows and columns of rays over the rectangle that an object's surface is projected into; shares
+are good to about a hundredth."""
+WIDEST = 20.0
+"""What is further beside the optical axis than this many times its distance along it is not looked
+for: objects beside the camera, none of which it sees."""
+
+
+def visible_from(scene: Scene, station: Station, camera: str) -> dict[str, float]:
+    """The share of each free object's silhouette that a camera of the station sees.
+
+    The silhouette is all that the camera would see of the object alone if its image had no edges.
+    Of it counts what lies within the image and is not hidden by another object, by the table or by
+    an obstacle of the station; the arm is not there.
+
+    Args:
+        scene: what stands where.
+        station: has the camera and the obstacles.
+        camera: its name.
+
+    Returns:
+        0 to 1 by instance, in the scene's order; 0 for what is behind the camera.
+
+    Raises:
+        UnknownNameError: there is no such camera, or a mesh file is missing.
+        MeshError: a mesh file is damaged.
+    """
+    document = station.camera(camera)
+    intrinsics = of_camera(document)
+    X_SW = inverse(station.document.X_WS.matrix())
+    X_SC = X_SW @ document.X_WC.matrix()
+    shape = build_scene_mesh(scene)
+    caster = _with_surroundings(shape, station, X_SW)
+    return {name: _seen_share(shape, caster, name, intrinsics, X_SC) for name in scene.instances}
+
+
+def _with_surroundings(shape: SceneMesh, station: Station, X_SW: Array) -> RayCaster:
+    """Rays at the objects, whose faces come first, and at table and obstacles."""
+    document = station.document
+    x, y = document.table.center
+    boxes = [(make_pose(np.eye(3), (x, y, -0.5 * document.table.size[2])), document.table.size)]
+    boxes += [(box.X_WB.matrix(), box.size) for box in document.background.values()]
+    vertices, faces = [shape.outline.vertices], [shape.outline.faces]
+    for X_WB, size in boxes:
+        mesh = trimesh.creation.box(size)
+        faces.append(np.asarray(mesh.faces, np.int64) + sum(len(some) for some in vertices))
+        vertices.append(transform_points(X_SW @ X_WB, mesh.vertices))
+    return RayCaster(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _seen_share(
+    shape: SceneMesh, caster: RayCaster, name: str, intrinsics: Intrinsics, X_SC: Array
+) -> float:
+    alone = shape.of((name,))
+    p_CV = transform_points(inverse(X_SC), alone.outline.vertices)
+    ahead = p_CV[p_CV[:, 2] >= NEAR]
+    if not len(ahead):
+        return 0.0
+    flat = np.clip(ahead[:, :2] / ahead[:, 2:], -WIDEST, WIDEST)
+    directions = _grid(flat.min(axis=0), flat.max(axis=0))
+    along_S = directions @ X_SC[:3, :3].T
+    along_S /= np.linalg.norm(along_S, axis=1, keepdims=True)
+    start = np.broadcast_to(X_SC[:3, 3], along_S.shape)
+    hit = alone.rays.first_hits(start, along_S)[0] >= 0
+    if not hit.any():
+        return 0.0
+    pixel = intrinsics.project(directions[hit])
+    size = np.array((intrinsics.width, intrinsics.height))
+    inside = ((pixel >= -0.5) & (pixel <= size - 0.5)).all(axis=1)
+    face = caster.first_hits(start[hit], along_S[hit])[0]
+    owner = np.append(shape.owner, -1)[np.clip(face, -1, len(shape.owner))]
+    return float((inside & (owner == shape.names.index(name))).mean())
+
+
+def _grid(lower: Array, upper: Array) -> Array:
+    """(N, 3) directions at z = 1, in the middles of equal cells of a rectangle."""
+    share = (np.arange(RAYS) + 0.5) / RAYS
+    x, y = (low + share * (high - low) for low, high in zip(lower, upper, strict=True))
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return np.concatenate([grid, np.ones((len(grid), 1))], axis=1)

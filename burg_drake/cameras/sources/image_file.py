@@ -1,0 +1,98 @@
+"""Reading photographs: the sensor's pixels, in RGB."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from burg_drake.cameras.sources.frame import Image
+from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.core import InvalidInputError
+from burg_drake.core.files import IMAGE_SIZE, atomic_write, read_bytes
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+"""Of image files; what else there is in a folder is not looked at."""
+
+
+def read_image(path: str | Path) -> Image:
+    """Reads an image file.
+
+    A camera that was held upright writes the sensor's pixels and a note how to turn them (EXIF).
+    They stay as the sensor has them: intrinsics are of the sensor, and do not turn.
+
+    Args:
+        path: PNG, JPEG or another file that OpenCV reads; gray and 16-bit images become RGB of
+            8 bits, transparency is dropped.
+
+    Returns:
+        (H, W, 3) RGB.
+
+    Raises:
+        InvalidInputError: there is no such file, or it is not an image.
+    """
+    path = Path(path)
+    try:
+        data = read_bytes(path, IMAGE_SIZE)
+    except InvalidInputError as error:
+        raise InvalidInputError(str(error).replace("read", "read image", 1)) from error
+    if not data:
+        raise InvalidInputError(f"image {path} is empty (0 bytes)")
+    image = decode_image(data)
+    if image is None:
+        raise InvalidInputError(
+            f"{path} is not an image that can be read, or is cut off; PNG and JPEG are"
+        )
+    return image
+
+
+def decode_image(data: bytes) -> Image | None:
+    """(H, W, 3) RGB of the contents of an image file; None if they are not an image."""
+    if _is_cut_off(data):
+        return None
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    with quiet(), contextlib.suppress(cv2.error):
+        bgr = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+        return None if bgr is None or bgr.size == 0 else np.ascontiguousarray(bgr[..., ::-1])
+    return None
+
+
+def _is_cut_off(data: bytes) -> bool:
+    """A JPEG without its end, which decoders fill up with grey; or a PNG without, about which
+    libpng writes a line of its own."""
+    if data.startswith(b"\x89PNG"):
+        return b"IEND" not in data
+    if not data.startswith(b"\xff\xd8"):
+        return False
+    at = 2  # behind it segments, which may hold a small image, then the image itself
+    while data[at : at + 1] == b"\xff" and data[at + 1 : at + 2] != b"\xda":
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return data.find(b"\xff\xd9", at) < 0
+
+
+def require_image_format(path: str | Path) -> None:
+    """Refuses names of image files to write whose endings tell no format, before any work.
+
+    Raises:
+        InvalidInputError: no such format.
+    """
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise InvalidInputError(f"cannot write {path}: .png and .jpg are formats of images")
+
+
+def write_image(path: str | Path, image: Image) -> None:
+    """Writes an (H, W, 3) RGB image in the format that the file's suffix names.
+
+    Raises:
+        InvalidInputError: no such format, or the place cannot be written to.
+    """
+    path = Path(path)
+    try:
+        good, data = cv2.imencode(path.suffix or ".png", np.ascontiguousarray(image[..., ::-1]))
+    except cv2.error:
+        good = False
+    if not good:
+        raise InvalidInputError(f"cannot write {path}: .png and .jpg are formats of images")
+    atomic_write(path, data.tobytes())

@@ -1,0 +1,4 @@
+from .pose_filter import (
+    PoseFilter as PoseFilter,
+    Track as Track,
+)

@@ -1,0 +1,191 @@
+"""The whole loop in one Drake diagram: simulated camera, the board's pose, the overlay.
+
+    station ──► camera.NAME.color_image ──► BoardPoseEstimator ──► [filter] ──► SceneOverlay
+
+Ports of the diagram: all of the station diagram's under their names (`station.diagram`), and
+
+    inputs   placement             what is known of how far objects stand from their places
+    outputs  board.X_SC            pose of the camera's optical frame in the scene frame
+             board.valid           1 if it can be used
+             board.reprojection_error [pixels], board.covariance, board.estimate
+             board.X_SC_filtered   with a filter
+             overlay_image         what the camera sees, and the scene as it should be
+
+An output is computed when it is asked for, from where everything is at that moment: nothing lags by
+a frame unless a period is given. What nobody asks for is not rendered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ZeroOrderHold
+from pydrake.systems.sensors import RgbdSensor
+
+from burg_drake.cameras.optics import Intrinsics, of_camera
+from burg_drake.cameras.overlay import OverlayStyle
+from burg_drake.cameras.systems.pose_estimator import BoardPoseEstimator
+from burg_drake.cameras.systems.scene_overlay import SceneOverlay
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, inverse, nearest
+from burg_drake.scene.document import Scene
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.world import Robot
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+
+    from burg_drake.cameras.systems.pose_filter import PoseFilter
+
+SAMPLES = 2
+"""Rays along each side of a pixel: 2 x 2 halve the error that the rendering adds to the pose, and
+take 0.06 s more an image of 640 x 480 pixels (`benchmarks/board_loop.py`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardLoop:
+    """A built loop.
+
+    Attributes:
+        diagram: the whole; keep it alive while its parts are used.
+        built: the station in it.
+        sensor: the camera.
+        intrinsics: of the camera.
+    """
+
+    diagram: Diagram
+    built: StationDiagram
+    sensor: RgbdSensor
+    intrinsics: Intrinsics
+
+    def X_SC(self, context: Context) -> Array:
+        """(4, 4) where the camera truly is; `context` is the whole diagram's."""
+        X_WC = self.sensor.GetX_PB(self.sensor.GetMyContextFromRoot(context)).GetAsMatrix4()
+        return inverse(self.built.station.document.X_WS.matrix()) @ X_WC
+
+    def place_camera(self, context: Context, X_SC: Array) -> None:
+        """Puts the camera elsewhere over the board."""
+        mine = self.sensor.GetMyMutableContextFromRoot(context)
+        self.sensor.SetX_PB(mine, self._in_world(X_SC))
+
+    def place_object(self, context: Context, instance: str, X_SO: Array) -> None:
+        """Puts an object elsewhere, in the simulation only: the overlay shows where it belongs.
+
+        Raises:
+            UnknownNameError: the scene has no such free instance.
+        """
+        free = self.built.free
+        if instance not in free:
+            raise UnknownNameError(f"{instance!r} cannot be moved; {nearest(instance, free)}")
+        plant = self.built.plant
+        mine = plant.GetMyMutableContextFromRoot(context)
+        plant.SetFreeBodyPose(mine, plant.get_body(free[instance]), self._in_world(X_SO))
+
+    def _in_world(self, X_SF: Array) -> RigidTransform:
+        return RigidTransform(self.built.station.document.X_WS.matrix() @ X_SF)
+
+
+def build_board_loop(
+    scene: Scene,
+    station: Station,
+    camera: str = "board",
+    *,
+    robot: Robot = "none",
+    engine: Engine = ENGINES["standard"],
+    style: OverlayStyle | None = None,
+    filter: PoseFilter | None = None,
+    depth: bool = False,
+    samples: int = SAMPLES,
+    period: float | None = None,
+    meshcat: Meshcat | None = None,
+) -> BoardLoop:
+    """Builds the diagram of a station whose camera looks at the board.
+
+    Args:
+        scene: what stands on the board, and is drawn over the image at its place.
+        station: has the camera.
+        camera: its name.
+        robot, engine, meshcat: see `station.diagram.build_station_diagram`.
+        style: of the overlay, if not the default.
+        filter: between estimate and overlay; the overlay gets the estimate itself if not given.
+        depth: the estimator gets the depth image, too, which says at what scale the board is.
+        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
+        period: between images [s]. If not given, there is one for every moment.
+
+    Raises:
+        UnknownNameError: there is no such camera.
+        InvalidInputError: the period is not above 0, `samples` is out of range, or the board's
+            markers do not fit on it; and as `build_station_diagram`.
+        MissingDependencyError: a system library of the renderer is missing.
+    """
+    if period is not None and period <= 0.0:
+        raise InvalidInputError(f"period {period:g} of a camera must be above 0 [s]")
+    simulated = replace(station.camera(camera), samples=samples)
+    cameras = {**station.document.cameras, camera: simulated}
+    station = replace(station, document=replace(station.document, cameras=cameras))
+    intrinsics = of_camera(simulated)
+    built = build_station_diagram(
+        scene, station, robot=robot, engine=engine, meshcat=meshcat, cameras=True
+    )
+    builder = DiagramBuilder()
+    builder.AddSystem(built.diagram)
+    color_image = _images(builder, built, f"camera.{camera}.color_image", period)
+    estimator = builder.AddNamedSystem(
+        "board_pose_estimator", BoardPoseEstimator(scene.board, intrinsics)
+    )
+    builder.Connect(color_image, estimator.GetInputPort("color_image"))
+    if depth:
+        depth_image = _images(builder, built, f"camera.{camera}.depth_image", period)
+        builder.Connect(depth_image, estimator.GetInputPort("depth_image"))
+    X_SC, valid = estimator.GetOutputPort("X_SC"), estimator.GetOutputPort("valid")
+    if filter is not None:
+        builder.AddNamedSystem("pose_filter", filter)
+        builder.Connect(estimator.GetOutputPort("estimate"), filter.GetInputPort("estimate"))
+        X_SC, valid = filter.GetOutputPort("X_SC"), filter.GetOutputPort("valid")
+    overlay = SceneOverlay(scene, intrinsics, style or OverlayStyle())
+    builder.AddNamedSystem("scene_overlay", overlay)
+    builder.Connect(color_image, overlay.GetInputPort("color_image"))
+    builder.Connect(X_SC, overlay.GetInputPort("X_SC"))
+    builder.Connect(valid, overlay.GetInputPort("valid"))
+    builder.Connect(estimator.GetOutputPort("estimate"), overlay.GetInputPort("estimate"))
+
+    _export_station(builder, built.diagram)
+    _export_board(builder, estimator, filter, overlay)
+    sensor = built.diagram.GetSubsystemByName(f"camera.{camera}")
+    return BoardLoop(builder.Build(), built, sensor, intrinsics)
+
+
+def _images(
+    builder: DiagramBuilder, built: StationDiagram, port: str, period: float | None
+) -> OutputPort:
+    """A camera's images, held for a period if there is one."""
+    images = built.diagram.GetOutputPort(port)
+    if period is None:
+        return images
+    hold = builder.AddNamedSystem(f"{port}.hold", ZeroOrderHold(period, images.Allocate()))
+    builder.Connect(images, hold.get_input_port())
+    return hold.get_output_port()
+
+
+def _export_board(
+    builder: DiagramBuilder,
+    estimator: BoardPoseEstimator,
+    pose_filter: PoseFilter | None,
+    overlay: SceneOverlay,
+) -> None:
+    for name in ("X_SC", "valid", "reprojection_error", "covariance", "estimate"):
+        builder.ExportOutput(estimator.GetOutputPort(name), f"board.{name}")
+    if pose_filter is not None:
+        builder.ExportOutput(pose_filter.GetOutputPort("X_SC"), "board.X_SC_filtered")
+    builder.ExportInput(overlay.GetInputPort("placement"), "placement")
+    builder.ExportOutput(overlay.GetOutputPort("overlay_image"), "overlay_image")
+
+
+def _export_station(builder: DiagramBuilder, station: Diagram) -> None:
+    for i in range(station.num_input_ports()):
+        builder.ExportInput(station.get_input_port(i), station.get_input_port(i).get_name())
+    for i in range(station.num_output_ports()):
+        builder.ExportOutput(station.get_output_port(i), station.get_output_port(i).get_name())

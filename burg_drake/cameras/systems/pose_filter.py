@@ -1,0 +1,157 @@
+"""A temporal filter of poses of a camera over a board, for a live view that must not tremble."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
+from scipy.spatial.transform import Rotation
+
+from burg_drake.cameras.pose import BoardEstimate, perturbed_pose
+from burg_drake.cameras.systems.pose_estimator import rigid_transform
+from burg_drake.core import Array, InvalidInputError
+
+GATE = 33.1
+"""Squared Mahalanobis distance from which on a pose is another than before: a chi-square of 6
+degrees of freedom exceeds it once in 100,000 times."""
+LATER = 1e-3
+"""Share of the period by which updates are later than those of what holds the image."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """What a filter remembers.
+
+    Attributes:
+        X_SC: (4, 4) filtered pose; None before the first.
+        information: (6, 6) sum of the estimates' inverse covariances, faded by age.
+        covariance: (6, 6) of `X_SC`.
+        strange: estimates in a row that were not near it.
+        age: updates since the last estimate that was.
+    """
+
+    X_SC: Array | None = None
+    information: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    covariance: Array = field(default_factory=lambda: np.full((6, 6), np.nan))
+    strange: int = 0
+    age: int = 0
+
+
+class PoseFilter(LeafSystem):
+    """Mean of the latest poses, weighted by covariance, that begins anew when the camera moves.
+
+    A Kalman filter for a camera that stands still, in the form of information: with every update
+    the old information fades, so that at rest errors are those of a mean of `window` estimates,
+    lower by the square root of that. An estimate farther from the filtered pose than noise explains
+    (`GATE`) is held back; with the `patience`-th in a row the filter begins again from it. So what
+    is shown lags behind a moved camera by less than `patience` updates, but for moves that are
+    smaller than the noise, which it follows within about `window` updates.
+
+    Input ports:
+        estimate: `BoardEstimate`, from `BoardPoseEstimator`.
+
+    Output ports:
+        X_SC: `RigidTransform`, the filtered pose; identity while not valid.
+        valid: 1.0 from the first valid estimate on, until more than `hold` updates have passed
+            without one that fits; else 0.0.
+        covariance: (36,) of the filtered pose row by row, see `BoardEstimate.covariance`, provided
+            that errors of estimates are independent; NaN while not valid.
+
+    Args:
+        period: time between updates [s].
+        offset: of the updates from whole periods [s], below `period`; a thousandth of it if not
+            given. Systems that are updated at the same moment see each other as they were before
+            it, so that without an offset a filter behind a held image is one image late.
+        window: number of estimates that the mean is as good as.
+        patience: estimates in a row that make a new pose.
+        hold: updates without a fitting estimate for which the last pose stays valid.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        window: float = 8.0,
+        patience: int = 2,
+        hold: int = 5,
+        offset: float | None = None,
+    ) -> None:
+        super().__init__()
+        if period <= 0.0 or window < 1.0 or patience < 1 or hold < 0:
+            raise InvalidInputError(
+                "a pose filter takes a period above 0 [s], a window and patience of at least 1, and"
+                " hold of at least 0"
+            )
+        offset = LATER * period if offset is None else offset
+        if not 0.0 <= offset < period:
+            raise InvalidInputError(
+                f"offset {offset:g} of a pose filter must be from 0 to below its period"
+                f" {period:g} [s]"
+            )
+        # The variance of an exponential mean with this factor is 1 / window of one estimate's.
+        self._keep = (window - 1.0) / (window + 1.0)
+        self._patience, self._hold = patience, hold
+        self._input = self.DeclareAbstractInputPort("estimate", AbstractValue.Make(BoardEstimate()))
+        self._state = self.DeclareAbstractState(AbstractValue.Make(Track()))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, offset, self._update)
+        state = {self.abstract_state_ticket(self._state)}
+        self.DeclareAbstractOutputPort(
+            "X_SC", lambda: AbstractValue.Make(RigidTransform()), self._calc_X_SC, state
+        )
+        self.DeclareVectorOutputPort("valid", 1, self._calc_valid, state)
+        self.DeclareVectorOutputPort("covariance", 36, self._calc_covariance, state)
+
+    def follow(self, track: Track, estimate: BoardEstimate) -> Track:
+        """What the filter remembers after one more estimate."""
+        aged = replace(track, age=track.age + 1)
+        if not estimate.valid:
+            return aged
+        R = estimate.covariance
+        seen = np.asarray(np.linalg.inv(R))
+        fresh = Track(estimate.X_SC, seen, R)
+        if track.X_SC is None or not self._valid(track):
+            return fresh
+        step = _difference(track.X_SC, estimate.X_SC)
+        if step @ np.linalg.solve(track.covariance + R, step) > GATE:
+            strange = track.strange + 1
+            return fresh if strange >= self._patience else replace(aged, strange=strange)
+        information = self._keep * track.information + seen
+        gain = np.asarray(np.linalg.solve(information, seen))
+        rest = np.eye(6) - gain
+        covariance = rest @ track.covariance @ rest.T + gain @ R @ gain.T
+        return Track(perturbed_pose(track.X_SC, gain @ step), information, covariance)
+
+    def _update(self, context: Context, state: State) -> None:
+        track = self.follow(self._track(context), self._input.Eval(context))
+        state.get_mutable_abstract_state(int(self._state)).set_value(track)
+
+    def _track(self, context: Context) -> Track:
+        track = context.get_abstract_state(int(self._state)).get_value()
+        assert isinstance(track, Track)
+        return track
+
+    def _valid(self, track: Track) -> bool:
+        return track.X_SC is not None and track.age <= self._hold
+
+    def _calc_X_SC(self, context: Context, output: AbstractValue) -> None:
+        track = self._track(context)
+        if track.X_SC is None or not self._valid(track):
+            output.set_value(RigidTransform())
+        else:
+            output.set_value(rigid_transform(track.X_SC))
+
+    def _calc_valid(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector([float(self._valid(self._track(context)))])
+
+    def _calc_covariance(self, context: Context, output: BasicVector) -> None:
+        track = self._track(context)
+        known = track.covariance if self._valid(track) else np.full((6, 6), np.nan)
+        output.SetFromVector(known.ravel())
+
+
+def _difference(X_SC: Array, X_SC_new: Array) -> Array:
+    """(6,) small rotation [rad] and translation [m] in S from one pose to another."""
+    turn = Rotation.from_matrix(X_SC_new[:3, :3] @ X_SC[:3, :3].T).as_rotvec()
+    return np.r_[turn, X_SC_new[:3, 3] - X_SC[:3, 3]]

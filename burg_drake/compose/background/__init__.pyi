@@ -1,0 +1,13 @@
+from .grasp_counts import (
+    Counted as Counted,
+    GraspWatch as GraspWatch,
+)
+from .process import (
+    BackgroundJob as BackgroundJob,
+    BackgroundWorker as BackgroundWorker,
+    Cancelled as Cancelled,
+)
+from .settling import (
+    Settle as Settle,
+    SettlingProposal as SettlingProposal,
+)

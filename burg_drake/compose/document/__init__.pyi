@@ -1,0 +1,33 @@
+from .amending import Amending as Amending
+from .bounds_on_board import (
+    bounds as bounds,
+    nearest_stable_pose as nearest_stable_pose,
+    object_bounds as object_bounds,
+    object_shadow as object_shadow,
+    object_vertices as object_vertices,
+    shadow as shadow,
+    yaw_between as yaw_between,
+)
+from .checker import (
+    SceneChecker as SceneChecker,
+    known_scene as known_scene,
+    lost as lost,
+    with_lost as with_lost,
+)
+from .free_place import (
+    free_offset as free_offset,
+    free_spot as free_spot,
+    middle_of_board as middle_of_board,
+)
+from .history import (
+    History as History,
+    HistoryStep as HistoryStep,
+)
+from .state import (
+    State as State,
+    name_of as name_of,
+    named as named,
+    require_some as require_some,
+    unused_name as unused_name,
+)
+from .surroundings import Surroundings as Surroundings

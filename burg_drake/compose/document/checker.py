@@ -1,0 +1,92 @@
+"""What is wrong with a scene while it is composed, even if its library lacks some objects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from burg_drake.compose.document.state import State
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.arrangement import ObjectShapes
+from burg_drake.scene.document import Scene, SceneDocument, SceneIssue
+from burg_drake.station.document import Station
+
+if TYPE_CHECKING:
+    from burg_drake.station.checks import SceneCheck
+
+
+class SceneChecker:
+    """Checks states on one station; to be used by one thread at a time.
+
+    Args:
+        station: where scenes stand.
+    """
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self._check: SceneCheck | None = None
+        self._library: ObjectLibrary | None = None
+        self._shapes: ObjectShapes | None = None
+        self._state: State | None = None
+        self._issues: tuple[SceneIssue, ...] = ()
+
+    def issues(self, state: State, path: Path) -> tuple[SceneIssue, ...]:
+        """What is wrong, but for instances whose object is lost.
+
+        Args:
+            state: scene and library.
+            path: of the scene's file, for messages.
+
+        Raises:
+            BurgError: it cannot be checked: a file of an object is missing, for example.
+        """
+        known = self._state
+        if known and known.document == state.document and known.library is state.library:
+            return self._issues
+        issues = self.check(state).issues(known_scene(state, path))
+        self._state, self._issues = state, issues
+        return issues
+
+    def check(self, state: State) -> SceneCheck:
+        """What knows of the objects of a state's library, and of contact between them."""
+        from burg_drake.station.checks import SceneCheck
+
+        if self._check is None or self._library is not state.library:
+            self._check, self._library = SceneCheck(self._station, state.library), state.library
+        return self._check
+
+    def shapes(self, state: State) -> ObjectShapes:
+        """The shapes of a state's library."""
+        if self._shapes is None or self._shapes.library is not state.library:
+            self._shapes = ObjectShapes(state.library)
+        return self._shapes
+
+
+def lost(state: State) -> tuple[str, ...]:
+    """Instances whose object is not in the library any more."""
+    return tuple(n for n, i in state.instances.items() if i.object not in state.library.objects)
+
+
+def known_scene(state: State, path: Path) -> Scene:
+    """The scene without lost instances."""
+    names = lost(state)
+    if not names:
+        return state.scene(path)
+    gone = [state.instance(name) for name in names]
+    document = replace(
+        state.document,
+        instances=tuple(i for i in state.document.instances if i not in gone),
+        background=tuple(i for i in state.document.background if i not in gone),
+    )
+    return Scene(document, state.library, path)
+
+
+def with_lost(document: SceneDocument, state: State) -> SceneDocument:
+    """What became of a `known_scene`, with the instances that it was without."""
+    gone = [state.instance(name) for name in lost(state)]
+    return replace(
+        document,
+        instances=(*document.instances, *(i for i in state.document.instances if i in gone)),
+        background=(*document.background, *(i for i in state.document.background if i in gone)),
+    )

@@ -1,0 +1,165 @@
+"""What is done beside the editing: settling in physics, and counting grasps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from burg_drake.compose.background import (
+    BackgroundJob,
+    BackgroundWorker,
+    Cancelled,
+    Counted,
+    GraspWatch,
+    Settle,
+    SettlingProposal,
+)
+from burg_drake.compose.document import known_scene, with_lost
+from burg_drake.compose.editing.editor import Editor
+from burg_drake.compose.editing.view import SessionView
+from burg_drake.compose.storage import Opened
+from burg_drake.core import InvalidInputError
+from burg_drake.station.document import Station
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.stages import GraspCount
+
+SETTLE_TIME = 10.0
+"""Simulated time that a scene gets to settle, where nothing else is asked for [s]."""
+
+
+class BackgroundEditor(Editor):
+    """An editor with processes for what takes long; see `ComposeSession`.
+
+    Args:
+        opened: the scene.
+        station: where it stands.
+    """
+
+    def __init__(self, opened: Opened, station: Station) -> None:
+        self._settler = BackgroundWorker()
+        self._settling: BackgroundJob[SettlingProposal] | None = None
+        self._proposal: SettlingProposal | None = None
+        self._grasp_watch: GraspWatch | None = None
+        self._grasps: tuple[Mapping[str, GraspCount], int] = ({}, 0)
+        super().__init__(opened, station)
+
+    def settle(self, *, time_limit: float = SETTLE_TIME) -> BackgroundJob[SettlingProposal]:
+        """Lets the scene come to rest in a worker process; editing goes on meanwhile.
+
+        What comes of it is `SessionView.proposal`. What was asked before is cancelled.
+
+        Args:
+            time_limit: simulated time allowed [s].
+        """
+        with self._alone():
+            self._drop_settling()
+            scene = known_scene(self._history.state, self._storage.place)
+            self._settling = self._settler.ask(
+                Settle(scene, self.station, time_limit), self._settled
+            )
+            self._publish()
+            return self._settling
+
+    def accept(self, proposal: SettlingProposal | None = None) -> SessionView:
+        """Makes a proposal a step.
+
+        Args:
+            proposal: the one in the view if None.
+
+        Raises:
+            InvalidInputError: there is none, or the scene has changed since it was made.
+        """
+        with self._alone():
+            proposal = proposal or self._proposal
+            if proposal is None:
+                raise InvalidInputError("there is no proposal to accept; settle the scene first")
+            before = self._history.state
+            if known_scene(before, self._storage.place).document != proposal.start:
+                raise InvalidInputError(
+                    "the scene has changed since it was settled; settle it again, or undo"
+                )
+            self._proposal = None
+            self._drag = None
+            state = replace(before, document=with_lost(proposal.document, before))
+            moved = [n for n, i in state.instances.items() if i != before.instance(n)]
+            return self._edit(proposal.label, state.select(moved))
+
+    def revert(self) -> SessionView:
+        """Drops the proposal, and what is being done for one."""
+        with self._alone():
+            self._drop_settling()
+            return self._publish()
+
+    def watch_grasps(self, grasps_per_object: int | None = 50) -> SessionView:
+        """Counts grasps from now on, in a worker process, a while after each change: how many of
+        each object are clear and reachable, and what is in the way of the others. They are in
+        `SessionView.grasps`.
+
+        Args:
+            grasps_per_object: grasps that are sampled for each object; no more counting if None.
+        """
+        with self._alone():
+            watch, self._grasp_watch = self._grasp_watch, None
+            if grasps_per_object is not None:
+                self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
+            view = self._publish()
+        if watch is not None:
+            watch.close()
+        return view
+
+    def _end_beside(self) -> None:
+        """Ends all processes."""
+        self.watch_grasps(None)
+        self._settler.close()
+
+    def _counted(self, found: Counted) -> None:
+        """Called by the worker's thread."""
+        with self._alone():
+            if self._grasp_watch is None:
+                return
+            if found.error is not None:
+                self.notify(f"grasps cannot be counted: {found.error}")
+                self._grasps = ({}, found.revision)  # nobody waits for more
+            elif found.complete:
+                self._grasps = (found.counts, found.revision)
+            else:
+                self._grasps = ({**self._grasps[0], **found.counts}, self._grasps[1])
+            self._publish()
+
+    def _settled(self, job: BackgroundJob[SettlingProposal]) -> None:
+        """Called by the worker's thread."""
+        with self._alone():
+            if job is not self._settling:
+                return
+            if job.done:
+                self._settling = None
+                if job.error is None:
+                    self._proposal = job.result
+                elif not isinstance(job.error, Cancelled):
+                    self.notify(f"cannot settle the scene: {job.error}")
+            self._publish()
+
+    def _drop_settling(self) -> None:
+        job, self._settling = self._settling, None
+        self._proposal = None
+        if job is not None:
+            job.cancel()
+
+    def _dressed(self, view: SessionView) -> SessionView:
+        if self._grasp_watch is not None:
+            scene = known_scene(self._history.state, self._storage.place)
+            self._grasp_watch.tell(scene, self._revision, self._state.selection)
+        working = None
+        if self._settling is not None:
+            share, word = self._settling.progress
+            working = f"settling: {word}" if share == 0.0 else f"settling: {share:.0%}, {word}"
+        grasps, revision = self._grasps
+        return replace(
+            view,
+            working=working,
+            proposal=self._proposal,
+            grasps=grasps,
+            grasps_revision=revision,
+        )

@@ -1,0 +1,321 @@
+"""The heart of a session: commands on a scene, its history, its selection, and what one sees."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+from burg_drake.compose.commands import Command, MoveObjects, label_of
+from burg_drake.compose.document import (
+    Amending,
+    History,
+    HistoryStep,
+    SceneChecker,
+    State,
+    Surroundings,
+    require_some,
+)
+from burg_drake.compose.editing.drag import Drag
+from burg_drake.compose.editing.view import SessionView, status_of
+from burg_drake.compose.storage import Opened, Storage
+from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.scene.document import SceneIssue
+from burg_drake.station.document import Station
+
+Callback = Callable[[SessionView], None]
+
+
+class Editor:
+    """What of a session needs neither other files nor other processes; see `ComposeSession`.
+
+    Args:
+        opened: the scene.
+        station: where it stands.
+    """
+
+    def __init__(self, opened: Opened, station: Station) -> None:
+        self.station = station
+        self._lock = threading.RLock()
+        self._depth = 0
+        self._callbacks: list[Callback] = []
+        self._told = 0
+        self._checker = SceneChecker(station)
+        self._amending = Amending()
+        self._planar = True
+        self._serial = self._revision = 0
+        self._notices: tuple[str, ...] = ()
+        self._dismissed: set[str] = set()
+        self._trouble: str | None = None
+        self._history: History
+        self._storage: Storage
+        self._state: State
+        self._drag: Drag | None
+        self._view: SessionView
+        with self._alone():
+            self._begin(opened)
+
+    @property
+    def view(self) -> SessionView:
+        """What there is to see now."""
+        return self._view
+
+    def on_change(self, callback: Callback) -> Callable[[], None]:
+        """Calls `callback` with each new view, in the thread that caused it; of views that come
+        together only with the last. With several threads they may come out of order: see
+        `SessionView.serial`.
+
+        Returns:
+            What ends that.
+        """
+        with self._lock:
+            self._callbacks.append(callback)
+
+        def unsubscribe() -> None:
+            with self._lock:
+                if callback in self._callbacks:
+                    self._callbacks.remove(callback)
+
+        return unsubscribe
+
+    def do(self, command: Command, *, field: str = "") -> SessionView:
+        """Takes a step; none if the command changes nothing.
+
+        Args:
+            command: to do.
+            field: that the user is typing in: the step takes the place of the last one if that is
+                of the same field and recent, and neither was anything selected since.
+
+        Raises:
+            BurgError: it cannot be taken; one clear line says why.
+        """
+        with self._alone():
+            self._look_around()
+            selected = replace(self._history.state, selection=self._state.selection)
+            state = command.apply(selected, self._surroundings)
+            self._drag = None
+            return self._edit(command.label, state, field)
+
+    def undo(self) -> SessionView:
+        """Takes the last step back, and selects what it had changed.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._go(lambda: self._history.undo())
+
+    def redo(self) -> SessionView:
+        """Takes the step again that was undone last.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._go(lambda: self._history.redo())
+
+    def select(self, names: Iterable[str]) -> SessionView:
+        """Selects instances, and no others; this is no step.
+
+        Raises:
+            UnknownNameError: one is not there.
+        """
+        with self._alone():
+            self._amending.end()
+            return self._show(self._state.select(names))
+
+    def restrict_movement(self, planar: bool) -> SessionView:
+        """Whether what is moved from now on keeps its height and tilt."""
+        with self._alone():
+            self._planar = planar
+            return self._publish()
+
+    def notify(self, notice: str) -> SessionView:
+        """Adds a line to what the user should know."""
+        with self._alone():
+            if notice not in self._notices:
+                self._notices += (notice,)
+            return self._publish()
+
+    def dismiss(self, notice: str) -> SessionView:
+        """The user has read a notice."""
+        with self._alone():
+            self._notices = tuple(n for n in self._notices if n != notice)
+            self._dismissed.add(notice)
+            return self._publish()
+
+    def drag(self, names: Iterable[str]) -> Drag:
+        """Takes instances in the hand; they are selected. A drag that is not over yet is put back.
+
+        Raises:
+            InvalidInputError: no instance is given.
+            UnknownNameError: one is not there.
+        """
+        with self._alone():
+            held = require_some(names, self._history.state)
+            self._drag = None
+            self._show(self._history.state.select(held))
+            self._drag = Drag(self, held, self._view)
+            self._publish()
+            return self._drag
+
+    def holds(self, drag: Drag) -> bool:
+        """Whether a drag is not over."""
+        return self._drag is drag
+
+    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+        """Shows what is dragged elsewhere; see `Drag.move`.
+
+        Raises:
+            InvalidInputError: a pose is none, or the drag is over.
+        """
+        with self._alone():
+            self._require(drag)
+            return self._show(move.apply(self._history.state, self._surroundings))
+
+    def drop(self, drag: Drag) -> SessionView:
+        """Makes a drag a step; see `Drag.end`."""
+        with self._alone():
+            self._require(drag)
+            self._drag = None
+            state = replace(self._state, library=self._history.state.library)
+            return self._edit(label_of("move", drag.names), state)
+
+    def put_back(self, drag: Drag) -> SessionView:
+        """Ends a drag without a step; see `Drag.cancel`."""
+        with self._alone():
+            if not self.holds(drag):
+                return self._view
+            self._drag = None
+            return self._show(self._history.state.select(drag.names))
+
+    def _begin(self, opened: Opened) -> None:
+        """Another scene, with its own history."""
+        self._drag = None
+        self._history, self._storage = opened.history, opened.storage
+        self._notices = opened.notices
+        self._dismissed.clear()
+        self._state = self._history.state
+        self._revision += 1
+        self._publish()
+
+    def _look_around(self) -> None:
+        """Called before each step: has anything around the session changed?"""
+
+    def _dressed(self, view: SessionView) -> SessionView:
+        """A view with what else there is to say."""
+        return view
+
+    @property
+    def _surroundings(self) -> Surroundings:
+        return Surroundings(self.station, self._planar, self._storage.place, self._checker)
+
+    @property
+    def _changed(self) -> bool:
+        """There are changes that are in no file."""
+        if self._storage.saved is None:
+            return self._history.position > 0
+        return self._history.state.document != self._storage.saved
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Keeps other threads out; then tells of the new view, when nothing is locked any more."""
+        view: SessionView | None = None
+        try:
+            with self._lock:
+                self._depth += 1
+                try:
+                    yield
+                finally:
+                    self._depth -= 1
+                    if self._depth == 0 and self._serial != self._told:
+                        view, self._told = self._view, self._serial
+                        callbacks = tuple(self._callbacks)
+        finally:
+            if view is not None:
+                for callback in callbacks:
+                    try:
+                        callback(view)
+                    except Exception:  # what listens must not undo what was done
+                        logging.getLogger(__name__).exception("a listener of a session failed")
+
+    def _edit(self, label: str, state: State, field: str = "") -> SessionView:
+        """Takes a step after which the scene is not any more the one that was sampled."""
+        document = state.document
+        if document != self._history.state.document and document.origin is not None:
+            state = replace(state, document=replace(document, origin=None))
+        if self._amending.allows(field, self._history):
+            label = self._history.undo_label or label
+            self._history.undo()
+            self._storage.record_position(self._history)
+            self._revision += 1
+        step = HistoryStep(label, state)
+        self._amending.begin(field, step)
+        return self._take(step)
+
+    def _take(self, step: HistoryStep) -> SessionView:
+        before = self._history.state
+        if step.state.document == before.document and step.state.library is before.library:
+            return self._show(step.state)
+        self._history.add(step)
+        self._storage.record_step(self._history)
+        self._revision += 1
+        return self._show(step.state)
+
+    def _go(self, there: Callable[[], State]) -> SessionView:
+        with self._alone():
+            state = there()
+            self._drag = None
+            self._amending.end()
+            self._storage.record_position(self._history)
+            self._revision += 1
+            return self._show(state)
+
+    def _show(self, state: State) -> SessionView:
+        self._state = state
+        return self._publish()
+
+    def _issues(self) -> tuple[SceneIssue, ...] | None:
+        try:
+            issues = self._checker.issues(self._state, self._storage.place)
+        except BurgError as error:
+            self._trouble = f"the scene cannot be checked: {error}"
+            return None
+        self._trouble = None
+        return issues
+
+    def _publish(self) -> SessionView:
+        self._serial += 1
+        issues = self._issues()
+        self._view = self._dressed(
+            SessionView(
+                serial=self._serial,
+                revision=self._revision,
+                state=self._state,
+                issues=issues or (),
+                status=status_of(self._state, issues),
+                undo_label=self._history.undo_label,
+                redo_label=self._history.redo_label,
+                saved=self._history.state.document == self._storage.saved,
+                changed=self._changed,
+                path=self._storage.path,
+                planar=self._planar,
+                dragging=self._drag.names if self._drag else (),
+                notices=self._all_notices(),
+            )
+        )
+        return self._view
+
+    def _all_notices(self) -> tuple[str, ...]:
+        journal = self._storage.trouble
+        troubles = (
+            self._trouble,
+            journal and f"{journal}; until then changes are kept in memory alone",
+        )
+        return self._notices + tuple(t for t in troubles if t and t not in self._dismissed)
+
+    def _require(self, drag: Drag) -> None:
+        if self._drag is not drag:
+            raise InvalidInputError(
+                "the drag is over: something else changed the scene; drag again"
+            )

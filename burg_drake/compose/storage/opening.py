@@ -1,0 +1,181 @@
+"""What a session begins with: a scene from a file, a built-in one, or an empty board; and what a
+session that was killed has left of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+
+from burg_drake.compose.commands import board_size
+from burg_drake.compose.document import History, State
+from burg_drake.compose.storage.journal import LibraryGone, Recovered, journal_path, recover
+from burg_drake.compose.storage.scene_file import fingerprint
+from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
+from burg_drake.compose.storage.scene_storage import Storage
+from burg_drake.core import InvalidInputError, UnknownNameError
+from burg_drake.core.paths import builtin_names, data_root, portable_reference, resolve
+from burg_drake.objects.library import LIBRARY_FILE, load_library
+from burg_drake.scene.document import Board, SceneDocument, load_scene
+
+NEW_SCENE = "new_scene"
+"""What a scene is called before somebody names it."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What was opened.
+
+    Attributes:
+        history: with the scene's state, and what came before it if it was recovered.
+        storage: its files.
+        notices: what the user should know, one line each.
+    """
+
+    history: History
+    storage: Storage
+    notices: tuple[str, ...] = ()
+
+
+def open_reference(reference: str | Path, folder: str | Path | None, address: str) -> Opened:
+    """Opens a scene, or begins a new one; see `ComposeSession.open`."""
+    text = str(reference)
+    if text in builtin_names("models"):
+        return new_scene(text, _folder(folder), address)
+    try:
+        path = resolve(reference, "scenes")
+    except UnknownNameError as error:
+        known = f"; libraries: {', '.join(builtin_names('models'))}"
+        raise UnknownNameError(f"{error}{known}") from error
+    if path.is_dir() or path.name == LIBRARY_FILE:
+        return new_scene(text, _folder(folder), address)
+    if path.is_relative_to(data_root() / "scenes"):
+        return _built_in(path, _folder(folder), address)
+    return open_scene_file(path, address)
+
+
+def open_scene_file(path: Path, address: str = "") -> Opened:
+    """Opens a scene's file, or what a session that was killed has left of it.
+
+    Raises:
+        SceneInUse: another session has it.
+        UnknownNameError: there is none, or an instance's object is unknown.
+        DocumentError: it does not fit the schema.
+    """
+    lock = SceneLock(path, address)
+    try:
+        found = recover(journal_path(path))
+        notices = _damage(found)
+        known = fingerprint(path)
+        if found and found.history and found.history.state.document != found.saved:
+            if found.known != known:
+                notices += (
+                    f"{path} was changed since; what you see are the changes of the last session,"
+                    " which were not saved",
+                )
+            return _recovered(path, path, found, lock, notices)
+        if found and found.history and found.known == known:
+            return _recovered(path, path, found, lock, notices, quiet=True)
+        scene = load_scene(path)
+        state = State(scene.document, scene.library)
+        storage = Storage(path, lock, path=path, known=known, saved=scene.document)
+        return Opened(History(state), storage, notices)
+    except BaseException:
+        lock.release()
+        raise
+
+
+def new_scene(library: str | Path, folder: Path, address: str = "") -> Opened:
+    """An empty board, A3 across, with the objects of a library at hand."""
+    loaded = load_library(library)
+    built_in = str(library) in builtin_names("models")
+    reference = str(library) if built_in else portable_reference(loaded.root, folder)
+
+    def make(name: str) -> State:
+        board = Board(size=board_size("A3"))
+        return State(SceneDocument(name=name, library=reference, board=board), loaded)
+
+    return _unsaved(NEW_SCENE, make, folder, reference, address)
+
+
+def _built_in(path: Path, folder: Path, address: str) -> Opened:
+    """A scene that the package installs: the start of a new one, as its file is not the user's."""
+    scene = load_scene(path)
+
+    def make(name: str) -> State:
+        return State(replace(scene.document, name=name), scene.library)
+
+    return _unsaved(scene.name, make, folder, f"scene {path.stem}", address)
+
+
+def _unsaved(
+    name: str, make: Callable[[str], State], folder: Path, origin: str, address: str
+) -> Opened:
+    """A scene without a file, by the first name that is nobody else's: numbers are put behind it.
+
+    What a session of the same origin has left is recovered.
+    """
+    notices: tuple[str, ...] = ()
+    for number in count(1):
+        place = folder / (f"{name}.yaml" if number == 1 else f"{name}_{number}.yaml")
+        if place.exists():
+            continue
+        try:
+            lock = SceneLock(place, address)
+        except SceneInUse:
+            continue
+        try:
+            found = recover(journal_path(place))
+            notices += _damage(found)
+            if found is None or found.history is None:
+                return Opened(
+                    History(make(place.stem)), Storage(place, lock, origin=origin), notices
+                )
+            if found.origin == origin and found.saved is None:
+                return _recovered(place, None, found, lock, notices)
+        except LibraryGone as error:
+            notices += (str(error),)
+        except BaseException:
+            lock.release()
+            raise
+        lock.release()
+    raise AssertionError("numbers do not end")
+
+
+def _recovered(
+    place: Path,
+    path: Path | None,
+    found: Recovered,
+    lock: SceneLock,
+    notices: tuple[str, ...],
+    *,
+    quiet: bool = False,
+) -> Opened:
+    history = found.history
+    assert history is not None
+    storage = Storage(
+        place, lock, path=path, known=found.known, saved=found.saved, origin=found.origin
+    )
+    storage.record_all(history)
+    if not quiet:
+        notices += (f"recovered what was not saved of {place.stem!r}, with its history",)
+    return Opened(history, storage, notices)
+
+
+def _damage(found: Recovered | None) -> tuple[str, ...]:
+    if found is None or found.aside is None:
+        return ()
+    return (f"the journal of the last session is damaged; it is kept as {found.aside}",)
+
+
+def _folder(folder: str | Path | None) -> Path:
+    """The folder for scenes.
+
+    Raises:
+        InvalidInputError: it is none.
+    """
+    path = Path.cwd() if folder is None else Path(folder)
+    if not path.is_dir():
+        raise InvalidInputError(f"{path} is no folder; give one for the scenes")
+    return path.resolve()

@@ -1,0 +1,56 @@
+from .cache import (
+    Arrays as Arrays,
+    cache_folder as cache_folder,
+    kept as kept,
+)
+from .content import (
+    content_hash as content_hash,
+    rng_from as rng_from,
+)
+from .errors import (
+    BurgError as BurgError,
+    ClusterError as ClusterError,
+    DocumentError as DocumentError,
+    FieldError as FieldError,
+    InvalidInputError as InvalidInputError,
+    MeshError as MeshError,
+    MissingDependencyError as MissingDependencyError,
+    SimulationError as SimulationError,
+    UnknownNameError as UnknownNameError,
+    did_you_mean as did_you_mean,
+    listing as listing,
+    nearest as nearest,
+    quoted as quoted,
+    shown as shown,
+)
+from .frames import (
+    Array as Array,
+    canonical_fingers as canonical_fingers,
+    check_pose as check_pose,
+    grasp_from_axes as grasp_from_axes,
+    inverse as inverse,
+    make_pose as make_pose,
+    pregrasp as pregrasp,
+    quaternion_from_rotation as quaternion_from_rotation,
+    rot_z as rot_z,
+    rotation_angle as rotation_angle,
+    rotation_from_quaternion as rotation_from_quaternion,
+    rotation_from_rpy as rotation_from_rpy,
+    rpy_from_rotation as rpy_from_rotation,
+    swap_fingers as swap_fingers,
+    transform_points as transform_points,
+)
+from .statistics import (
+    Z_95 as Z_95,
+    clustered_interval as clustered_interval,
+    wilson_interval as wilson_interval,
+)
+from .web_access import (
+    HEADERS as HEADERS,
+    LOCALHOST as LOCALHOST,
+    RequestError as RequestError,
+    page_url as page_url,
+    require_own_host as require_own_host,
+    taken as taken,
+)
+from .web_token import BrowserToken as BrowserToken

@@ -1,0 +1,29 @@
+from .json_text import (
+    DIGITS as DIGITS,
+    load_json as load_json,
+    parse_json as parse_json,
+)
+from .plain_yaml import (
+    Tree as Tree,
+    load_plain_yaml as load_plain_yaml,
+    parse_plain_yaml as parse_plain_yaml,
+)
+from .ranges import require_ranges as require_ranges
+from .reader import Reader as Reader
+from .schema import (
+    Pose as Pose,
+    Vector3 as Vector3,
+    dump_document as dump_document,
+    load_document as load_document,
+    parse_document as parse_document,
+    plain_data as plain_data,
+    save_document as save_document,
+)
+from .yaml_events import (
+    TAGS as TAGS,
+    checked_events as checked_events,
+)
+from .yaml_nodes import (
+    load_nodes as load_nodes,
+    parse_nodes as parse_nodes,
+)

@@ -1,0 +1,304 @@
+"""`GraspSet`: grasps as a struct of arrays; how it is stored is the matter of `grasp_storage`."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.core.frames import FARTHEST, Array, canonical_fingers, check_pose
+
+ID_DIGITS = 12
+"""Hexadecimal digits of an identifier; among 100,000 grasps two share one with chance 2e-5."""
+
+FIXED_COLUMNS = ("width", "id", "object", "score")
+"""Columns that every set has."""
+
+
+@dataclass(frozen=True, eq=False)
+class GraspSet:
+    """N grasps, possibly of several objects.
+
+    Attributes:
+        X_OG: (N, 4, 4) grasp poses in the object frame.
+        width: (N,) distance between the contacts along the closing direction [m]; NaN if unknown.
+        id: (N,) identifiers that follow from object, pose and width.
+        object: (N,) names of the library objects.
+        score: (N,) quality, higher is better; NaN if unknown.
+        provenance: how the set was made (sampler, parameters, seeds, hashes); JSON values.
+        columns: further values by name, each (N,) numbers, truth values or text. `instance` is
+            the placed object of a scene that each grasp belongs to.
+    """
+
+    X_OG: Array
+    width: Array
+    id: NDArray[np.str_]
+    object: NDArray[np.str_]
+    score: Array
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.X_OG.ndim != 3 or self.X_OG.shape[1:] != (4, 4):
+            raise InvalidInputError(
+                f"GraspSet.X_OG has shape {self.X_OG.shape}; expected (N, 4, 4)"
+            )
+        n = len(self.X_OG)
+        for name in self.column_names:
+            if (shape := self.column(name).shape) != (n,):
+                raise InvalidInputError(f"GraspSet.{name} has shape {shape}; expected ({n},)")
+
+    @classmethod
+    def create(
+        cls,
+        X_OG: ArrayLike,
+        *,
+        object: str | ArrayLike,
+        width: ArrayLike | None = None,
+        score: ArrayLike | None = None,
+        provenance: Mapping[str, Any] | None = None,
+        columns: Mapping[str, ArrayLike] | None = None,
+    ) -> GraspSet:
+        """Checks the poses, fills what is not given and computes the identifiers.
+
+        Args:
+            X_OG: (N, 4, 4) or (4, 4) grasp poses in the object frame.
+            object: one name for all, or (N,) names.
+            width: (N,) or scalar [m]; NaN if None.
+            score: (N,) or scalar; NaN if None.
+            provenance: JSON-compatible mapping.
+            columns: further values by name, each (N,) or scalar.
+
+        Raises:
+            InvalidInputError: a pose is not a finite rigid transform, shapes or types do not fit,
+                or the provenance is not JSON-compatible.
+        """
+        poses = check_pose(X_OG, "X_OG") + 0.0  # a copy without negative zeros: equal, equal id
+        poses = poses.reshape(-1, 4, 4)
+        n = len(poses)
+        names = _column("object", np.asarray(object, dtype=str), n)
+        widths = _column("width", np.asarray(np.nan if width is None else width, float), n) + 0.0
+        _require_widths(widths)
+        scores = _column("score", np.asarray(np.nan if score is None else score, float), n)
+        ids = _identifiers(names, poses, widths)
+        try:
+            plain = json.loads(json.dumps(dict(provenance or {})))
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"provenance has to consist of JSON values: {error}") from error
+        grasps = cls(poses, widths, ids, names, scores, plain)
+        return grasps.with_columns(**columns) if columns else grasps
+
+    def __len__(self) -> int:
+        return len(self.X_OG)
+
+    def __repr__(self) -> str:
+        objects = listing(sorted(set(self.object.tolist())))
+        columns = f"; columns {', '.join(self.columns)}" if self.columns else ""
+        return f"GraspSet({len(self)} grasps of {objects}{columns})"
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names that `column` knows."""
+        return (*FIXED_COLUMNS, *self.columns)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Values (N,) of a column: width, id, object, score, or one of `columns`.
+
+        Raises:
+            UnknownNameError: there is no such column.
+        """
+        if name in self.columns:
+            return self.columns[name]
+        if name not in FIXED_COLUMNS:
+            raise UnknownNameError(
+                f"the grasps have no column {name!r}; {nearest(name, self.column_names)}"
+            )
+        values: NDArray[Any] = getattr(self, name)
+        return values
+
+    def with_columns(self, **values: ArrayLike) -> GraspSet:
+        """The same grasps with columns added or replaced.
+
+        Args:
+            values: (N,) or scalars by name; `score` sets the score.
+
+        Raises:
+            InvalidInputError: a shape or type does not fit, or the column is part of the
+                identity: object, width and id.
+        """
+        columns, score = dict(self.columns), self.score
+        for name, given in values.items():
+            column = _column(name, np.asarray(given), len(self))
+            if name == "score":
+                score = column.astype(float)
+            elif name in FIXED_COLUMNS:
+                raise InvalidInputError(
+                    f"column {name!r} is part of what a grasp is; make the set anew with"
+                    " GraspSet.create"
+                )
+            elif column.dtype.kind not in "fiubU":
+                raise InvalidInputError(
+                    f"column {name!r} has values of type {column.dtype}; give numbers, truth"
+                    " values or text"
+                )
+            else:
+                columns[name] = column
+        return replace(self, score=score, columns=columns)
+
+    def canonical(self) -> GraspSet:
+        """The same physical grasps with fingers named alike: see `frames.canonical_fingers`.
+
+        Identifiers change where the fingers are swapped.
+        """
+        return GraspSet.create(
+            canonical_fingers(self.X_OG),
+            object=self.object,
+            width=self.width,
+            score=self.score,
+            provenance=self.provenance,
+            columns=self.columns,
+        )
+
+    def select(self, index: ArrayLike) -> GraspSet:
+        """Subset by boolean mask, integer array or slice; the provenance is kept."""
+        i = index if isinstance(index, slice) else np.atleast_1d(np.asarray(index))
+        if not isinstance(i, slice) and i.size == 0 and i.dtype != bool:
+            i = i.astype(int)  # an empty list is an array of floats
+        return GraspSet(
+            self.X_OG[i],
+            self.width[i],
+            self.id[i],
+            self.object[i],
+            self.score[i],
+            self.provenance,
+            {name: values[i] for name, values in self.columns.items()},
+        )
+
+    @staticmethod
+    def concatenate(sets: Iterable[GraspSet]) -> GraspSet:
+        """One set of all; the provenances are listed under `parts`.
+
+        Where a set lacks a column that another one has, its values are NaN, or empty text.
+
+        Raises:
+            InvalidInputError: there is no set to join, or a column is text in one set and numbers
+                in another.
+        """
+        parts = list(sets)
+        if not parts:
+            raise InvalidInputError("cannot concatenate zero grasp sets; give at least one")
+        names = dict.fromkeys(name for s in parts for name in s.columns)
+        return GraspSet(
+            np.concatenate([s.X_OG for s in parts]),
+            np.concatenate([s.width for s in parts]),
+            np.concatenate([s.id for s in parts]),
+            np.concatenate([s.object for s in parts]),
+            np.concatenate([s.score for s in parts]),
+            {"parts": [dict(s.provenance) for s in parts]},
+            {name: _joined(name, parts) for name in names},
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Writes a file that `load` restores bit for bit.
+
+        Args:
+            path: ends in `.npz` or `.h5`.
+
+        Raises:
+            InvalidInputError: another suffix, or the place cannot be written to.
+        """
+        from burg_drake.core.grasps.storage import save_grasps
+
+        save_grasps(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> GraspSet:
+        """Reads a file written by `save`.
+
+        Raises:
+            InvalidInputError: not such a file, or of a newer version.
+        """
+        from burg_drake.core.grasps.storage import load_grasps
+
+        return load_grasps(path)
+
+
+def parts_of(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The provenances of the sets that a set was joined of, which `parts` lists or has by name."""
+    parts = provenance.get("parts")
+    if isinstance(parts, Mapping):
+        parts = list(parts.values())
+    return [p for p in parts if isinstance(p, Mapping)] if isinstance(parts, (list, tuple)) else []
+
+
+def require_sound(grasps: GraspSet) -> None:
+    """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
+
+    Grasps that are there several times, with the same identifier, object, pose and width, are fine.
+
+    Raises:
+        InvalidInputError: a pose is not a finite rigid transform, a width is beyond all hands,
+            or grasps that differ have the same identifier; the message names the first ones.
+    """
+    check_pose(grasps.X_OG, "X_OG")
+    _require_widths(grasps.width)
+    _, first, same = np.unique(grasps.id, return_index=True, return_inverse=True)
+    twin = first[same]
+    differs = (grasps.object != grasps.object[twin]) | (grasps.X_OG[twin] != grasps.X_OG).any(
+        (1, 2)
+    )
+    differs |= ~((grasps.width == grasps.width[twin]) | np.isnan(grasps.width))
+    differs |= np.isnan(grasps.width) != np.isnan(grasps.width[twin])
+    if differs.any():
+        i = int(np.argmax(differs))
+        raise InvalidInputError(
+            f"id[{twin[i]}] and id[{i}] are both {str(grasps.id[i])!r}, but these are different"
+            " grasps; give each an identifier of its own"
+        )
+
+
+def _require_widths(width: Array) -> None:
+    if (bad := np.abs(width) > FARTHEST).any():
+        i = int(np.argmax(bad))
+        raise InvalidInputError(f"width[{i}] is {width[i]:g}; give metres, or NaN if unknown")
+
+
+def _column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
+    """A copy of (n,) values, or of a scalar n times."""
+    if values.shape not in ((), (n,)):
+        raise InvalidInputError(f"{name} has shape {values.shape}; expected ({n},) or one value")
+    return np.array(np.broadcast_to(values, (n,)))
+
+
+def _identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> NDArray[np.str_]:
+    """(N,) hashes of names, poses and widths (BLAKE2b, which takes a microsecond a grasp)."""
+    numbers = np.column_stack([X_OG.reshape(-1, 16), width]).astype("<f8")
+    prefixes = {
+        name: hashlib.blake2b(f"{name}\0".encode(), digest_size=ID_DIGITS // 2)
+        for name in np.unique(object).tolist()
+    }
+    ids = []
+    for name, row in zip(object.tolist(), numbers, strict=True):
+        digest = prefixes[name].copy()
+        digest.update(row.data)
+        ids.append(digest.hexdigest())
+    return np.array(ids, dtype=f"<U{ID_DIGITS}")
+
+
+def _joined(name: str, sets: list[GraspSet]) -> NDArray[Any]:
+    """A column of sets that may lack it."""
+    kinds = {s.columns[name].dtype.kind == "U" for s in sets if name in s.columns and len(s)}
+    if len(kinds) > 1:
+        raise InvalidInputError(
+            f"column {name!r} is text in one set of grasps and numbers in another; rename one"
+        )
+    missing = "" if kinds == {True} else np.nan
+    filled = [s.columns.get(name, np.full(len(s), missing)) for s in sets]
+    return np.concatenate([values for values in filled if len(values)] or filled[:1])

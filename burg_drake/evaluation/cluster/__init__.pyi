@@ -1,0 +1,1 @@
+from .dask_executor import connect_cluster as connect_cluster

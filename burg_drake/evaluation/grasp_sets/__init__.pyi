@@ -1,0 +1,24 @@
+from .candidate_files import (
+    GivenGrasps as GivenGrasps,
+    NoSceneIdsError as NoSceneIdsError,
+    by_names as by_names,
+    read_grasps as read_grasps,
+)
+from .exchange import (
+    IN_WORDS as IN_WORDS,
+    read_in_frame as read_in_frame,
+)
+from .input import (
+    format_name as format_name,
+    hand_reference as hand_reference,
+    read_input as read_input,
+    station_reference as station_reference,
+)
+from .near_objects import require_near as require_near
+from .provenance import set_documents as set_documents
+from .run_set import (
+    column_called as column_called,
+    run_grasps as run_grasps,
+)
+from .sampled import sampled_set as sampled_set
+from .scored import scored_set as scored_set

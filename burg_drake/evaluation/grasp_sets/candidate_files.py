@@ -1,0 +1,253 @@
+"""Reads the grasps that a run judges from files, ours and those of other projects."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidates import (
+    INSTANCE,
+    InstanceNames,
+    Names,
+    by_instance,
+    held_instances,
+    require_instances,
+)
+from burg_drake.evaluation.grasp_sets.input import read_input
+from burg_drake.evaluation.grasp_sets.near_objects import require_near
+from burg_drake.formats.common import PANDA, Frame, Gripper, with_objects_renamed
+from burg_drake.scene.document import Scene
+
+OBJECT_ID, SCENE_ID = "object_id", "scene_id"
+"""Columns by which files of several objects, or of several scenes, tell theirs apart."""
+NO_OBJECT = -1
+"""Object id of grasps of which it is not known."""
+
+
+class NoSceneIdsError(InvalidInputError):
+    """A file does not say which scene its grasps are of."""
+
+
+@dataclass(frozen=True)
+class GivenGrasps:
+    """What was read of a file.
+
+    Attributes:
+        by_instance: grasps in the object frame by name of an instance, for `given_candidates`.
+        notes: what of the file was left behind or changed, one sentence each.
+    """
+
+    by_instance: dict[str, GraspSet]
+    notes: tuple[str, ...] = ()
+
+
+def read_grasps(
+    scene: Scene,
+    path: str | Path,
+    gripper: Gripper = PANDA,
+    *,
+    format: str | None = None,
+    objects: Mapping[str, str] | None = None,
+    frame: Frame | None = None,
+    X_SF: Array | None = None,
+    object_ids: Mapping[int, str] | None = None,
+    scene_id: str | None = None,
+) -> GivenGrasps:
+    """Reads a grasp file and gives each grasp to an instance of the scene.
+
+    Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
+    are measured in the frame of their object go to every instance of it. Those that are measured
+    in one frame for all, a camera's or a world's, go to the instance that they hold; see
+    `placement.held_instances`.
+
+    Args:
+        scene: the scene.
+        path: a file of any format in `formats.grasp_files`, or the folder of a run.
+        gripper: the hand that the grasps are for.
+        format: of the file; None to tell by the content.
+        objects: names of the scene's objects, or of its instances, by the names that the file has;
+            a name by the empty text is for all grasps.
+        frame: what the poses are measured in, in place of what the format says.
+        X_SF: (4, 4) pose of the file's camera, or of its world, in the scene frame; a world is the
+            scene frame if None.
+        object_ids: names of instances by the file's object ids.
+        scene_id: the one to take of a file of several scenes.
+
+    Raises:
+        InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
+        UnknownNameError: an object, instance or scene that is not there.
+    """
+    imported = read_input(path, format, gripper)
+    names = InstanceNames(scene, str(path), dict(objects or {}))
+    grasps = _of_one_scene(imported.grasps, scene_id, names.path)
+    frame = frame or imported.frame
+    if frame == "object":
+        if X_SF is not None or object_ids:
+            raise InvalidInputError(
+                f"{path} has grasps in the frames of their objects, to which neither a pose nor"
+                " object ids apply"
+            )
+        found = _of_names(grasps, names)
+        return GivenGrasps(found, (*imported.notes, *_repeated(found, names.path)))
+    if frame == "camera" and X_SF is None:
+        raise InvalidInputError(
+            f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
+            " (--camera-pose)"
+        )
+    X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
+    owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
+    placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
+    return GivenGrasps(placed, (*imported.notes, *notes, *_repeated(placed, names.path)))
+
+
+def _repeated(by_instance: Mapping[str, GraspSet], path: str) -> tuple[str, ...]:
+    """A note about grasps that are there several times, which `given_candidates` leaves out."""
+    count = sum(len(part) - len(np.unique(part.id)) for part in by_instance.values())
+    return (f"{count} grasps of {path} repeat others; each is judged once.",) if count else ()
+
+
+def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
+    """Gives grasps in the frames of their objects to the instances of a scene.
+
+    Args:
+        scene: the scene.
+        grasps: with a column `instance` they stay on the instances that it names; else they go to
+            every instance of their object.
+
+    Returns:
+        The grasps by name of an instance, for `given_candidates`.
+
+    Raises:
+        InvalidInputError: the set does not say which object its grasps are of.
+        UnknownNameError: the scene has no such object.
+    """
+    return _of_names(grasps, InstanceNames(scene, "the set", {}, is_file=False))
+
+
+def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
+    """The same, with the names of a file."""
+    on_instances = INSTANCE in grasps.columns and not names.given
+    found = _of_instances(grasps) if on_instances else _of_objects(grasps, names)
+    require_instances(names.scene, found, names.path)
+    for part in found.values():
+        require_near(part, names.scene.library, names.path, is_file=names.is_file)
+    return found
+
+
+def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet:
+    """The grasps of one scene of the file."""
+    if SCENE_ID not in grasps.columns:
+        if scene_id is not None:
+            raise NoSceneIdsError(f"{path} has no scene ids; leave out --scene-id")
+        return grasps
+    ids = grasps.columns[SCENE_ID].astype(str)
+    known = sorted(set(ids.tolist()))
+    if scene_id is None:
+        if len(known) > 1:
+            raise InvalidInputError(
+                f"{path} has grasps of {len(known)} scenes; choose one of them (--scene-id):"
+                f" {listing(known)}"
+            )
+        return grasps
+    if scene_id not in known:
+        raise UnknownNameError(f"{path} has no scene {scene_id!r}; {nearest(scene_id, known)}")
+    return grasps.select(ids == scene_id)
+
+
+def _of_instances(grasps: GraspSet) -> dict[str, GraspSet]:
+    """Grasps of a file that names instances, each set with its own provenance."""
+    owner = grasps.columns[INSTANCE]
+    given = grasps.provenance.get("parts")
+    parts = given if isinstance(given, Mapping) else {}
+    rest = _without_instance(grasps)
+    found = {}
+    for name in dict.fromkeys(owner.tolist()):
+        part = parts.get(name)
+        provenance = part if isinstance(part, Mapping) else {}
+        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
+    return found
+
+
+def _of_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
+    """Grasps in object frames by instance, in the scene's order."""
+    foreign = sorted(set(grasps.object.tolist()))
+    names.require_used(foreign)
+    sets: dict[str, list[GraspSet]] = {name: [] for name in names.scene.instances}
+    for name in foreign:
+        chosen = _without_instance(grasps.select(grasps.object == name))
+        for instance in names.of_object(name):
+            object = names.scene.instance(instance).object
+            sets[instance].append(with_objects_renamed(chosen, {name: object}))
+    return {
+        name: parts[0] if len(parts) == 1 else GraspSet.concatenate(parts)
+        for name, parts in sets.items()
+        if parts
+    }
+
+
+def _owners(
+    grasps: GraspSet,
+    X_SG: Array,
+    names: InstanceNames,
+    object_ids: Mapping[int, str],
+    gripper: Gripper,
+) -> tuple[Names, tuple[str, ...]]:
+    """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and notes about it."""
+    names.require_used([""])
+    among = names.of_object("") if names.given else None
+    owner = _told(grasps, names, object_ids)
+    open_ = owner == ""
+    owner[open_], held = held_instances(names.scene, X_SG[open_], gripper, among)
+    missed = int((~held).sum())
+    if not missed:
+        return owner.astype(str), ()
+    if missed == len(X_SG):
+        raise InvalidInputError(
+            f"none of the {missed} grasps of {names.path} has an object of scene"
+            f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
+            " of the camera or workspace (--camera-pose)?"
+        )
+    return owner.astype(str), (
+        f"{missed} of {len(X_SG)} grasps have no object between their fingers; they are given to"
+        " the one with the nearest surface.",
+    )
+
+
+def _told(
+    grasps: GraspSet, names: InstanceNames, object_ids: Mapping[int, str]
+) -> NDArray[np.object_]:
+    """(N,) instances that object ids tell; empty texts where they do not."""
+    told = np.full(len(grasps), "", dtype=object)
+    if not object_ids:
+        return told
+    if OBJECT_ID not in grasps.columns:
+        raise InvalidInputError(f"{names.path} has no object ids; leave out --object-ids")
+    ids = grasps.columns[OBJECT_ID]
+    unknown = sorted(set(ids.tolist()) - {*object_ids, NO_OBJECT})
+    if unknown:
+        raise InvalidInputError(
+            f"{names.path} has grasps of object id {unknown[0]}, which --object-ids does not name;"
+            f" it has {', '.join(f'{number}={name}' for number, name in object_ids.items())}"
+        )
+    for number, name in object_ids.items():
+        instance, *others = names.called(name)
+        if others:
+            raise InvalidInputError(
+                f"object id {number} is given as {name!r}, of which scene {names.scene.name!r}"
+                f" has several: {', '.join((instance, *others))}; name one of them"
+            )
+        told[ids == number] = instance
+    return told
+
+
+def _without_instance(grasps: GraspSet) -> GraspSet:
+    """The same grasps without the column that candidates have in their own way."""
+    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
+    return dataclasses.replace(grasps, columns=columns)

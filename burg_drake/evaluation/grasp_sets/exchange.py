@@ -1,0 +1,112 @@
+"""Grasps of a file in the frame in which another file wants them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, inverse, make_pose
+from burg_drake.core.grasps import GraspSet
+from burg_drake.evaluation.candidates import in_frame
+from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
+from burg_drake.evaluation.grasp_sets.input import read_input
+from burg_drake.formats.common import PANDA, Frame, Gripper, ImportedGrasps, with_objects_renamed
+from burg_drake.scene.document import Scene
+
+IN_WORDS = {"object": "the frame of their object", "world": "a scene", "camera": "a camera"}
+
+
+def read_in_frame(
+    path: str | Path,
+    wanted: Frame,
+    gripper: Gripper = PANDA,
+    *,
+    format: str | None = None,
+    frame: Frame | None = None,
+    objects: Mapping[str, str] | None = None,
+    scene: Scene | None = None,
+    X_SF: Array | None = None,
+    object_ids: Mapping[int, str] | None = None,
+    scene_id: str | None = None,
+) -> ImportedGrasps:
+    """Reads grasps and measures them in another frame, with the help of a scene where it takes one.
+
+    Args:
+        path: the file, or the folder of a run.
+        wanted: the frame; in that of their object, grasps get the column `instance`.
+        gripper: the hand that they are for.
+        format: of the file; None to tell by the content.
+        frame: what its poses are measured in, in place of what the format says.
+        objects: new names of objects by those that the file has; one by the empty text is for all.
+        scene: where objects stand.
+        X_SF: (4, 4) the camera in the scene frame; where a world is not the scene frame, that.
+        object_ids: names of instances by the file's object ids.
+        scene_id: the one to take of a file of several scenes.
+
+    Raises:
+        InvalidInputError: the file cannot be read, or a scene or the camera's pose is missing.
+        UnknownNameError: an object, instance or scene that is not there.
+    """
+    imported = read_input(path, format, gripper)
+    given = frame or imported.frame
+    if given == wanted:
+        grasps = with_objects_renamed(imported.grasps, objects or {})
+        return ImportedGrasps(grasps, wanted, imported.notes)
+    if "object" not in (given, wanted):
+        if X_SF is None:
+            raise InvalidInputError(
+                f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
+                f" {IN_WORDS[wanted]}; give the camera's pose in the scene (--camera-pose)"
+            )
+        grasps = _moved(imported.grasps, X_SF if given == "camera" else inverse(X_SF))
+        return ImportedGrasps(grasps, wanted, imported.notes)
+    if scene is None:
+        raise InvalidInputError(
+            f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
+            f" {IN_WORDS[wanted]}; give the scene in which the objects stand (--scene)"
+        )
+    if wanted == "camera" and X_SF is None:
+        raise InvalidInputError("grasps are wanted in a camera; give its pose (--camera-pose)")
+    placed = read_grasps(
+        scene,
+        path,
+        gripper,
+        format=format,
+        objects=objects,
+        frame=given,
+        X_SF=None if given == "object" else X_SF,
+        object_ids=object_ids if wanted == "object" else None,
+        scene_id=scene_id,
+    )
+    X_SX = make_pose() if wanted == "object" or X_SF is None else X_SF
+    if wanted == "object":
+        named = [
+            part.with_columns(instance=np.full(len(part), name))
+            for name, part in placed.by_instance.items()
+        ]
+        return ImportedGrasps(GraspSet.concatenate(named), wanted, placed.notes)
+    grasps = _with_ids(in_frame(scene, placed.by_instance, X_SX), object_ids or {})
+    return ImportedGrasps(grasps, wanted, placed.notes)
+
+
+def _moved(grasps: GraspSet, X_TF: Array) -> GraspSet:
+    """The same grasps, measured in T instead of F."""
+    return GraspSet.create(
+        X_TF @ grasps.X_OG,
+        object=grasps.object,
+        width=grasps.width,
+        score=grasps.score,
+        provenance=grasps.provenance,
+        columns=grasps.columns,
+    )
+
+
+def _with_ids(grasps: GraspSet, object_ids: Mapping[int, str]) -> GraspSet:
+    """With the column `object_id` of GraspNet's files, where ids of instances are given."""
+    if not object_ids:
+        return grasps
+    ids = {name: number for number, name in object_ids.items()}
+    instances = grasps.columns["instance"].tolist()
+    return grasps.with_columns(object_id=np.array([ids.get(name, -1) for name in instances]))

@@ -1,0 +1,90 @@
+from .campaign_document import (
+    CampaignDocument as CampaignDocument,
+    SceneEntry as SceneEntry,
+    campaign_differences as campaign_differences,
+    campaign_hash as campaign_hash,
+    require_same_campaign as require_same_campaign,
+)
+from .folder_lock import (
+    Lock as Lock,
+    is_locked as is_locked,
+    unchanged as unchanged,
+)
+from .journal import (
+    JOURNAL_FILE as JOURNAL_FILE,
+    LONGEST_LINE as LONGEST_LINE,
+    Journal as Journal,
+    encode as encode,
+    journal_lines as journal_lines,
+    read_journal as read_journal,
+)
+from .ledger import (
+    LEDGER_FILE as LEDGER_FILE,
+    Ledger as Ledger,
+    SceneState as SceneState,
+    ledger_text as ledger_text,
+)
+from .motion_numbers import (
+    motion_in as motion_in,
+    motion_options as motion_options,
+    motion_text as motion_text,
+    without_motion as without_motion,
+)
+from .origin import (
+    TrialOrigin as TrialOrigin,
+    engine_label as engine_label,
+    pairs_text as pairs_text,
+    read_origin as read_origin,
+)
+from .rows import (
+    best_rows as best_rows,
+    rows_of as rows_of,
+    unknown_grasp as unknown_grasp,
+)
+from .run_document import (
+    HASH_DIGITS as HASH_DIGITS,
+    Grasps as Grasps,
+    Input as Input,
+    Library as Library,
+    RunDocument as RunDocument,
+    TableFormat as TableFormat,
+    WorkSession as WorkSession,
+    begun_now as begun_now,
+    differences as differences,
+    identity as identity,
+    input_of as input_of,
+    input_reference as input_reference,
+    numbers as numbers,
+    origin_of as origin_of,
+    require_same_run as require_same_run,
+    run_hash as run_hash,
+    software_versions as software_versions,
+    what_is_asked as what_is_asked,
+)
+from .shard import (
+    Shard as Shard,
+    as_shard as as_shard,
+    share as share,
+)
+from .table import (
+    CPU_COLUMNS as CPU_COLUMNS,
+    GIVEN as GIVEN,
+    TEXT as TEXT,
+    Columns as Columns,
+    make_columns as make_columns,
+    table_row as table_row,
+    trial_columns as trial_columns,
+)
+from .table_file import (
+    is_table as is_table,
+    read_table as read_table,
+    require_table as require_table,
+    require_writer as require_writer,
+    write_table as write_table,
+)
+from .trial import (
+    MOVED as MOVED,
+    PUSHED as PUSHED,
+    RecordedTrial as RecordedTrial,
+    read_trial as read_trial,
+)

@@ -1,0 +1,158 @@
+"""The document of a run over many scenes, `campaign.yaml`: which scenes, and what is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError, content_hash, listing
+from burg_drake.core.paths import require_name
+from burg_drake.evaluation.records.run_document import (
+    HASH_DIGITS,
+    Grasps,
+    Input,
+    TableFormat,
+    WorkSession,
+    differences,
+    require_same_shard,
+    what_is_asked,
+)
+from burg_drake.evaluation.records.shard import Shard, as_shard
+from burg_drake.evaluation.stages import Mode
+from burg_drake.station.document import Engine
+
+FEW_SCENES = 100
+"""Of more scenes than these only who asks for it gets a report of each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneEntry:
+    """A scene of the run.
+
+    Attributes:
+        name: in this run, of its folder; the scene's own, unless another has the same.
+        path: where it was, or the name of a built-in one.
+        content: hash of all that matters in it and behind it.
+        file: hash of the scene file's bytes; empty for a scene that was no file.
+        library: folder of its library, a key of `libraries`.
+        instances: objects of the free instances by name.
+    """
+
+    name: str
+    path: str
+    content: str
+    file: str = ""
+    library: str = ""
+    instances: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_name(self.name, "name")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignDocument:
+    """Schema of campaign.yaml.
+
+    Attributes:
+        hash: of what decides about results, `campaign_hash`.
+        command: the command line, or the Python script, that began the run.
+        station, engine, trial, mode, arm, seed, grasps: what is asked about each scene, as in
+            `RunDocument`; each run has its own number of grasps.
+        shard: which share of the work is done here, as `K/N`; all if empty.
+        table: format of the tables of results.
+        joints: of the arm that is asked; 0 without one.
+        scenes: all of them, also in a shard.
+        libraries: hash of all objects of each library, by folder.
+        versions: of the software and the machine.
+        stretches: who worked on it when.
+    """
+
+    version: int = 1
+    hash: str = ""
+    command: str = ""
+    station: Input
+    grasps: Grasps
+    engine: Engine
+    trial: dict[str, float] = field(default_factory=dict)
+    mode: Mode
+    arm: dict[str, float] = field(default_factory=dict)
+    seed: int
+    shard: str = ""
+    table: TableFormat = "csv"
+    joints: int = 0
+    scenes: tuple[SceneEntry, ...]
+    libraries: dict[str, str] = field(default_factory=dict)
+    versions: dict[str, str] = field(default_factory=dict)
+    stretches: tuple[WorkSession, ...] = ()
+
+    @property
+    def mine(self) -> tuple[SceneEntry, ...]:
+        """Scenes that are judged here, wholly or in part."""
+        shard = as_shard(self.shard or None)
+        if shard is None or not shard.divides_scenes(len(self.scenes)):
+            return self.scenes
+        return tuple(entry for place, entry in enumerate(self.scenes) if shard.has(place))
+
+    @property
+    def shard_of_grasps(self) -> Shard | None:
+        """The share of the grasps of each scene that is judged here; None is all."""
+        shard = as_shard(self.shard or None)
+        divides = shard is not None and shard.divides_scenes(len(self.scenes))
+        return None if divides else shard
+
+    @property
+    def has_few_scenes(self) -> bool:
+        """Whether each scene has a report of its own, if nothing else is asked for."""
+        return len(self.scenes) <= FEW_SCENES
+
+    @property
+    def instances(self) -> list[str]:
+        """Names of the free objects of all scenes."""
+        return list(dict.fromkeys(name for entry in self.scenes for name in entry.instances))
+
+
+def identity(document: CampaignDocument) -> dict[str, str]:
+    """What two calls must have in common to work on the same run, in words, by topic."""
+    return {"scenes": f"{len(document.scenes)} scenes", **what_is_asked(document)}
+
+
+def campaign_hash(document: CampaignDocument) -> str:
+    """Short hash of what decides about results."""
+    scenes = [(entry.name, entry.content) for entry in document.scenes]
+    return content_hash(identity(document), scenes)[:HASH_DIGITS]
+
+
+def scene_differences(there: CampaignDocument, here: CampaignDocument) -> list[str]:
+    """How the scenes of two runs differ, in words."""
+    old = {entry.name: entry.content for entry in there.scenes}
+    new = {entry.name: entry.content for entry in here.scenes}
+    found = []
+    if lost := [name for name in old if name not in new]:
+        found.append(f"only there {listing(lost)}")
+    if more := [name for name in new if name not in old]:
+        found.append(f"only here {listing(more)}")
+    if other := [name for name in old if name in new and old[name] != new[name]]:
+        found.append(f"changed {listing(other)}")
+    if not found and list(old) != list(new):
+        found.append("in another order")
+    return [f"scenes: {'; '.join(found)}"] if found else []
+
+
+def campaign_differences(there: CampaignDocument, here: CampaignDocument) -> list[str]:
+    """What two runs differ in that must be the same in one run, in words."""
+    found = differences(identity(there), identity(here))
+    return [f for f in found if not f.startswith("scenes is")] + scene_differences(there, here)
+
+
+def require_same_campaign(folder: Path, there: CampaignDocument, here: CampaignDocument) -> None:
+    """Refuses to go on with a run that is not the one asked for.
+
+    Raises:
+        InvalidInputError: names every difference.
+    """
+    found = campaign_differences(there, here)
+    if found:
+        raise InvalidInputError(
+            f"{folder} holds another run ({'; '.join(found)}); choose another -o, or delete it"
+        )
+    require_same_shard(folder, there.shard, here.shard)

@@ -1,0 +1,174 @@
+"""Executes a recorded trial again and compares: outcome and margins have to be the same bits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+from burg_drake.core.grasps import Stage
+from burg_drake.evaluation.records import RecordedTrial, TrialOrigin, motion_text, software_versions
+from burg_drake.evaluation.stages import (
+    ARM_SCREEN_MARGINS,
+    LIFT_HEIGHT,
+    MARGINS,
+    Mode,
+    StationJudge,
+    Verdict,
+    judge_grasp,
+    mode_for,
+)
+from burg_drake.motion.plans import Plan
+from burg_drake.scene.document import Scene
+from burg_drake.simulation.trials import Margins, TrialResult
+from burg_drake.station.document import GraspMotion, Station
+
+ROUNDING = 1e-14
+"""Relative difference that a table gets which a program wrote again with 15 digits, as
+spreadsheets do, or has read without care for the last bit."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A result that is not as recorded.
+
+    Attributes:
+        name: of the result.
+        recorded, now: its values; NaN or an empty text where there is none.
+    """
+
+    name: str
+    recorded: float | str
+    now: float | str
+
+    @property
+    def rounding(self) -> bool:
+        """Whether a table that was written again by another program explains it."""
+        if isinstance(self.recorded, str) or isinstance(self.now, str):
+            return False
+        return math.isclose(self.recorded, self.now, rel_tol=ROUNDING)
+
+    def __str__(self) -> str:
+        return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
+
+
+def rerun(
+    scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
+) -> tuple[Verdict, Plan | None]:
+    """Judges a grasp again as its row tells.
+
+    The arm is asked only where it has decided, or has executed the grasp.
+
+    Returns:
+        The verdict, and the plan that the arm executed, if it did.
+
+    Raises:
+        InvalidInputError: settings that this release lacks, or an unsound scene.
+    """
+    judge = StationJudge(
+        scene,
+        station,
+        engine=origin.engine,
+        mode=mode_for(station, decisive_mode(trial, origin)),
+        settings=origin.settings(),
+    )
+    verdict = judge_grasp(judge, trial.candidate)
+    return verdict, judge.plan
+
+
+def decisive_mode(trial: RecordedTrial, origin: TrialOrigin) -> Mode:
+    """The least that has to be asked to come to the same verdict."""
+    stage = None if trial.verdict is None else trial.verdict.stage
+    by_hand = stage is Stage.CLEAR or (origin.mode == "reach" and stage is Stage.EXECUTED)
+    return "hand" if by_hand else origin.mode
+
+
+def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
+    """Results that are not the same bits; times and arm configurations are not compared."""
+    there, here = _results(recorded), _results(now)
+    if "clearance" not in there:  # of a release that did not measure it
+        here.pop("clearance", None)
+    if math.isnan(recorded.margins.get(LIFT_HEIGHT, math.nan)):  # likewise, or of a trial alone
+        here.pop(LIFT_HEIGHT, None)
+    # The arm may have passed a grasp on, and is not asked again.
+    for name in (*ARM_SCREEN_MARGINS, LIFT_HEIGHT):
+        if name not in here:
+            there.pop(name, None)
+    found = []
+    for name in {**there, **here}:
+        empty = "" if isinstance(there.get(name, here.get(name)), str) else math.nan
+        a, b = there.get(name, empty), here.get(name, empty)
+        if _bits(a) != _bits(b):
+            found.append(Difference(name, a, b))
+    return found
+
+
+def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
+    """What `differences` found as lines for people; `as recorded` if every bit is the same."""
+    if not found:
+        return ["as recorded"]
+    if all(difference.rounding for difference in found):
+        names = ", ".join(difference.name for difference in found)
+        return [f"as recorded, but for the last digits of {names}: the table was rounded"]
+    there, here = origin.versions, software_versions()
+    changed = [
+        f"{name} {there[name]}, now {here[name]}"
+        for name in there
+        if name in here and there[name] != here[name].replace(" ", "_")
+    ]
+    versions = f" (with {'; '.join(changed)})" if changed else ""
+    return [f"not as recorded{versions}", *map(str, found)]
+
+
+def _results(verdict: Verdict) -> dict[str, float | str]:
+    margins = {name: verdict.margins[name] for name in MARGINS if name in verdict.margins}
+    if margins.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
+        del margins["end_time"]
+    moved = {f"moved {name}": value for name, value in verdict.displacements.items()}
+    pushed = {f"pushed {name}": value for name, value in verdict.pushed.items()}
+    texts = {"blocker": verdict.blocker, "touched": verdict.touched}
+    return {"outcome": verdict.outcome.value, **texts, **margins, **moved, **pushed}
+
+
+def _bits(value: float | str) -> str:
+    return value if isinstance(value, str) else float(value).hex()
+
+
+def arm_figures(verdict: Verdict) -> list[str]:
+    """What the screen of the arm has measured, as lines for people; none if it was not asked."""
+    figures = [
+        f"{name} {verdict.margins[margin] * factor:.{digits}f} {unit}"
+        for name, margin, factor, digits, unit in (
+            ("arm clearance", "arm_clearance", 1e3, 1, "mm"),
+            ("beyond a joint limit by", "joint_excess", 180.0 / math.pi, 1, "deg"),
+            ("planned motion", "duration", 1.0, 2, "s"),
+        )
+        if margin in verdict.margins
+    ]
+    return [", ".join(figures)] if figures else []
+
+
+def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
+    """Where the hand goes, as lines for people; none if that is the usual way."""
+    motion = origin.settings().motion
+    if motion is None or motion == GraspMotion():
+        return []
+    whole = trial.lift is None or trial.lift >= motion.lift_height
+    room = "" if whole else f"; there is room for a lift of {1e3 * (trial.lift or 0.0):g} mm"
+    return [f"motion: {motion_text(motion)}{room}"]
+
+
+def as_result(verdict: Verdict) -> TrialResult:
+    """A verdict as a trial returns it."""
+    return TrialResult(
+        outcome=verdict.outcome,
+        margins=Margins(**{k: v for k, v in verdict.margins.items() if k in _OF_TRIALS}),
+        blocker=verdict.blocker,
+        reason=verdict.reason,
+        displacements=verdict.displacements,
+        pushed=verdict.pushed,
+        touched=verdict.touched,
+    )
+
+
+_OF_TRIALS = {field.name for field in fields(Margins)}

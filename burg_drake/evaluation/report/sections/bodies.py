@@ -1,0 +1,81 @@
+"""Sections of the report about bodies: what was in the hand's way, and what was pushed around."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from burg_drake.core.grasps import Outcome
+from burg_drake.evaluation.records import MOVED, Columns
+from burg_drake.evaluation.report.elements import Html, element, folded, table
+
+NOTICEABLE = 1e-3
+"""Objects count as moved from this displacement on [m]."""
+
+
+def collision_section(columns: Columns) -> Html | None:
+    """What the open hand collided with at the start and how deep; nothing if it never did."""
+    collides = np.char.startswith(columns["outcome"], "collision_")
+    if not collides.any():
+        return None
+    blockers = Counter(columns["blocker"][collides].tolist())
+    rows = []
+    for name, count in blockers.most_common():
+        mask = collides & (columns["blocker"] == name)
+        depth = columns["overlap"][mask] * 1e3
+        own = int((columns["outcome"][mask] == Outcome.COLLISION_TARGET).sum())
+        cells = [
+            count,
+            own or "·",
+            count - own or "·",
+            f"{np.median(depth):.1f} mm",
+            f"{depth.max():.1f} mm",
+        ]
+        numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
+        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+    head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
+    return folded(
+        "Start collisions",
+        "What the open hand is in at the grasp, and how far it would have to move back. A grasp"
+        " counts for one body, even if the hand is in several.",
+        table(head, rows, numbers=(1, 2, 3, 4, 5)),
+    )
+
+
+def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
+    """Which objects were moved in trials on others; nothing if all stayed where they were.
+
+    Args:
+        columns: the results.
+        disturbance: displacement from which on a lifted grasp counts as disturbing [m].
+    """
+    names = [name.removeprefix(MOVED) for name in columns if name.startswith(MOVED)]
+    moved = {name: columns[MOVED + name] for name in names}
+    found = {name: int((far >= NOTICEABLE).sum()) for name, far in moved.items()}
+    names = sorted((name for name in names if found[name]), key=lambda name: -found[name])
+    if not names:
+        return None
+    limit = f"over {disturbance * 1e3:g} mm"
+    head = ["object", "trials on others", "moved", limit, "median", "farthest", "mostly by trials"]
+    rows = []
+    for name in names:
+        far = moved[name]
+        mask = far >= NOTICEABLE
+        by, times = Counter(columns["instance"][mask].tolist()).most_common(1)[0]
+        cells = [
+            int(np.isfinite(far).sum()),
+            found[name],
+            int((far > disturbance).sum()) or "·",
+            f"{np.median(far[mask]) * 1e3:.1f} mm",
+            f"{far[mask].max() * 1e3:.1f} mm",
+        ]
+        numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
+        cause = element("td", f"on {by} ({times})")
+        rows.append(element("tr", element("th", name, scope="row"), *numbers, cause))
+    return folded(
+        "What was disturbed",
+        f"Objects that trials on other objects moved by {NOTICEABLE * 1e3:g} mm or more, whatever"
+        " the outcome: in how many of the executed trials, and how far at most in each.",
+        table(head, rows, numbers=(1, 2, 3, 4, 5)),
+    )

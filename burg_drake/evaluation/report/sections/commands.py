@@ -1,0 +1,75 @@
+"""The command lines that make runs again."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from burg_drake.core.documents import load_document
+from burg_drake.evaluation.records import CampaignDocument, RunDocument, motion_in, motion_options
+from burg_drake.evaluation.store import GRASPS_FILE, STATION_FILE, Campaign, Run
+from burg_drake.station.document import StationDocument
+
+FEW = 12
+"""More scenes of one folder are written as all of its files, where they are."""
+
+
+def reproduce_command(run: Run) -> str:
+    """The command line that makes this run; for given grasps their file is among the run's."""
+    document = run.document
+    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
+    words += ["--mode", document.mode]
+    if document.grasps.per_object is None:
+        words += ["--grasps", str(run.path / GRASPS_FILE)]
+    else:
+        words += _sampling(document)
+    words += _settings(document, run.path / STATION_FILE)
+    words += ["--shard", document.shard] if document.shard else []
+    return shlex.join([*words, "-o", str(run.path)])
+
+
+def reproduce_campaign_command(campaign: Campaign) -> str:
+    """The command line that makes this run over many scenes; for given grasps, which it does not
+    keep in one file, the one that began it."""
+    document = campaign.document
+    if document.grasps.per_object is None:
+        return document.command
+    words = ["--station", document.station.path, "--mode", document.mode, *_sampling(document)]
+    begun = (place.folder / STATION_FILE for place in campaign.places)
+    words += _settings(document, next((path for path in begun if path.is_file()), None))
+    words += ["--shard", document.shard] if document.shard else []
+    scenes = _scenes([entry.path for entry in document.scenes])
+    return f"burg-drake evaluate {scenes} {shlex.join([*words, '-o', str(campaign.path)])}"
+
+
+def _scenes(paths: Sequence[str]) -> str:
+    """Scenes as a shell has them; those of one folder with a star if it holds no others."""
+    folders = {Path(path).parent for path in paths}
+    if len(paths) > FEW and len(folders) == 1:
+        (folder,) = folders
+        if sorted(map(str, folder.glob("*.yaml"))) == sorted(paths):
+            return f"{shlex.quote(str(folder))}/*.yaml"
+    return shlex.join(paths)
+
+
+def _sampling(document: RunDocument | CampaignDocument) -> list[str]:
+    grasps = document.grasps
+    words = ["--grasps-per-object", str(grasps.per_object)]
+    words += ["--approach-angle", str(grasps.approach_angle_deg)]
+    words += ["--blind"] if grasps.blind else []
+    return words + [word for name in grasps.only for word in ("--only", name)]
+
+
+def _settings(document: RunDocument | CampaignDocument, station: Path | None) -> list[str]:
+    """Motion, engine, seed and format of the table; `station` is a copy of the document."""
+    motion = motion_in(document.trial)
+    words: list[str] = []
+    if station is not None:
+        usual = load_document(station, StationDocument).motion
+        if document.mode == "hand":  # which does not begin before the grasp
+            motion = replace(motion, standoff=usual.standoff)
+        words += motion_options(motion, usual)
+    words += ["--engine", document.engine.name, "--seed", str(document.seed)]
+    return words if document.table == "csv" else [*words, "--table", document.table]

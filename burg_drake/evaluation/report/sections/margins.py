@@ -1,0 +1,131 @@
+"""Sections of the report about margins: by how much grasps succeeded, and failed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array
+from burg_drake.core.grasps import Stage
+from burg_drake.evaluation.records import Columns
+from burg_drake.evaluation.report.elements import (
+    LIFTED,
+    STYLES,
+    Html,
+    Limit,
+    Series,
+    element,
+    folded,
+    group_legend,
+    mirrored_histogram,
+    present,
+    section,
+)
+from burg_drake.visualization.style import GROUPS
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A column of numbers as people read it.
+
+    Attributes:
+        column: its name in the table.
+        title, unit: for the axis.
+        factor: from SI to the unit.
+    """
+
+    column: str
+    title: str
+    unit: str
+    factor: float
+
+
+CLEARANCE = Margin("clearance", "room around the open hand", "mm", 1e3)
+DISTURBED = Margin("others_moved", "movement of other objects", "mm", 1e3)
+CHOSEN = (
+    CLEARANCE,
+    Margin("slip", "slip in the hand", "mm", 1e3),
+    Margin("tilt", "tilt in the hand", "°", 180 / math.pi),
+    DISTURBED,
+)
+"""What tells most about a grasp: how exact it must be met, how firmly it holds, what it moves."""
+FURTHER = (
+    Margin("pad_force", "normal force of the weaker pad", "N", 1.0),
+    Margin("patch_area", "contact patch of the weaker pad", "mm²", 1e6),
+    Margin("arm_clearance", "room around the robot on its way", "mm", 1e3),
+    Margin("pushed", "push before the hand closed", "mm", 1e3),
+    Margin("tracking_distance", "error of the hand's way", "mm", 1e3),
+)
+
+
+def margin_section(
+    columns: Mapping[str, Array], groups: NDArray[np.int8], disturbance: float
+) -> Html | None:
+    """The chosen margins; nothing where nothing was executed.
+
+    Args:
+        columns: (N,) by name, of grasps that came to a trial.
+        groups: (N,) of each, see `outcome_groups`.
+        disturbance: displacement from which on a lifted grasp counts as disturbing [m].
+    """
+    limits = {DISTURBED: Limit(disturbance * 1e3, "limit")} if math.isfinite(disturbance) else {}
+    charts = _charts(CHOSEN, columns, groups, limits)
+    if not charts:
+        return None
+    return section(
+        "Margins",
+        "Of all executed grasps, with those that lifted their object above the axis and the others"
+        " below it, each half on its own scale. A dashed line is the median. Slip and tilt are of"
+        " those that both fingers held once, since the grip.",
+        element("div", *charts, class_="charts"),
+        group_legend(present(groups)),
+    )
+
+
+def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> Html | None:
+    """The others; likewise."""
+    charts = _charts(FURTHER, columns, groups, {})
+    if not charts:
+        return None
+    text = "As above. Forces and patches are those of the moment when the outcome was decided."
+    return folded("Further margins", text, element("div", *charts, class_="charts"))
+
+
+def tried_margins(
+    columns: Columns, groups: NDArray[np.int8]
+) -> tuple[dict[str, Array], NDArray[np.int8]]:
+    """What `margin_section` asks for, of a table of results and its groups (N,)."""
+    tried = columns["stage"] == Stage.EXECUTED.value
+    names = [margin.column for margin in (*CHOSEN, *FURTHER) if margin.column in columns]
+    return {name: columns[name][tried] for name in names}, groups[tried]
+
+
+def _charts(
+    margins: Sequence[Margin],
+    columns: Mapping[str, Array],
+    groups: NDArray[np.int8],
+    limits: dict[Margin, Limit],
+) -> list[Html]:
+    charts = []
+    for margin in margins:
+        values = columns.get(margin.column, np.empty(0)) * margin.factor
+        known = np.isfinite(values)
+        if known.any():
+            charts.append(_chart(margin, values[known], groups[known], limits.get(margin)))
+    return charts
+
+
+def _chart(
+    margin: Margin, values: np.ndarray, groups: NDArray[np.int8], limit: Limit | None
+) -> Html:
+    series = {
+        k: Series(values[groups == k], STYLES[GROUPS[k].name], GROUPS[k].name)
+        for k in {LIFTED, *present(groups)}
+    }
+    success = series.pop(LIFTED)
+    failures = [series[k] for k in sorted(series)]
+    return mirrored_histogram(success, failures, title=margin.title, unit=margin.unit, limit=limit)

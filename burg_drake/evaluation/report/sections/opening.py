@@ -1,0 +1,155 @@
+"""The first lines of a report: what came out, in two or three sentences and a few large figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core import clustered_interval
+from burg_drake.core.terminal import count, percent
+from burg_drake.evaluation.report.elements import Child, Html, element, tiles
+from burg_drake.evaluation.report.sections.outcomes import STOPPED
+from burg_drake.evaluation.results import OutcomeCounts, Summary
+
+ALIKE = (
+    "Intervals hold 95 % (Wilson's), and take grasps as independent draws; grasps on one object are"
+    " alike, so that for other objects the range is wider."
+)
+MANY = 8
+"""From so many scenes on, quartiles tell more than the worst and the best."""
+BY_SCENE = (
+    "Intervals hold 95 %, for other scenes of the same kind: they follow from how much scenes"
+    " differ (never narrower than Wilson's)."
+)
+"""What the intervals stand for, in a run and in one over many scenes."""
+
+
+def opening_section(summary: Summary) -> Html:
+    """Sentences with figures and intervals, and the same figures large."""
+    sentences = [
+        _success(summary),
+        _cascade(summary),
+        _spread(summary.scenes, "scene"),
+        _spread(summary.objects, "object"),
+    ]
+    first, *rest = [text.replace(" %", "\u00a0%") for text in sentences if text]
+    note = BY_SCENE if summary.scenes else ALIKE
+    return element(
+        "div",
+        element("p", element("b", first), *(f" {text}" for text in rest), class_="lead"),
+        tiles(_tiles(summary)),
+        element("p", note, class_="note") if summary.total.judged else None,
+    )
+
+
+def interval_text(summary: Summary, *, executed: bool) -> str:
+    """The 95 % interval of the share of grasps that were lifted, such as "79 to 93 %".
+
+    Args:
+        summary: of a run, of one scene or of many.
+        executed: of those that were executed, not of all.
+    """
+    groups = summary.scenes or (summary.total,)
+    whole = [group.executed if executed else group.judged for group in groups]
+    low, high = clustered_interval([group.lifted for group in groups], whole)
+    return f"{100 * low:.0f} to {100 * high:.0f} %"
+
+
+def grasps(number: int) -> str:
+    """So many grasps."""
+    return f"{count(number)} grasp{'' if number == 1 else 's'}"
+
+
+def _success(summary: Summary) -> str:
+    total = summary.total
+    if not total.judged:
+        return "No grasp is judged yet."
+    if not total.lifted:
+        return f"None of {grasps(total.judged)} lifted its object."
+    share = (
+        f"{percent(total.lifted / total.judged)}, interval {interval_text(summary, executed=False)}"
+    )
+    return f"{count(total.lifted)} of {grasps(total.judged)} lifted their object ({share})."
+
+
+def _cascade(summary: Summary) -> str:
+    total = summary.total
+    if not total.judged:
+        return ""
+    if not total.executed:
+        return f"Nothing was executed: {_losses(summary)}."
+    whole = "by the whole arm" if summary.mode == "arm" else "by the hand"
+    share = f"{percent(total.lifted / total.executed)}, interval"
+    share += f" {interval_text(summary, executed=True)}"
+    text = f"Of the {count(total.executed)} that were executed {whole} in simulation,"
+    text += f" {count(total.lifted)} succeeded ({share})."
+    if total.executed < total.judged:
+        text += f" The others ended before that: {_losses(summary)}."
+    return text
+
+
+def _losses(summary: Summary) -> str:
+    """What was lost before the trial, by stage."""
+    words = {
+        "clear": "the open hand collides",
+        "reachable": "hand or arm cannot be there",
+        "planned": "the arm has no way",
+        "executed": "the simulation failed",
+    }
+    counts = [
+        (sum(summary.total.outcomes[o] for o in STOPPED[step]), text)
+        for step, text in words.items()
+    ]
+    return ", ".join(f"{text} in {count(number)}" for number, text in counts if number)
+
+
+def _spread(groups: Sequence[OutcomeCounts], what: str) -> str:
+    """The best and the worst object or scene of those that were tried."""
+    tried = [group for group in groups if group.executed]
+    if len(tried) < 2:
+        return ""
+    shares = [group.lifted / group.executed for group in tried]
+    if min(shares) == max(shares):
+        where = "In" if what == "scene" else "On"
+        return f"{where} each {what} that was tried it is {percent(shares[0])}."
+    if what == "scene" and len(tried) >= MANY:
+        low, middle, high = np.quantile(shares, [0.25, 0.5, 0.75])
+        return (
+            f"In half of the scenes, success when executed is between {percent(low)} and"
+            f" {percent(high)} (median {percent(middle)})."
+        )
+    low, high = (tried[shares.index(pick(shares))] for pick in (min, max))
+    return (
+        f"By {what}, success when executed is between {percent(min(shares))} ({low.name}:"
+        f" {low.lifted} of {low.executed}) and {percent(max(shares))} ({high.name}: {high.lifted}"
+        f" of {high.executed})."
+    )
+
+
+def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
+    total = summary.total
+    screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a way"
+    disturbed = total.held - total.lifted
+    extra = f"; {count(disturbed)} more disturbed others" if disturbed else ""
+    scenes = f" in {count(len(summary.scenes))} scenes" if summary.scenes else ""
+    objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
+    return [
+        ("Grasps judged", count(total.judged), objects + scenes),
+        ("Executed", count(total.executed), screened),
+        ("Lifted", count(total.lifted), f"of {count(total.executed)} executed{extra}"),
+        (
+            "Success when executed",
+            percent(total.lifted / total.executed) if total.executed else "-",
+            f"{interval_text(summary, executed=True)} (95 % interval)"
+            if total.executed
+            else "nothing executed",
+        ),
+        (
+            "Success of all",
+            percent(total.lifted / total.judged) if total.judged else "-",
+            f"{interval_text(summary, executed=False)} (95 % interval)"
+            if total.judged
+            else "nothing judged",
+        ),
+    ]

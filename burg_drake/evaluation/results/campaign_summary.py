@@ -1,0 +1,115 @@
+"""A run over many scenes in numbers, from a few columns of its store."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import listing
+from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.evaluation.records import CPU_COLUMNS, PUSHED, motion_in
+from burg_drake.evaluation.results.shortened_lifts import short_lifts
+from burg_drake.evaluation.results.summary import (
+    STAGES,
+    OutcomeCounts,
+    StageCost,
+    Summary,
+    pushes,
+    stage_cost,
+)
+from burg_drake.evaluation.stages import LIFT_HEIGHT
+from burg_drake.evaluation.store import Campaign, StoredRows
+
+OUTCOMES = tuple(Outcome)
+ALL_STAGES = tuple(Stage)
+TOLD = 5
+"""Scenes of which it is told what is missing, and why."""
+
+
+def summarize_campaign(campaign: Campaign) -> Summary:
+    """Counts what a run over many scenes has found so far."""
+    document = campaign.document
+    stages = [stage for stage in Stage if stage in STAGES[document.mode]]
+    names = ["object", "outcome", "stage", LIFT_HEIGHT, *(CPU_COLUMNS[s] for s in stages)]
+    if document.mode == "arm":
+        names += ["pushed", "instance", *(PUSHED + name for name in document.instances)]
+    rows = campaign.rows(names)
+    object, objects = rows.codes("object")
+    by_object = dict(zip(objects, _counts(rows, object, len(objects)), strict=True))
+    by_scene = _counts(rows, rows.run, len(rows.counts))
+    none = np.zeros((len(OUTCOMES), len(ALL_STAGES)), dtype=np.int64)
+    costs = [stage_cost(rows.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
+    sampled = [s for s in campaign.states.values() if s.sampling > 0.0]
+    if sampled:
+        grasps, seconds = sum(s.grasps for s in sampled), sum(s.sampling for s in sampled)
+        costs.insert(0, StageCost("sampling", grasps, seconds, math.nan))
+    known = dict.fromkeys(o for entry in document.mine for o in entry.instances.values())
+    return Summary(
+        objects=tuple(_group(name, by_object.get(name, none)) for name in known),
+        total=_group("all", by_scene.sum(axis=0)),
+        costs=tuple(costs),
+        mode=document.mode,
+        pushes=pushes(rows.columns(rows.table.column_names)) if document.mode == "arm" else None,
+        lifts=short_lifts(rows.column(LIFT_HEIGHT), motion_in(document.trial).lift_height),
+        notes=_notes(campaign),
+        scenes=tuple(map(_group, campaign.names, by_scene)),
+    )
+
+
+def _counts(rows: StoredRows, keys: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """How many grasps there are by key, outcome and stage.
+
+    Args:
+        rows: the grasps.
+        keys: (N,) from 0 to `count`.
+        count: of the keys.
+    """
+    outcome = _member_codes(rows, "outcome", OUTCOMES)
+    stage = _member_codes(rows, "stage", ALL_STAGES)
+    shape = (count, len(OUTCOMES), len(ALL_STAGES))
+    flat = (keys * shape[1] + outcome) * shape[2] + stage
+    return np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
+
+
+def _member_codes(rows: StoredRows, name: str, members: Sequence[str]) -> NDArray[np.int64]:
+    codes, texts = rows.codes(name)
+    return np.array([list(members).index(text) for text in texts], dtype=np.int64)[codes]
+
+
+def _group(name: str, counts: NDArray[np.int64]) -> OutcomeCounts:
+    """Grasps of an object or a scene.
+
+    Args:
+        name: of it.
+        counts: (outcomes, stages) how many there are.
+    """
+    failed = counts[OUTCOMES.index(Outcome.SIMULATION_FAILED)]
+    return OutcomeCounts(
+        name,
+        int(counts.sum()),
+        _counter(OUTCOMES, counts.sum(axis=1)),
+        _counter(ALL_STAGES, counts.sum(axis=0)),
+        _counter(ALL_STAGES, failed),
+    )
+
+
+def _counter(members: Sequence[str], counts: NDArray[np.int64]) -> Counter:
+    found = zip(members, counts.tolist(), strict=True)
+    return Counter({member: n for member, n in found if n})
+
+
+def _notes(campaign: Campaign) -> tuple[str, ...]:
+    states, notes = campaign.states, []
+    if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
+        notes.append(f"no grasps to judge in {len(empty)} scenes: {listing(empty)}")
+    if failed := list(campaign.failed):
+        notes.append(f"{len(failed)} scenes could not be judged: {listing(failed)}")
+    short = [n for n in campaign.names if n in states and states[n].missing]
+    notes += [f"scene {name}: {states[name].missing}" for name in short[:TOLD]]
+    if len(short) > TOLD:
+        notes.append(f"{len(short) - TOLD} more scenes have fewer grasps than asked for")
+    return tuple(notes)

@@ -1,0 +1,99 @@
+"""What a run found, as tables for a terminal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from burg_drake.core.grasps import Outcome
+from burg_drake.core.terminal import TextTable, count, duration, figure, percent
+from burg_drake.evaluation.results.summary import OutcomeCounts, Summary
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+
+SHORT = {"candidates": "grasps", "reachable": "reach", "planned": "plan"}
+"""Names for a narrow terminal."""
+
+
+@dataclass(frozen=True)
+class SummaryView:
+    """The summary for a terminal of any width, as `rich` prints it."""
+
+    summary: Summary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.text import Text
+
+        matrix = _outcome_matrix(self.summary)
+        fits = matrix.width <= options.max_width
+        yield _stage_table(self.summary)
+        yield ""
+        if self.summary.notes:
+            yield Text("\n".join(f"note: {note}" for note in self.summary.notes) + "\n")
+        yield matrix if fits else _outcome_list(self.summary)
+        yield ""
+        for found in (self.summary.lifts, self.summary.pushes):
+            if found is not None:
+                yield f"{found}\n"
+        yield _cost_table(self.summary)
+        yield ""
+
+
+def summary_view(summary: Summary) -> RenderableType:
+    """Stages, outcomes and CPU time as tables; where objects are too many, outcomes as a list."""
+    return SummaryView(summary)
+
+
+def _stage_table(summary: Summary) -> TextTable:
+    names = summary.steps
+    table = TextTable("Grasps that pass each stage").names("object")
+    table.numbers(*(SHORT.get(name, name) for name in names), "success", "95 % CI")
+    for group in _rows(summary):
+        if group is summary.total and len(summary.objects) > 1:
+            table.gap()
+        low, high = group.interval
+        share, interval = "-", "-"
+        if group.executed:
+            share = percent(group.lifted / group.executed)
+            interval = f"{100 * low:.0f}-{100 * high:.0f} %"
+        table.row(group.name, *(count(group.funnel[name]) for name in names), share, interval)
+    table.caption = "held: to the end; lifted: held, and no other object disturbed\n"
+    if summary.mode != "hand":
+        table.caption += "reach, plan: the arm can be there; it can move there, in and up\n"
+    table.caption += "success: lifted of executed; CI: Wilson's interval"
+    return table
+
+
+def _outcome_matrix(summary: Summary) -> TextTable:
+    groups = _rows(summary)
+    table = TextTable("Outcomes").texts("outcome").numbers(*(group.name for group in groups))
+    for outcome in _seen(summary):
+        counts = [count(n) if (n := group.outcomes[outcome]) else "·" for group in groups]
+        table.row(outcome.value, *counts, bold=outcome is Outcome.LIFTED)
+    return table
+
+
+def _outcome_list(summary: Summary) -> TextTable:
+    table = TextTable("Outcomes").names("object").texts("outcomes")
+    for group in _rows(summary):
+        found = [f"{count(group.outcomes[o])} {o}" for o in _seen(summary) if group.outcomes[o]]
+        table.row(group.name, ", ".join(found))
+    return table
+
+
+def _seen(summary: Summary) -> list[Outcome]:
+    return [outcome for outcome in Outcome if summary.total.outcomes[outcome]]
+
+
+def _cost_table(summary: Summary) -> TextTable:
+    table = TextTable("CPU time").texts("stage")
+    table.numbers("grasps", "CPU time", "median", "grasps per CPU second")
+    for cost in summary.costs:
+        spent = (duration(cost.seconds), duration(cost.median), figure(cost.rate))
+        table.row(cost.name, count(cost.grasps), *spent)
+    return table
+
+
+def _rows(summary: Summary) -> list[OutcomeCounts]:
+    return [*summary.objects, summary.total] if len(summary.objects) != 1 else [*summary.objects]

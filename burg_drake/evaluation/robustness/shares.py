@@ -1,0 +1,76 @@
+"""Shares of perturbed repeats that were lifted, from tables of robustness: a predicted probability
+of success.
+
+Ids of grasps repeat between scenes, so that a share belongs to a run and an id.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import InvalidInputError, listing
+from burg_drake.evaluation.records import read_table
+
+TABLE_FILES = ("robustness.csv", "robustness.parquet")
+"""Tables of `burg-drake robustness` in the folder of a run."""
+
+
+def own_table(folder: Path) -> Path | None:
+    """The table of robustness in the folder of a run, if it is there."""
+    places = (folder / name for name in TABLE_FILES)
+    return next((place for place in places if place.is_file()), None)
+
+
+def lifted_shares(
+    path: Path, runs: Collection[str], ids: Collection[str] | None
+) -> dict[tuple[str, str], float]:
+    """Shares by the hash of the run and the id of the grasp.
+
+    Args:
+        path: the table.
+        runs: hashes of the runs that it may be of.
+        ids: of all grasps, if it is one run. A table that does not say of which run it is, as those
+            of earlier versions, is then taken for its own if it has no other grasp.
+
+    Raises:
+        InvalidInputError: the table cannot be read, has no such shares, or is of another run.
+    """
+    columns = read_table(path)
+    if "success" not in columns or "id" not in columns or columns["success"].dtype.kind != "f":
+        raise InvalidInputError(
+            f"{path} is no table of robustness: it has no columns id and success, as `burg-drake"
+            " robustness` writes them"
+        )
+    grasps, shares = columns["id"].tolist(), columns["success"].tolist()
+    if "run" in columns:
+        of = columns["run"].tolist()
+        if grasps and not set(of) & set(runs):
+            raise InvalidInputError(
+                f"{path} is of run {listing(sorted(set(of)))}, not of {listing(sorted(runs))};"
+                " give the table of the run whose verdicts are asked about"
+            )
+    else:
+        of = [_only_run(path, runs, ids, grasps)] * len(grasps)
+    rows = zip(of, grasps, shares, strict=True)
+    return {(run, id): share for run, id, share in rows if np.isfinite(share)}
+
+
+def _only_run(
+    path: Path, runs: Collection[str], ids: Collection[str] | None, grasps: Collection[str]
+) -> str:
+    """The run of a table that does not say it."""
+    if ids is None or len(runs) != 1:
+        raise InvalidInputError(
+            f"{path} has no column run, and ids of grasps repeat between scenes; make it again with"
+            " `burg-drake robustness`, or give one of its runs alone"
+        )
+    foreign = sorted(set(grasps) - set(ids))
+    if foreign:
+        raise InvalidInputError(
+            f"{path} is of another run than {listing(sorted(runs))}, which has no grasp"
+            f" {foreign[0]}"
+        )
+    return next(iter(runs))

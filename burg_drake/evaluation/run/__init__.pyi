@@ -1,0 +1,14 @@
+from .completeness import require_judged as require_judged
+from .many_scenes import evaluate_scenes as evaluate_scenes
+from .preparation import (
+    finish_run as finish_run,
+    open_grasps as open_grasps,
+    open_run as open_run,
+    require_sound as require_sound,
+)
+from .request import (
+    Given as Given,
+    Request as Request,
+    names as names,
+)
+from .scene_judging import is_finished as is_finished

@@ -1,0 +1,199 @@
+"""What a call of `evaluate` asks about a scene, the same of one scene or of each of many."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import content_hash
+from burg_drake.core.grasps import GraspSet
+from burg_drake.core.paths import PACKAGE_URI, portable_reference
+from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
+from burg_drake.evaluation.grasp_sets import by_names
+from burg_drake.evaluation.records import (
+    Grasps,
+    Library,
+    RunDocument,
+    Shard,
+    TableFormat,
+    input_of,
+    numbers,
+    software_versions,
+)
+from burg_drake.evaluation.stages import Mode, arm_settings
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Engine, GraspMotion, Station
+
+ByInstance = Mapping[str, GraspSet]
+Given = GraspSet | ByInstance | Callable[[Scene], ByInstance]
+"""Grasps that a user has: a set, sets by instance, or a function that has those of a scene."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Request:
+    """What is asked.
+
+    Attributes:
+        station, engine, mode, motion: who judges, and how.
+        seed, per_object, approach_angle_deg, blind: of the sampling.
+        only: names of objects or instances; all if empty.
+        grasps: given in place of sampled ones.
+        table: format of the results file.
+        shard: the share that is judged here; None is all.
+        retry_failed: whether grasps that could not be simulated are tried again.
+        scene_reports: whether each of many scenes gets a report of its own; None if they are few.
+    """
+
+    station: Station
+    engine: Engine
+    mode: Mode
+    motion: GraspMotion
+    seed: int
+    per_object: int
+    approach_angle_deg: float
+    blind: bool
+    only: tuple[str, ...] = ()
+    grasps: Given | None = None
+    table: TableFormat = "csv"
+    shard: Shard | None = None
+    retry_failed: bool = False
+    scene_reports: bool | None = None
+
+    def given(self, scene: Scene) -> ByInstance | None:
+        """The user's grasps on the instances of a scene; None where they are sampled.
+
+        Raises:
+            BurgError: they do not fit the scene.
+        """
+        if self.grasps is None:
+            return None
+        found = self.grasps(scene) if callable(self.grasps) else self.grasps
+        found = by_names(scene, found) if isinstance(found, GraspSet) else found
+        return on_chosen(scene, found, self.only)
+
+    def of_scene(self, scene: Scene) -> Request | None:
+        """What is asked about one scene of many: `only` and grasps may be for others alone.
+
+        Returns:
+            The same without what is not for this scene; None if that leaves no grasps.
+
+        Raises:
+            BurgError: the grasps do not fit the scene.
+        """
+        known = {n for name, i in scene.instances.items() for n in (name, i.object)}
+        only = tuple(name for name in self.only if name in known)
+        if self.only and not only:
+            return None
+        if self.grasps is None:
+            return replace(self, only=only) if scene.instances else None
+        grasps: Given = self.grasps
+        if isinstance(grasps, GraspSet):
+            by = grasps.columns.get(INSTANCE, grasps.object)
+            among = list(scene.instances) if INSTANCE in grasps.columns else sorted({*known, ""})
+            grasps = grasps.select(np.isin(by, among))
+        elif isinstance(grasps, Mapping):
+            grasps = {name: grasps[name] for name in grasps if name in scene.instances}
+        else:
+            grasps = grasps(scene)
+        if not isinstance(grasps, GraspSet):
+            grasps = {name: part for name, part in grasps.items() if len(part)}
+        if not len(grasps):
+            return None
+        chosen = set(chosen_instances(scene, only))
+        found = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+        found = {name: part for name, part in found.items() if name in chosen}
+        return replace(self, only=only, grasps=found) if found else None
+
+    def asked(self, scene: Scene) -> Grasps:
+        """What is asked of the grasps; what comes of it is filled in when it is known.
+
+        Raises:
+            UnknownNameError: `only` has a name that is not in the scene.
+        """
+        asked = self.asked_of_all()
+        if self.grasps is not None:
+            return asked
+        chosen = chosen_instances(scene, self.only)
+        return replace(asked, only=() if chosen == tuple(scene.instances) else chosen)
+
+    def asked_of_all(self) -> Grasps:
+        """The same, whatever the scene."""
+        if self.grasps is not None:
+            return Grasps(origin="given", count=0, objects={}, content="")
+        return Grasps(
+            origin="sampled",
+            per_object=self.per_object,
+            approach_angle_deg=self.approach_angle_deg,
+            blind=self.blind,
+            only=self.only,
+            count=0,
+            objects={},
+            content="",
+        )
+
+    def document(self, folder: Path, scene: Scene) -> RunDocument:
+        """The document of a run; what comes of the grasps is filled in later."""
+        instances = [*scene.instances.values(), *scene.background.values()]
+        library = portable_reference(scene.library.root, folder)
+        return RunDocument(
+            command=command(),
+            scene=input_of(scene, "scenes"),
+            station=input_of(self.station, "stations"),
+            library=Library(
+                name=scene.library.name,
+                path=library
+                if library.startswith(PACKAGE_URI)
+                else str(scene.library.root.resolve()),
+                objects={i.object: scene.library.entry(i.object).build for i in instances},
+            ),
+            grasps=self.asked(scene),
+            engine=self.engine,
+            trial=self.trial,
+            mode=self.mode,
+            arm=self.arm,
+            seed=self.seed,
+            shard="" if self.shard is None else str(self.shard),
+            table=self.table,
+            versions=software_versions(),
+        )
+
+    @property
+    def trial(self) -> dict[str, float]:
+        """Settings of the trial's phases, by name."""
+        from burg_drake.simulation.trials import TrialSettings
+
+        return numbers(TrialSettings(motion=self.motion))
+
+    @property
+    def arm(self) -> dict[str, float]:
+        """Settings of the search for the arm's motions, by name; none where it is not asked."""
+        return {} if self.mode == "hand" else numbers(arm_settings(self.motion))
+
+
+def command() -> str:
+    """The command that is running, as one can type it again."""
+    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
+    return shlex.join([program, *sys.argv[1:]])
+
+
+def names(only: Iterable[str] | None) -> tuple[str, ...]:
+    """Names by which objects are chosen; a text alone is one name."""
+    return (only,) if isinstance(only, str) else tuple(only or ())
+
+
+def given_content(grasps: Given | None) -> str:
+    """Hash of the grasps that are given for many scenes; empty of those that a function has, which
+    each scene's run has a hash of."""
+    if grasps is None or callable(grasps):
+        return ""
+    sets = {"": grasps} if isinstance(grasps, GraspSet) else grasps
+    parts = {
+        name: [part.X_OG, part.width, part.object, part.columns.get(INSTANCE)]
+        for name, part in sets.items()
+    }
+    return content_hash(parts)

@@ -1,0 +1,41 @@
+from .counts import (
+    GraspCount as GraspCount,
+    grasp_counts as grasp_counts,
+)
+from .judge import (
+    ARM_MARGINS as ARM_MARGINS,
+    ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
+    LIFT_HEIGHT as LIFT_HEIGHT,
+    MARGINS as MARGINS,
+    Decide as Decide,
+    Decision as Decision,
+    Judge as Judge,
+    Screen as Screen,
+    ScreenAnswers as ScreenAnswers,
+    Verdict as Verdict,
+    judge_grasp as judge_grasp,
+    one_line as one_line,
+    screen_grasps as screen_grasps,
+    trial_decision as trial_decision,
+    trial_verdict as trial_verdict,
+)
+from .mode import (
+    MODES as MODES,
+    Mode as Mode,
+    mode_for as mode_for,
+)
+from .scene_acceptance import (
+    clear_grasp_counts as clear_grasp_counts,
+    within_reach as within_reach,
+)
+from .screening import (
+    arm_reach as arm_reach,
+    arm_screen as arm_screen,
+    arm_settings as arm_settings,
+    hand_alone as hand_alone,
+    hand_screen as hand_screen,
+)
+from .station_judge import (
+    StationJudge as StationJudge,
+    StationJudgeFactory as StationJudgeFactory,
+)

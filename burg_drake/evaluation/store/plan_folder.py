@@ -1,0 +1,174 @@
+"""The folder of the plans that `reach` makes, and how a later call goes on with it.
+
+plans.yaml                   what was asked: documents, grasps, settings, versions
+journal.jsonl                one line a judged grasp, as it came; times of computation are in it
+INSTANCE-GRASP.json or .csv  the timed motion of each grasp that the arm can execute
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from burg_drake.core import InvalidInputError, content_hash
+from burg_drake.core.documents import load_document, save_document
+from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Outcome
+from burg_drake.evaluation.candidates import Candidates
+from burg_drake.evaluation.records import (
+    HASH_DIGITS,
+    JOURNAL_FILE,
+    Input,
+    Journal,
+    differences,
+    motion_in,
+    motion_text,
+    read_journal,
+    software_versions,
+    without_motion,
+)
+from burg_drake.evaluation.stages import Verdict
+
+PlanFormat = Literal["json", "csv"]
+DOCUMENT_FILE = "plans.yaml"
+HEADER = "Record of the plans in this folder; written by the program."
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlansDocument:
+    """Schema of plans.yaml.
+
+    Attributes:
+        scene, station: what the plans are for.
+        grasps: how many were asked about.
+        content: hash of these.
+        arm: settings of the search for motions.
+        exact: whether Drake's checker has seen each motion.
+        format: of the plans.
+        versions: of the software and the machine.
+    """
+
+    version: int = 1
+    scene: Input
+    station: Input
+    grasps: int
+    content: str
+    arm: dict[str, float]
+    exact: bool
+    format: PlanFormat
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class PlanFolder:
+    """A folder for plans.
+
+    Attributes:
+        path: its path.
+        document: what is asked.
+    """
+
+    path: Path
+    document: PlansDocument
+
+    def plan(self, id: str) -> Path:
+        """The file for the plan of a grasp."""
+        return self.path / f"{id}.{self.document.format}"
+
+    @contextmanager
+    def opened(self) -> Iterator[Journal]:
+        """Makes the folder, or goes on with it; one call at a time can.
+
+        Raises:
+            InvalidInputError: it cannot be written, holds something else, or plans of something
+                else; or another process is at it.
+        """
+        self._require_plans()
+        writable_folder(self.path)
+        with Journal(self.path / JOURNAL_FILE) as journal:
+            document = self.path / DOCUMENT_FILE
+            if document.exists():
+                self._require_same(load_document(document, PlansDocument))
+            else:
+                save_document(self.document, document, HEADER)
+            remove_unfinished(self.path)
+            yield journal
+
+    def verdicts(self) -> dict[str, Verdict]:
+        """What the journal holds, by grasp id."""
+        return read_journal(self.path / JOURNAL_FILE)
+
+    def finished(self, *, retry_failed: bool = False) -> dict[str, Verdict]:
+        """Verdicts that stand: the plan of what is reachable is there.
+
+        Args:
+            retry_failed: see `Verdict.is_open`.
+        """
+        return {
+            id: verdict
+            for id, verdict in self.verdicts().items()
+            if not verdict.is_open(retry_failed=retry_failed)
+            and (verdict.outcome is not Outcome.REACHABLE or self.plan(id).is_file())
+        }
+
+    def _require_plans(self) -> None:
+        """Refuses a folder with anything but plans: they are not to be mixed up with others."""
+        if not self.path.is_dir() or (self.path / DOCUMENT_FILE).exists():
+            return
+        held = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
+        journal = self.path / JOURNAL_FILE
+        begun = held == [JOURNAL_FILE] and journal.is_file() and journal.stat().st_size == 0
+        if held and not begun:
+            raise InvalidInputError(
+                f"folder {self.path} is not empty, it has {held[0]}, and no {DOCUMENT_FILE}; plans"
+                " go to a folder of their own: choose another one, or empty it"
+            )
+
+    def _require_same(self, there: PlansDocument) -> None:
+        found = differences(_identity(there), _identity(self.document))
+        if found:
+            raise InvalidInputError(
+                f"folder {self.path} has plans of something else ({'; '.join(found)}); choose"
+                " another one, or delete it"
+            )
+
+
+def plans_document(
+    scene: Input,
+    station: Input,
+    candidates: Candidates,
+    arm: dict[str, float],
+    *,
+    exact: bool,
+    format: PlanFormat,
+) -> PlansDocument:
+    """What a call asks for, with the versions that are installed."""
+    return PlansDocument(
+        scene=scene,
+        station=station,
+        grasps=len(candidates),
+        content=candidates.content,
+        arm=arm,
+        exact=exact,
+        format=format,
+        versions=software_versions(),
+    )
+
+
+def _identity(document: PlansDocument) -> dict[str, str]:
+    """What two calls must have in common to work on the same plans, in words, by topic."""
+    arm = without_motion({k: v for k, v in document.arm.items() if k != "exact"})
+    return {
+        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
+        "station": f"content {document.station.content[:HASH_DIGITS]}",
+        "grasps": f"{document.grasps}, content {document.content[:HASH_DIGITS]}",
+        "check": "exact" if document.exact else "screening",
+        "settings of the arm": content_hash(arm)[:HASH_DIGITS],
+        "motion": motion_text(motion_in(document.arm)),
+        "format": document.format,
+        "burg_drake": document.versions.get("burg_drake", ""),
+        "drake": document.versions.get("drake", ""),
+    }

@@ -1,0 +1,50 @@
+"""Judges the grasps of one job in worker processes of this machine; see `pool`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+
+from burg_drake.core import InvalidInputError
+from burg_drake.core.workers import default_workers
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.stages import Judge, Verdict
+from burg_drake.evaluation.workers.job import Job
+from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.evaluation.workers.pool import Pool
+
+
+def judge_all(
+    candidates: Sequence[Candidate],
+    make_judge: Callable[[], Judge],
+    *,
+    workers: int | None = None,
+    limits: WorkerLimits | None = None,
+) -> Generator[tuple[Candidate, Verdict], None, None]:
+    """Judges grasps in parallel.
+
+    Args:
+        candidates: the grasps.
+        make_judge: builds the judge, called once in each worker; pickled by reference, hence an
+            instance of an importable class or an importable function.
+        workers: number of processes; as many as there are processors if None.
+        limits: what they may take; the usual ones if None.
+
+    Yields:
+        Each candidate with its verdict, in the order of completion. Closing the iterator ends the
+        workers.
+
+    Raises:
+        InvalidInputError: workers is below 1.
+        BurgError: the judge cannot be built.
+        SimulationError: workers die while the judge is built, or at `WorkerLimits.hopeless` grasps
+            in a row.
+    """
+    count = default_workers() if workers is None else workers
+    if count < 1:
+        raise InvalidInputError(f"workers is {count}; give 1 or more")
+    pool = Pool(count, limits or WorkerLimits())
+    with closing(pool.run([Job("", make_judge, candidates)])) as answers:
+        for _, candidate, verdict in answers:
+            yield candidate, verdict
+    pool.dismiss()

@@ -1,0 +1,10 @@
+from .comparison import (
+    Comparison as Comparison,
+    compare as compare,
+)
+from .record import (
+    comparison_json as comparison_json,
+    plain as plain,
+)
+from .tables import comparison_tables as comparison_tables
+from .wording import interval as interval

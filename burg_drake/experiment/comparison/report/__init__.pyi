@@ -1,0 +1,1 @@
+from .page import comparison_page as comparison_page

@@ -1,0 +1,223 @@
+"""Judges real trials again in scenes whose objects stand where they were measured before.
+
+The robot goes where the grasp was planned, and the object is elsewhere: that is what a planned
+verdict leaves out. What disagrees with reality as planned, and agrees as measured, came from the
+placement; what is left is physics. Answers are appended to a journal as they come, under names that
+follow from all that decides about them, so that the same call goes on where one stopped, and asks
+again what was changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from burg_drake.core import content_hash
+from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.records import (
+    JOURNAL_FILE,
+    Journal,
+    origin_of,
+    read_journal,
+    software_versions,
+)
+from burg_drake.evaluation.stages import Verdict, one_line
+from burg_drake.evaluation.store import Run
+from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecutor
+from burg_drake.experiment.gap.displacement import commanded
+from burg_drake.experiment.gap.measured_places import measured_scene
+from burg_drake.experiment.gap.rejudged_files import write_rejudging
+from burg_drake.experiment.gap.rejudged_trials import Rejudged, Rejudging, why_skipped
+from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
+from burg_drake.experiment.trials import (
+    RealTrial,
+    Success,
+    TrialSheet,
+    grasp_contents,
+    load_sources,
+)
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+
+if TYPE_CHECKING:
+    from burg_drake.station.checks import SceneCheck
+
+ID_DIGITS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """A trial that is to be judged again; without a judge where its scene cannot be."""
+
+    trial: Rejudged
+    factory: SceneJudgeFactory | None
+
+
+def rejudge(
+    sheet: TrialSheet,
+    path: str | Path,
+    out: str | Path,
+    *,
+    runs: Mapping[str, Run] | None = None,
+    success: Success | None = None,
+    executor: Executor | None = None,
+    retry_failed: bool = False,
+    progress: bool | Listener = True,
+) -> Rejudging:
+    """Judges every real trial with a measured placement again.
+
+    Each is judged as its run was: mode, engine, motion and settings. The hand goes to the place in
+    the world to which the robot was sent. Objects that were not measured stay where they were
+    planned. A scene that cannot be makes a trial that is not judged, with the reason.
+
+    Args:
+        sheet: the trials.
+        path: their file, from whose folder the sheet's paths start.
+        out: folder for the answers; made if need be.
+        runs: by the sheet's keys, in place of its own; trials of keys that are missing, or whose
+            grasp is not in the run, or another one there, are skipped.
+        success: what counts; as the sheet says if None.
+        executor: who judges; as many processes as there are processors if None.
+        retry_failed: ask again what an earlier call could not simulate.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Raises:
+        InvalidInputError: a run is gone, or is another one; its library or station has changed; or
+            the folder cannot be written.
+    """
+    runs = load_sources(sheet, path) if runs is None else runs
+    executor = LocalExecutor.of_this_machine() if executor is None else executor
+    skipped = _skipped(sheet, runs)
+    asked = _questions([t for t in sheet.trials if t.number not in skipped], runs)
+    folder = writable_folder(out)
+    with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
+        remove_unfinished(folder)
+        known = {
+            id: verdict
+            for id, verdict in read_journal(folder / JOURNAL_FILE).items()
+            if not verdict.is_open(retry_failed=retry_failed)
+        }
+        failed: dict[str, str] = {}
+        for id, verdict in _judge(asked, known, executor, reporter, failed):
+            journal.append(id, verdict)
+            known[id] = verdict
+    trials = tuple(_answered(one.trial, known, failed) for one in asked)
+    found = Rejudging(
+        path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
+    )
+    write_rejudging(found)
+    return found
+
+
+def _skipped(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
+    """Why trials cannot be judged again, by number."""
+    tried = [trial.grasp for trial in sheet.trials]
+    contents = {key: grasp_contents(run, tried) for key, run in runs.items()}
+    found = {}
+    for trial in sheet.trials:
+        content = contents.get(trial.run, {}).get(trial.grasp)
+        if why := why_skipped(trial, runs.get(trial.run), content):
+            found[trial.number] = why
+    return found
+
+
+def _questions(trials: Sequence[RealTrial], runs: Mapping[str, Run]) -> list[_Question]:
+    from burg_drake.station.checks import SceneCheck
+
+    places: dict[str, tuple[Scene, Station, SceneCheck]] = {}
+    asked = []
+    for trial in trials:
+        run = runs[trial.run]
+        if trial.run not in places:
+            scene, station = run.scene(), run.station()
+            places[trial.run] = scene, station, SceneCheck(station, scene.library)
+        asked.append(_question(trial, run, *places[trial.run]))
+    return asked
+
+
+def _question(
+    real: RealTrial, run: Run, planned: Scene, station: Station, check: SceneCheck
+) -> _Question:
+    assert real.outcome is not None
+    grasp, verdict = run.candidate(real.grasp), run.verdicts.get(real.grasp)
+    origin = origin_of(run.document)
+    measured = measured_scene(planned, real.placement, check.issues)
+    trial = Rejudged(
+        number=real.number,
+        run=real.run,
+        grasp=real.grasp,
+        instance=grasp.instance,
+        object=planned.instance(grasp.instance).object,
+        real=real.outcome,
+        planned=real.simulated if verdict is None else verdict.outcome,
+        origin=origin,
+        scene=measured.scene,
+        notes=measured.notes,
+        reason=measured.reason,
+    )
+    if measured.scene is None:
+        return _Question(trial, None)
+    settings = origin.settings(f"{run.path}: trial")
+    factory = SceneJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
+    X_OG = commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
+    versions = software_versions()
+    key = content_hash(
+        *(real.number, factory.content, grasp.instance, X_OG, grasp.width),
+        *(versions["burg_drake"], versions["drake"]),
+    )
+    id = f"{real.number}:{key[:ID_DIGITS]}"
+    candidate = Candidate(id, grasp.instance, X_OG, width=grasp.width)
+    return _Question(replace(trial, candidate=candidate), factory)
+
+
+def _answered(trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str, str]) -> Rejudged:
+    if trial.candidate is None:
+        return trial
+    id = trial.candidate.id
+    return replace(trial, verdict=known.get(id), reason=failed.get(id, ""))
+
+
+def _judge(
+    asked: Sequence[_Question],
+    known: Mapping[str, Verdict],
+    executor: Executor,
+    reporter: Reporter,
+    failed: dict[str, str],
+) -> Iterator[tuple[str, Verdict]]:
+    """Asks what is not known yet, trials of one scene together.
+
+    Args:
+        asked, known, executor, reporter: what is asked, and what need not be.
+        failed: gets the reason, by id, for trials of scenes that cannot be built.
+
+    Yields:
+        Ids and verdicts.
+    """
+    jobs: dict[str, Job] = {}
+    total = 0
+    for one in asked:
+        if one.factory is None or one.trial.candidate is None:
+            continue
+        total += 1
+        if one.trial.candidate.id not in known:
+            key = one.factory.content
+            held = jobs[key].candidates if key in jobs else ()
+            jobs[key] = Job(key, one.factory.plain, (*held, one.trial.candidate))
+    if not jobs:
+        return
+    todo = sum(len(job.candidates) for job in jobs.values())
+    begin = Progress(STARTING, total - todo, total, unit="trials")
+    pace = Pace(reporter.show, begin, "judging again")
+
+    def note(lost: JobFailed) -> None:
+        failed.update({c.id: one_line(lost.error) for c in lost.job.candidates})
+
+    with closing(executor.judge(jobs.values(), note)) as judged:
+        for _, candidate, verdict in judged:
+            pace.step(outcome=verdict.outcome)
+            yield candidate.id, verdict

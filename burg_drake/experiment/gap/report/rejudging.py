@@ -1,0 +1,172 @@
+"""What judging again says, as a section of a page and as a table for terminals."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+
+from burg_drake.core.grasps import Stage
+from burg_drake.core.terminal import TextTable, percent
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    command,
+    element,
+    interval_mark,
+    join,
+    section,
+    table,
+)
+from burg_drake.experiment.gap.rejudged_files import TABLE_FILE
+from burg_drake.experiment.gap.rejudged_trials import CAUSES, Cause, Rejudged, Rejudging
+
+HEADS: dict[Cause, str] = {
+    "placement": "Explained by placement",
+    "worsened": "Worsened",
+    "physics": "Left to physics",
+}
+ROWS = 40
+
+
+def rejudged_words(found: Rejudging) -> list[str]:
+    """What came of it, in sentences."""
+    whole = len(found.judged)
+    if not whole:
+        return ["None of the trials could be judged again.", *_skipped(found)]
+    of, p = found.causes, found.paired.p_value
+    planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
+    count, wrong, low, high = found.explained
+    told = [
+        f"Of {whole} trials {planned} agree with the robot as planned"
+        f" ({percent(planned / whole)}), and {measured} with the objects where they stood"
+        f" ({percent(measured / whole)}); McNemar's exact test: p = {p:.2g}."
+    ]
+    if wrong:
+        told.append(
+            f"Of the {wrong} that disagree as planned, placement explains {count}"
+            f" ({percent(count / wrong)}, 95 % interval {100 * low:.0f} to {100 * high:.0f} %), and"
+            f" {of['physics']} are left to physics."
+        )
+    if of["worsened"]:
+        told.append(f"Worsened: {of['worsened']} that agreed as planned.")
+    within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
+    if within:
+        told.append(
+            f"In {within} the open hand would be within a displaced object, which counts as a"
+            " collision, though a robot may push it aside."
+        )
+    not_judged = [trial for trial in found.trials if trial not in found.judged]
+    if not_judged:
+        told.append(f"{len(not_judged)} could not be judged again.")
+    return [*told, *_skipped(found)]
+
+
+def _skipped(found: Rejudging) -> list[str]:
+    counts = Counter(found.skipped.values())
+    parts = [f"{count} {why}" for why, count in counts.items()]
+    return [f"Left out: {', '.join(parts)}."] if parts else []
+
+
+def rejudged_view(found: Rejudging) -> TextTable:
+    """Counts of what the verdicts say, for a terminal."""
+    whole = len(found.judged)
+    table = TextTable("Judged again where objects stood", caption=" ".join(rejudged_words(found)))
+    table.texts("verdict as planned, as measured").numbers("trials", "share %")
+    for cause, text in CAUSES.items():
+        count = found.causes[cause]
+        table.row(text, str(count), percent(count / whole) if whole else "-")
+    return table
+
+
+def rejudged_section(found: Rejudging) -> Html:
+    """Counts, the table of both verdicts and reality, and the trials that changed."""
+    return section(
+        "Judged again where objects stood",
+        " ".join(rejudged_words(found)),
+        *_spread(_counts(found), _cube(found), _listing(found)),
+        element("p", f"Rows of {TABLE_FILE} can be replayed in the scene as measured:"),
+        command(replay_line(found, 1)),
+    )
+
+
+def _spread(*parts: Html | None) -> list[Html]:
+    """Tables with some room between them."""
+    return [element("div", part, style="margin-top:20px") for part in parts if part is not None]
+
+
+def _counts(found: Rejudging) -> Html:
+    whole = len(found.judged)
+    rows = []
+    for name, measured in (("as planned", False), ("as measured", True)):
+        count, low, high = found.agreement(measured=measured)
+        share: Child = "-"
+        if whole:
+            share = join(interval_mark(count / whole, low, high), f" {percent(count / whole)}")
+        rows.append(
+            element(
+                "tr",
+                element("th", name, scope="row"),
+                element("td", f"{count} of {whole}", class_="number"),
+                element("td", share, class_="estimate"),
+            )
+        )
+    return table(["verdict", "right", "share with 95 % interval"], rows, numbers=(1,))
+
+
+def _cube(found: Rejudging) -> Html:
+    """Both verdicts and reality."""
+    rows = []
+    for planned in (True, False):
+        for measured in (True, False):
+            counts = [found.table[planned, measured, real] for real in (True, False)]
+            cells = [element("td", count, class_="number") for count in counts]
+            texts = [element("td", _word(value)) for value in (planned, measured)]
+            rows.append(element("tr", *texts, *cells))
+    head = ["as planned", "as measured", "robot: success", "robot: failure"]
+    return table(head, rows, numbers=(2, 3))
+
+
+def _word(success: bool) -> str:
+    return "success" if success else "failure"
+
+
+def _listing(found: Rejudging) -> Html | None:
+    """Trials by what they say, those that changed first, and those that were not judged."""
+    rows: list[Html] = []
+    for cause, head in HEADS.items():
+        chosen = [t for t in found.trials if t.cause(found.success) == cause]
+        rows += _rows(chosen, head)
+    rows += _rows([t for t in found.trials if t.cause(found.success) is None], "Not judged")
+    if not rows:
+        return None
+    names = ["", "trial", "object", "planned", "as measured", "robot", "notes"]
+    return table(names, rows, numbers=(1,))
+
+
+def _rows(trials: Sequence[Rejudged], head: str) -> list[Html]:
+    rows = []
+    for k, trial in enumerate(trials[:ROWS]):
+        more = f" (first {ROWS} of {len(trials)})" if len(trials) > ROWS else ""
+        measured = trial.outcome.value if trial.outcome else trial.why_not
+        notes = "; ".join(trial.notes)
+        cells: list[Child] = [trial.object, trial.planned.value, measured, trial.real.value, notes]
+        rows.append(
+            element(
+                "tr",
+                element("th", f"{head}{more}" if k == 0 else "", scope="row"),
+                element("td", trial.number, class_="number"),
+                *(element("td", _spaced(cell)) for cell in cells),
+            )
+        )
+    return rows
+
+
+def _spaced(cell: Child) -> str:
+    return str(cell).replace("_", " ")
+
+
+def replay_line(found: Rejudging, row: int) -> str:
+    """The command that shows a row of the table, the first one is 1."""
+    table_file = str(found.path / TABLE_FILE)
+    return shlex.join(["burg-drake", "replay", table_file, "--row", str(row)])

@@ -1,0 +1,85 @@
+"""What each step does to the agreement with real trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Outcome
+from burg_drake.evaluation.store import Run
+from burg_drake.experiment.gap.steps import GapSteps, StepName
+from burg_drake.experiment.statistics import Agreement, agreement, matrix_of
+from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
+
+
+@dataclass(frozen=True)
+class StepAgreement:
+    """Real trials beside the verdicts of a step.
+
+    Attributes:
+        step: its name.
+        found: confusion matrix and figures.
+    """
+
+    step: StepName
+    found: Agreement
+
+
+def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTrial]:
+    """The trials of a sheet about grasps of a run, carried out or not.
+
+    Args:
+        sheet: contents of the trials file.
+        path: the trials file, for messages.
+        run: theirs, or another one of the same scene; grasps are the same by id and content.
+
+    Raises:
+        InvalidInputError: it is theirs, and a grasp is not the one that was planned with.
+    """
+    scene, found = run.document.scene.content, []
+    contents = grasp_contents(run, (trial.grasp for trial in sheet.trials))
+    for trial in sheet.trials:
+        source, content = sheet.runs[trial.run], contents.get(trial.grasp)
+        if source.scene.content == scene and content == trial.content:
+            found.append(trial)
+        elif source.hash == run.document.hash:
+            has = "is gone" if content is None else f"has content {content}"
+            raise InvalidInputError(
+                f"{path}: trial {trial.number}: grasp {trial.grasp} of {run.path} {has}; it had"
+                f" {trial.content} when the trials were planned"
+            )
+    return found
+
+
+def agreement_by_step(
+    ladder: GapSteps, trials: Sequence[RealTrial], success: Success
+) -> tuple[StepAgreement, ...]:
+    """Compares each step with the trials that tell anything of its grasp.
+
+    A grasp in displaced scenes is predicted to succeed if it does in more than half of them.
+
+    Args:
+        ladder: all steps.
+        trials: see `tried_grasps`. Each counts once, whatever it was chosen from.
+        success: what counts.
+    """
+    real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
+    found = []
+    for step in ladder.steps:
+        runs = [*step.runs, *ladder.tried] if step.name == "placed" else list(step.runs)
+        predicted, actual = [], []
+        for trial in real:
+            assert trial.outcome is not None
+            verdicts = [run.verdicts[trial.grasp] for run in runs if trial.grasp in run.verdicts]
+            judged = [v.outcome for v in verdicts if v.outcome is not Outcome.SIMULATION_FAILED]
+            if judged:
+                good = sum(succeeded(outcome, success) for outcome in judged)
+                predicted.append(good > len(judged) / 2)
+                actual.append(succeeded(trial.outcome, success))
+        cells = matrix_of(np.array(predicted, dtype=bool), np.array(actual, dtype=bool))
+        found.append(StepAgreement(step.name, agreement(cells)))
+    return tuple(found)

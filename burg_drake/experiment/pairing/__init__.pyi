@@ -1,0 +1,23 @@
+from .matching import (
+    Match as Match,
+    match_rows as match_rows,
+)
+from .pairs import (
+    NAMES as NAMES,
+    REFERENCE_NAMES as REFERENCE_NAMES,
+    VerdictPairs as VerdictPairs,
+    make_pairs as make_pairs,
+    successes as successes,
+    undecided as undecided,
+)
+from .probability import predicted_probability as predicted_probability
+from .result_table import ResultTable as ResultTable
+from .side import (
+    JudgedRuns as JudgedRuns,
+    Side as Side,
+    require_common_scene as require_common_scene,
+    settings_apart as settings_apart,
+    side_of_trials as side_of_trials,
+)
+from .text_codes import Factor as Factor
+from .tried import find_tried as find_tried

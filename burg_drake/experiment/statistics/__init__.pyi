@@ -1,0 +1,31 @@
+from .arrays import (
+    Flags as Flags,
+    Rows as Rows,
+    Values as Values,
+)
+from .confusion import (
+    Agreement as Agreement,
+    agreement as agreement,
+    agreements as agreements,
+    grouped as grouped,
+    matrix_of as matrix_of,
+)
+from .estimates import (
+    CELLS as CELLS,
+    MEASURES as MEASURES,
+    Estimate as Estimate,
+    share as share,
+)
+from .margin_calibration import (
+    MARGINS as MARGINS,
+    PROBABILITY as PROBABILITY,
+    Bin as Bin,
+    MarginCalibration as MarginCalibration,
+    calibration as calibration,
+    calibrations as calibrations,
+)
+from .mcnemar import (
+    Paired as Paired,
+    paired as paired,
+    paired_counts as paired_counts,
+)

@@ -1,0 +1,58 @@
+"""Writers of a trials file, and of what lies beside it, take turns by a lock on a file."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError
+
+WAIT = 30.0
+"""Time to wait for other writers, each of which takes some hundredths of a second [s]."""
+TURN = 0.01
+"""Time between two attempts to get the lock [s]."""
+
+
+@contextlib.contextmanager
+def exclusive(sheet_path: Path) -> Iterator[None]:
+    """One writer at a time; the end of its process, however it comes, releases the lock.
+
+    Args:
+        sheet_path: the trials file.
+
+    Raises:
+        InvalidInputError: the lock cannot be made, or another process keeps it.
+    """
+    path = sheet_path.with_name(f".{sheet_path.name}.lock")
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+    try:
+        _wait_for(file, sheet_path)
+        yield
+    finally:
+        os.close(file)
+
+
+def _wait_for(file: int, sheet_path: Path) -> None:
+    until = time.monotonic() + WAIT
+    while True:
+        try:
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            if time.monotonic() > until:
+                raise InvalidInputError(
+                    f"{sheet_path} has been locked by another process for {WAIT:g} s; nothing"
+                    " was recorded"
+                ) from error
+            time.sleep(TURN)
+        except OSError as error:
+            raise InvalidInputError(
+                f"{sheet_path} is on a file system without locks ({error.strerror}), where two"
+                " writers could lose entries; move it to another one"
+            ) from error

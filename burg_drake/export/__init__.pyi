@@ -1,0 +1,1 @@
+from .scene_export import export_scene as export_scene

@@ -1,0 +1,133 @@
+"""Exports of scenes: which formats there are, and the folder that holds one."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import burg_drake
+from burg_drake.core import MissingDependencyError, UnknownNameError, nearest
+from burg_drake.export.folder import (
+    ExportRecord,
+    replaced_folder,
+    require_own_folder,
+    write_record,
+)
+from burg_drake.export.layout import Layout, lay_out
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that scenes are exported to.
+
+    Attributes:
+        module: in this room, imported when needed.
+        writer: its function of a layout and a folder, which returns notes.
+        main: the file to open.
+        hydroelastic: whether it has Drake's contact properties.
+        package: that it needs beside those of burg_drake, as pip and as Python know it.
+    """
+
+    module: str
+    writer: str
+    main: str
+    hydroelastic: bool = False
+    package: tuple[str, str] | None = None
+
+
+FORMATS = {
+    "sdf": Format("sdf_world", "write_sdf", "world.sdf", hydroelastic=True),
+    "dmd": Format("directives", "write_directives", "scene.dmd.yaml", hydroelastic=True),
+    "mjcf": Format("mjcf", "write_mjcf", "scene.xml"),
+    "usd": Format("usd", "write_usd", "scene.usda", package=("usd-core", "pxr")),
+}
+"""Formats by name: SDFormat, Drake's model directives, MuJoCo's MJCF, USD with its physics."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """An export.
+
+    Attributes:
+        main: the file to open.
+        layout: what is in it.
+        notes: what became other than it is in the scene, one sentence each.
+    """
+
+    main: Path
+    layout: Layout
+    notes: tuple[str, ...]
+
+
+def export_scene(
+    scene: Scene, folder: str | Path, to: str, station: Station | None = None
+) -> Exported:
+    """Writes a scene for another program: a folder that can be moved or zipped as it is.
+
+    Args:
+        scene: what stands on the board. The board itself, which is paper, is left out.
+        folder: new, empty, or an earlier export, which is replaced as a whole when the new one is
+            complete.
+        to: one of `FORMATS`.
+        station: its table and obstacles are exported, too, and the world is the station's. Without
+            one the world is the scene frame S, and nothing is under the objects.
+
+    Raises:
+        UnknownNameError: no such format, or a file of the library is missing.
+        InvalidInputError: the folder holds something else or cannot be written to; an instance and
+            a part of the station share a name; an object's model cannot be exported.
+        MeshError: a mesh of the library is damaged.
+        MissingDependencyError: `usd` without the package usd-core.
+    """
+    if to not in FORMATS:
+        raise UnknownNameError(f"format {to!r} does not exist; {nearest(to, FORMATS)}")
+    chosen = FORMATS[to]
+    write = _writer(to)
+    path = require_own_folder(folder)
+    layout = lay_out(scene, station)
+    with replaced_folder(path) as fresh:
+        notes = write(layout, fresh)
+        write_record(
+            fresh,
+            ExportRecord(
+                format=to,
+                scene=scene.name,
+                scene_content=scene.content,
+                station=station.name if station is not None else "",
+                main=chosen.main,
+                software=f"burg_drake {burg_drake.__version__}",
+            ),
+        )
+    if not chosen.hydroelastic:
+        notes = (*notes, *_contact_notes(layout, to))
+    return Exported(path / chosen.main, layout, notes)
+
+
+def _writer(to: str) -> Callable[[Layout, Path], tuple[str, ...]]:
+    chosen = FORMATS[to]
+    if chosen.package is not None and importlib.util.find_spec(chosen.package[1]) is None:
+        raise MissingDependencyError(
+            f"exports to {to} need the package {chosen.package[0]}; install it with"
+            f" pip install 'burg-drake[{to}]'"
+        )
+    return getattr(importlib.import_module(f"burg_drake.export.{chosen.module}"), chosen.writer)
+
+
+def _contact_notes(layout: Layout, to: str) -> list[str]:
+    """What of the objects' contact a format without Drake's properties does not have."""
+    notes = []
+    for name, entry in layout.entries.items():
+        if entry.contact.kind == "primitive":
+            continue
+        if not entry.pieces:
+            notes.append(f"{name!r} has no convex pieces; its convex hull collides in {to}")
+        elif entry.contact.kind == "mesh":
+            notes.append(f"{name!r} is a rigid mesh in Drake; in {to} its convex pieces collide")
+        elif entry.contact.kind == "compliant_pieces":
+            notes.append(f"{name!r} is compliant in Drake; {to} has no hydroelastic modulus")
+    return notes

@@ -1,0 +1,258 @@
+"""Grasps of the ACRONYM dataset: one HDF5 file an object and scale.
+
+The layout is that of C. Eppner, A. Mousavian, D. Fox, "ACRONYM: A Large-Scale Grasp Dataset Based
+on Simulation", ICRA 2021, as `load_mesh` and `load_grasps` in acronym_tools/acronym.py
+(github.com/NVlabs/acronym) read it:
+
+- `grasps/transforms` (N, 4, 4): poses of the gripper in the frame of the scaled mesh [m].
+  `grasps/qualities/flex` has the trials of the simulator FleX, each (N,): `object_in_gripper` (1 or
+  0) and `object_motion_during_{closing,shaking}_{linear,angular}`.
+- `object/file` is the mesh, such as `meshes/Mug/10f6....obj`, `object/scale` the factor that
+  `load_mesh` applies to it. `object/mass`, `friction`, `inertia`, `com`, `density`, `volume`
+  describe it further.
+- `gripper/type` is `panda`, `gripper/configuration` how far each finger is open.
+- Files are named after category, mesh and scale: `Mug_10f6..._0.0002682457830986903.h5`.
+
+The gripper frame has its origin at the hand's base, which for the Panda is the frame of its link
+`panda_hand`, +z towards the tips and x along the fingers' way, the left finger at +x: so
+`create_gripper_marker` (fingers at x = +-0.041 m, tips at z = 0.112 m) draws it, and the author of
+the dataset confirms the same of its predecessor (github.com/NVlabs/6dof-graspnet, issue 8).
+
+Written files have what else is known of grasps as `grasps/qualities/burg_drake`, next to `flex`.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, InvalidInputError, inverse
+from burg_drake.core.files import (
+    DAMAGED,
+    NUMBERS,
+    Hdf5File,
+    Shape,
+    atomic_write,
+    is_hdf5,
+    open_hdf5,
+    reading,
+)
+from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
+from burg_drake.formats.common import (
+    HANDS,
+    SUCCESS_COLUMN,
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    check_hand,
+    conversion_losses,
+    nearest_rigid,
+    object_name,
+    only_object,
+    scale_note,
+    shareable_description,
+    success_of,
+)
+
+TRANSFORMS = "grasps/transforms"
+QUALITIES = "grasps/qualities"
+SIMULATOR, OURS = "flex", "burg_drake"
+MOTIONS = tuple(
+    f"object_motion_during_{phase}_{kind}"
+    for phase in ("closing", "shaking")
+    for kind in ("angular", "linear")
+)
+"""Trials' results of FleX besides `object_in_gripper`."""
+PHYSICAL: dict[str, tuple[Shape, ...]] = {
+    **dict.fromkeys(("mass", "friction", "density", "volume"), ((), (1,))),
+    "com": ((3,),),
+    "inertia": ((3, 3), (9,)),
+}
+"""What files say of their object besides mesh and scale, with its shapes."""
+KIND = "an ACRONYM file"
+
+
+def X_GF(gripper: Gripper) -> Array:
+    """The hand's base, x along the closing direction."""
+    return gripper.X_GB
+
+
+def recognises(path: Path) -> bool:
+    """An HDF5 file with `grasps/transforms`."""
+    try:
+        if not is_hdf5(path):
+            return False
+        with open_hdf5(path) as file:
+            return TRANSFORMS in file
+    except (OSError, *DAMAGED):
+        return False
+
+
+def read(path: Path, gripper: Gripper) -> ImportedGrasps:
+    """The grasps of a file; `score` is `object_in_gripper`.
+
+    Raises:
+        InvalidInputError: no such file, or a value that cannot be used; the message says where.
+    """
+    with reading(path, "an HDF5 file that can be read"), open_hdf5(path) as file:
+        return _read(path, file, gripper)
+
+
+def _read(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
+    notes: tuple[str, ...] = ()
+    X_OF, rounded = nearest_rigid(_poses(file), f"{path}: {TRANSFORMS}")
+    mesh = _text(file, "object/file")
+    scale = _number(file, "object/scale")
+    if scale <= 0.0:
+        raise InvalidInputError(f"{path}: object/scale is {scale:g}; it must be above 0")
+    name = object_name(mesh)
+    described: dict[str, Any] = {"file": mesh, "scale": scale}
+    for key, shapes in PHYSICAL.items():
+        if f"object/{key}" in file:
+            values = file.array(f"object/{key}").read(NUMBERS, *shapes).astype(float)
+            if np.isfinite(values).all():
+                described[key] = values.tolist()
+    if "gripper/type" in file:
+        notes = check_hand(_text(file, "gripper/type"), gripper, f"{path}: gripper/type")
+    columns = _qualities(file, len(X_OF))
+    success = columns.pop(SUCCESS_COLUMN, None)
+    width = columns.pop("width", None)
+    score = columns.pop("score", success)
+    if success is not None and score is not success:
+        columns[SUCCESS_COLUMN] = success
+    grasps = GraspSet.create(
+        X_OF @ inverse(X_GF(gripper)),
+        object=name,
+        width=width,
+        score=score,
+        columns=columns,
+        provenance={
+            "format": FORMAT.name,
+            "file": str(path.absolute()),
+            "object_files": {name: described},
+        },
+    )
+    return ImportedGrasps(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
+
+
+def _poses(file: Hdf5File) -> NDArray[Any]:
+    if TRANSFORMS not in file:
+        raise InvalidInputError(f"{file.path}: {TRANSFORMS} is missing; is it a file of ACRONYM?")
+    stored = file.array(TRANSFORMS)
+    stored.rows(4, 4)
+    return stored.read("fiu")
+
+
+def _qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
+    """(n,) values by column: of FleX and of us under their names, of others as `WHO.NAME`."""
+    columns: dict[str, NDArray[Any]] = {}
+    if QUALITIES not in file:
+        return columns
+    for who in file.names(QUALITIES):
+        for name in file.names(f"{QUALITIES}/{who}"):
+            values = file.array(f"{QUALITIES}/{who}/{name}").read(NUMBERS, (n,))
+            plain = who in (SIMULATOR, OURS) and name not in FIXED_COLUMNS
+            plain = plain or (who == OURS and name in ("score", "width"))
+            columns[name if plain else f"{who}.{name}"] = values.astype(float)
+    return columns
+
+
+def _number(file: Hdf5File, key: str) -> float:
+    values = file.array(key).read("fiu", (), (1,))
+    if not np.isfinite(values).all():
+        raise InvalidInputError(f"{file.path}: {key} is {values.item()}; expected a finite number")
+    return float(values.item())
+
+
+def _text(file: Hdf5File, key: str) -> str:
+    value = str(file.array(key).read("U", (), (1,)).item())
+    if not value:
+        raise InvalidInputError(f"{file.path}: {key} is empty; expected a name")
+    return value
+
+
+def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    """Writes the grasps of one object.
+
+    Raises:
+        InvalidInputError: grasps of several objects, or the place cannot be written to.
+    """
+    import h5py
+
+    name = only_object(grasps, KIND)
+    described = shareable_description(grasps, name, path)
+    success = success_of(grasps)
+    notes = _notes(grasps, name, described, success)
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        file["object/file"] = str(described.get("file", f"{name}.obj"))
+        file["object/scale"] = float(described.get("scale", 1.0))
+        for key in PHYSICAL:
+            if key in described:
+                file[f"object/{key}"] = np.asarray(described[key], dtype=float)
+        foreign = {ours: theirs for theirs, ours in reversed(HANDS.items())}
+        file["gripper/type"] = foreign.get(gripper.name, gripper.name)
+        file["gripper/configuration"] = np.array([gripper.opening[1] / 2.0])
+        packed = {"compression": "gzip", "shuffle": True}
+        file.create_dataset(TRANSFORMS, data=grasps.X_OG @ X_GF(gripper), **packed)
+        for key, values in _written(grasps, success).items():
+            file.create_dataset(f"{QUALITIES}/{key}", data=values, **packed)
+    atomic_write(path, buffer.getvalue())
+    return notes
+
+
+def _written(grasps: GraspSet, success: Array) -> dict[str, NDArray[Any]]:
+    """Values by dataset below `grasps/qualities`."""
+    known = not np.isnan(success).any()
+    result: dict[str, NDArray[Any]] = {
+        f"{SIMULATOR}/{SUCCESS_COLUMN}": success.astype(np.int64) if known else success
+    }
+    if not np.array_equal(grasps.score, success, equal_nan=True):
+        result[f"{OURS}/score"] = grasps.score
+    if not np.isnan(grasps.width).all():
+        result[f"{OURS}/width"] = grasps.width
+    for name, values in grasps.columns.items():
+        if name != SUCCESS_COLUMN and values.dtype.kind in "fiub":
+            who, dot, rest = name.partition(".")
+            simulated = f"{SIMULATOR}/{name}" if name in MOTIONS else f"{OURS}/{name}"
+            result[f"{who}/{rest}" if dot and who and rest else simulated] = values
+    return result
+
+
+def _notes(
+    grasps: GraspSet, name: str, described: dict[str, Any], success: Array
+) -> tuple[str, ...]:
+    notes = []
+    if "file" not in described:
+        notes.append(
+            f"object/file is {name + '.obj'!r} and object/scale 1, as nothing says which mesh"
+            f" {name!r} was made of."
+        )
+    if np.isnan(success).any():
+        notes.append(
+            f"{SUCCESS_COLUMN} is NaN for {int(np.isnan(success).sum())} grasps, as nothing says"
+            " whether they succeed."
+        )
+    numbers = [key for key, values in grasps.columns.items() if values.dtype.kind in "fiub"]
+    carried = ("object", "width", "score", "outcome", *numbers)
+    return (*notes, *conversion_losses(grasps, carried, FORMAT.title))
+
+
+FORMAT = GraspFormat(
+    name="acronym",
+    title="ACRONYM",
+    suffixes=(".h5", ".hdf5"),
+    frame="object",
+    source="github.com/NVlabs/acronym, acronym_tools/acronym.py; Eppner et al., ICRA 2021",
+    carries=("score as object_in_gripper", "width", "further numbers", "mesh, scale and mass"),
+    cannot_carry=("ids", "several objects", "text columns", "provenance"),
+    X_GF=X_GF,
+    recognises=recognises,
+    read=read,
+    write=write,
+    one_object=True,
+)

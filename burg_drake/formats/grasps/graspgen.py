@@ -1,0 +1,244 @@
+"""Grasps of GraspGen's data sets: JSON, one object a file.
+
+The layout is the one of docs/GRASP_DATASET_FORMAT.md in github.com/NVlabs/GraspGen, as
+grasp_gen/dataset/dataset_utils.py reads it; the released data set has it too, in shards of tar
+files. A. Murali et al., "GraspGen: A Diffusion-based Framework for 6-DOF Grasping with On-Generator
+Training", ICRA 2026.
+
+- `object.file` is the mesh, or an identifier of Objaverse; `object.scale` the factor by which the
+  mesh is scaled. `grasps.transforms` (N, 4, 4) are poses of the gripper's base in the frame of the
+  scaled mesh [m]; `grasps.object_in_gripper` (N,) says which of them hold the object, as truth
+  values or 0 and 1.
+- scripts/record_grasp.py writes the same without `object`.
+- scripts/graspgen/datagen.py of github.com/NVlabs/GraspDataGen adds `gripper`: name, file, width,
+  depth, and `transform_offset_from_asset_to_graspgen_convention` as [[x, y, z], [x, y, z, w]] or as
+  16 numbers. `load_object_grasp_data` multiplies each transform by that offset from the right; so
+  does this reader.
+
+What comes out has +z towards the tips and x along the fingers' way (docs/GRIPPER_DESCRIPTION.md).
+For `franka_panda` the offset is the identity and the mesh grasp_gen/assets/panda_gripper/hand.stl
+has the origin of the Panda's link `panda_hand` (its top at z = 0.066 m) with the fingers along x
+(config/grippers/franka_panda.yaml and .py).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    inverse,
+    make_pose,
+    quoted,
+    rotation_from_quaternion,
+)
+from burg_drake.core.documents import load_json
+from burg_drake.core.files import GRASP_FILE, atomic_write
+from burg_drake.core.grasps import GraspSet
+from burg_drake.formats.common import (
+    SUCCESS_COLUMN,
+    GraspFormat,
+    Gripper,
+    ImportedGrasps,
+    check_hand,
+    conversion_losses,
+    nearest_rigid,
+    object_name,
+    only_object,
+    scale_note,
+    shareable_description,
+    success_of,
+)
+
+KIND = "a GraspGen file"
+OFFSET = "transform_offset_from_asset_to_graspgen_convention"
+HEAD = 1 << 16
+"""Bytes that are looked at to recognise a file."""
+
+_GRASPS = re.compile(rb'"grasps"\s*:\s*\{')
+
+
+def X_GF(gripper: Gripper) -> Array:
+    """The hand's base, x along the closing direction."""
+    return gripper.X_GB
+
+
+def recognises(path: Path) -> bool:
+    """JSON with `grasps` as a mapping."""
+    try:
+        with open(path, "rb") as stream:
+            head = stream.read(HEAD)
+    except OSError:
+        return False
+    return head.lstrip().startswith(b"{") and _GRASPS.search(head) is not None
+
+
+def read(path: Path, gripper: Gripper) -> ImportedGrasps:
+    """The grasps of a file; `score` is `object_in_gripper`.
+
+    Raises:
+        InvalidInputError: no such file, or a value that cannot be used; the message says where.
+    """
+    document = _load(path)
+    grasps = _mapping(path, document, "grasps")
+    given = grasps.get("transforms")
+    if not isinstance(given, list):
+        raise InvalidInputError(f"{path}: grasps.transforms is missing or no list of matrices")
+    where = f"{path}: grasps.transforms"
+    X_OF, rounded = nearest_rigid(given if given else np.empty((0, 4, 4)), where)
+    score = _success(path, grasps, len(X_OF))
+    notes, offset = _offset(path, document, gripper)
+    name, described, scaled = _object(path, document)
+    notes += () if score is not None else (f"The file has no {SUCCESS_COLUMN}, hence no scores.",)
+    set_ = GraspSet.create(
+        X_OF @ offset @ inverse(X_GF(gripper)),
+        object=name,
+        score=score,
+        provenance={
+            "format": FORMAT.name,
+            "file": str(path.absolute()),
+            "object_files": {name: described},
+        },
+    )
+    further = sorted(set(grasps) - {"transforms", SUCCESS_COLUMN})
+    left = (f"Left aside: grasps.{', grasps.'.join(further)}.",) if further else ()
+    return ImportedGrasps(set_, "object", (*notes, *rounded, *scaled, *left))
+
+
+def _load(path: Path) -> dict[str, Any]:
+    document = load_json(path, GRASP_FILE)
+    if not isinstance(document, dict):
+        raise InvalidInputError(f"{path}: a {type(document).__name__} instead of a mapping")
+    return document
+
+
+def _mapping(path: Path, document: dict[str, Any], key: str) -> dict[str, Any]:
+    if not isinstance(document.get(key), dict):
+        raise InvalidInputError(f"{path}: {key} is missing or no mapping; is it a GraspGen file?")
+    value: dict[str, Any] = document[key]
+    return value
+
+
+def _success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
+    """(N,) 1 or 0; None if the file does not say."""
+    if SUCCESS_COLUMN not in grasps:
+        return None
+    where = f"{path}: grasps.{SUCCESS_COLUMN}"
+    given = grasps[SUCCESS_COLUMN]
+    if not isinstance(given, list) or len(given) != n:
+        shown = f"{len(given)} values" if isinstance(given, list) else quoted(given)
+        raise InvalidInputError(f"{where} has {shown}; expected {n}, one a grasp")
+    for i, value in enumerate(given):
+        if not isinstance(value, (bool, int, float)) or value not in (0, 1):
+            raise InvalidInputError(
+                f"{where}[{i}] is {quoted(value)}; expected true, false, 0 or 1"
+            )
+    return np.array(given, dtype=float)
+
+
+def _object(path: Path, document: dict[str, Any]) -> tuple[str, dict[str, Any], tuple[str, ...]]:
+    """Its name, what the file says of it, and a note about its scale."""
+    if "object" not in document:
+        return path.stem, {}, (f"The file names no object; it is called {path.stem!r}.",)
+    object = _mapping(path, document, "object")
+    file, scale = object.get("file"), object.get("scale")
+    if not isinstance(file, str) or not file:
+        raise InvalidInputError(
+            f"{path}: object.file is {quoted(file)}; expected the name of a mesh"
+        )
+    is_number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
+    if scale is None or not is_number or not 0.0 < scale < np.inf:
+        raise InvalidInputError(
+            f"{path}: object.scale is {quoted(scale)}; expected a number above 0"
+        )
+    name = object_name(file)
+    return name, {"file": file, "scale": float(scale)}, (scale_note(name, file, scale),)
+
+
+def _offset(
+    path: Path, document: dict[str, Any], gripper: Gripper
+) -> tuple[tuple[str, ...], Array]:
+    """Notes about the gripper, and (4, 4) what transforms are multiplied by."""
+    if "gripper" not in document:
+        return (), np.eye(4)
+    given = _mapping(path, document, "gripper")
+    notes: tuple[str, ...] = ()
+    if isinstance(given.get("name"), str):
+        notes = check_hand(given["name"], gripper, f"{path}: gripper.name")
+    where = f"{path}: gripper.{OFFSET}"
+    offset = given.get(OFFSET, np.eye(4).reshape(-1).tolist())
+    try:
+        if len(offset) == 2:
+            p, xyzw = (np.array(part, dtype=float) for part in offset)
+            w = np.linalg.norm(xyzw)
+            if p.shape == (3,) and xyzw.shape == (4,) and np.isfinite(p).all() and 0.0 < w < np.inf:
+                return notes, make_pose(rotation_from_quaternion(np.roll(xyzw, 1)), p)
+        else:
+            poses, _ = nearest_rigid(np.array(offset, dtype=float).reshape(1, 4, 4), where)
+            return notes, poses[0]
+    except (TypeError, ValueError):
+        pass
+    raise InvalidInputError(f"{where} is {quoted(offset)}; expected [[x, y, z], [x, y, z, w]]")
+
+
+def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    """Writes the grasps of one object.
+
+    Raises:
+        InvalidInputError: grasps of several objects, some known to succeed or fail and others not,
+            or the place cannot be written to.
+    """
+    name = only_object(grasps, KIND)
+    described = shareable_description(grasps, name, path)
+    success = success_of(grasps)
+    unknown = int(np.isnan(success).sum())
+    if 0 < unknown < len(grasps):
+        raise InvalidInputError(
+            f"of {unknown} of {len(grasps)} grasps it is not known whether they succeed, which"
+            " GraspGen wants of all or none; select those that are known"
+        )
+    file, scale = str(described.get("file", f"{name}.obj")), float(described.get("scale", 1.0))
+    content: dict[str, Any] = {"transforms": (grasps.X_OG @ X_GF(gripper)).tolist()}
+    notes = []
+    if "file" not in described:
+        notes.append(
+            f"object.file is {file!r} and object.scale 1, as nothing says which mesh {name!r} was"
+            " made of."
+        )
+    if unknown:
+        notes.append(f"There is no {SUCCESS_COLUMN}, as nothing says which grasps succeed.")
+    else:
+        content[SUCCESS_COLUMN] = (success > 0.5).tolist()
+    document = {"object": {"file": file, "scale": scale}, "grasps": content}
+    atomic_write(path, json.dumps(document))
+    carried = ["object", SUCCESS_COLUMN, "outcome"]
+    carried += ["score"] if np.array_equal(grasps.score, success, equal_nan=True) else []
+    return (*notes, *conversion_losses(grasps, carried, FORMAT.title))
+
+
+FORMAT = GraspFormat(
+    name="graspgen",
+    title="GraspGen data set",
+    suffixes=(".json",),
+    frame="object",
+    source="github.com/NVlabs/GraspGen, docs/GRASP_DATASET_FORMAT.md",
+    carries=("score as object_in_gripper", "mesh and scale"),
+    cannot_carry=(
+        "ids",
+        "several objects",
+        "scores other than 0 and 1",
+        "width",
+        "further columns",
+    ),
+    X_GF=X_GF,
+    recognises=recognises,
+    read=read,
+    write=write,
+    one_object=True,
+)

@@ -1,0 +1,220 @@
+"""Which grasp of a set is nearest, and whether one is near enough, for all grasps of another set.
+
+Grasps become points: the position, and twice the unit quaternion in both signs and both finger
+forms, each times a weight. The straight distance of two points is never above what translation and
+angle come to with these weights. So a k-d tree of points gives candidates; what decides is computed
+pair by pair as in `similarity`, and a grasp is done only when no point that was not looked at can
+change its result. Results are those of brute force, bit for bit, in any order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.grasping.similarity.pose_distance import (
+    LEVER,
+    P,
+    check_lever,
+    pair_angle,
+    pair_translation,
+)
+
+Indices = NDArray[np.intp]
+Settle = Callable[[Indices, Indices, Indices, Array], NDArray[np.bool_]]
+"""Takes the rows that are open, pairs as positions among those rows and columns, and how far each
+row has looked; returns which rows stay open."""
+
+CANDIDATES = 4
+"""Points looked at first; four times as many in each further round for what is still open."""
+
+PAIRS = 200_000
+"""Most pairs in one step; bounds the memory to some ten megabytes."""
+
+TREE = 50_000
+"""Grasps in a tree; likewise."""
+
+ANGLE_SLACK = 1e-5
+"""Error of a rotation in a point [rad]: rotation matrices may be 1e-6 off orthonormal
+(`core.frames.POSE_TOLERANCE`), and their quaternion is that of a rotation nearby."""
+
+ROUNDING = 1e-12
+"""Relative error of a distance between points, and metres that a point may be off."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """When two grasps count as the same: all three bounds hold.
+
+    Attributes:
+        translation: between the origins [m].
+        angle: modulo the swap of the fingers [rad].
+        distance: translation + lever * angle [m]. BURG-Toolkit's coverage is of this kind, with
+            15 mm, which is narrower than 15 mm and 15 degrees.
+        lever: weight of the angle in that distance [m/rad].
+    """
+
+    translation: float = 0.015
+    angle: float = math.radians(15.0)
+    distance: float = math.inf
+    lever: float = LEVER
+
+    def __post_init__(self) -> None:
+        check_lever(self.lever)
+        for name in ("translation", "angle", "distance"):
+            value = getattr(self, name)
+            if not value >= 0.0:
+                raise InvalidInputError(f"tolerance {name} is {value}; expected a number from 0")
+
+
+def find_nearest(
+    G: Array, F: Array, *, lever: float = LEVER, same: bool = False
+) -> tuple[Indices, Array]:
+    """The nearest grasp by combined distance.
+
+    Args:
+        G: (12, N) `components` of the grasps that search.
+        F: (12, M) of those that are found.
+        lever: weight of the angle [m/rad].
+        same: G and F are one set, and a grasp does not find itself.
+
+    Returns:
+        (N,) indices into F and (N,) distances [m]; -1 and infinity where there is none. Of several
+        as near it is the first one; of several that equal the grasp itself, one of them.
+    """
+    check_lever(lever)
+    nearest = np.full(G.shape[1], -1, dtype=np.intp)
+    distance = np.full(G.shape[1], np.inf)
+
+    def settle(rows: Indices, i: Indices, column: Indices, reach: Array) -> NDArray[np.bool_]:
+        g, f = G[:, rows[i]], F[:, column]
+        d = pair_translation(g, f) + lever * pair_angle(g, f)
+        if same:
+            d[column == rows[i]] = np.inf
+        first = np.flatnonzero(np.diff(i, prepend=-1))  # pairs come row by row
+        best = np.minimum.reduceat(d, first)
+        tied = d == np.repeat(best, np.diff(first, append=len(d)))
+        column = np.minimum.reduceat(np.where(tied, column, F.shape[1]), first)
+        row, d = rows[i[first]], best
+        better = (d < distance[row]) | ((d == distance[row]) & (column < nearest[row]))
+        distance[row[better]], nearest[row[better]] = d[better], column[better]
+        least = reach * (1.0 - ROUNDING) - lever * ANGLE_SLACK - ROUNDING
+        return (least <= distance[rows]) & (distance[rows] > 0.0)
+
+    for tree in _trees(F, 1.0, lever):
+        _search(tree, G, np.arange(G.shape[1]), math.inf, settle)
+    return nearest, distance
+
+
+def find_within(G: Array, F: Array, tolerance: Tolerance) -> NDArray[np.bool_]:
+    """Whether any grasp is near enough.
+
+    Args:
+        G: (12, N) `components` of the grasps that search.
+        F: (12, M) of those that are found.
+        tolerance: what counts as near.
+
+    Returns:
+        (N,) True where a grasp of F is within the tolerance.
+    """
+    found = np.zeros(G.shape[1], dtype=bool)
+
+    def settle(rows: Indices, i: Indices, column: Indices, reach: Array) -> NDArray[np.bool_]:
+        g, f = G[:, rows[i]], F[:, column]
+        translation, angle = pair_translation(g, f), pair_angle(g, f)
+        near = (translation <= tolerance.translation) & (angle <= tolerance.angle)
+        near &= translation + tolerance.lever * angle <= tolerance.distance
+        found[rows[i[near]]] = True
+        return ~found[rows]
+
+    per_metre, per_radian, radius = _ball(tolerance)
+    for tree in _trees(F, per_metre, per_radian):
+        _search(tree, G, np.flatnonzero(~found), radius, settle)
+    return found
+
+
+def _ball(tolerance: Tolerance) -> tuple[float, float, float]:
+    """Scales of translation and angle, and the radius of a ball of points around all matches.
+
+    Scaled by the tolerances, translation and angle are at most 1 each, their hypotenuse at most
+    the root of 2; where the combined distance alone decides, their sum is at most 1.
+    """
+    lever, distance = tolerance.lever, tolerance.distance
+    angle = min(tolerance.angle, math.pi)
+    sum_decides = distance <= min(tolerance.translation, lever * angle)
+    if distance < lever * angle:
+        angle = distance / lever
+    per_metre = 1.0 / max(min(tolerance.translation, distance), 1e-9)
+    per_radian = 1.0 / max(angle, 1e-6)
+    slack = per_metre * ROUNDING + per_radian * ANGLE_SLACK
+    return per_metre, per_radian, (1.0 if sum_decides else math.sqrt(2.0)) + slack
+
+
+@dataclass(frozen=True, eq=False)
+class _GraspTree:
+    """Grasps as points, each in both signs of its quaternion and both finger forms.
+
+    Attributes:
+        points: k-d tree of (4 M, 7) points.
+        start: index of its first grasp in the set.
+        count: M.
+        per_metre, per_radian: scales of the points.
+    """
+
+    points: cKDTree
+    start: int
+    count: int
+    per_metre: float
+    per_radian: float
+
+
+def _trees(F: Array, per_metre: float, per_radian: float) -> Iterator[_GraspTree]:
+    for start in range(0, F.shape[1], TREE):
+        points = _points(F[:, start : start + TREE], per_metre, per_radian)
+        x, y, z, w = points[:, 3:].T
+        swapped = np.hstack([points[:, :3], np.stack([y, -x, w, -z], axis=1)])  # times (0, 0, 1, 0)
+        forms = np.vstack([points, swapped])
+        negative = np.hstack([forms[:, :3], -forms[:, 3:]])
+        tree = cKDTree(np.vstack([forms, negative]))
+        yield _GraspTree(tree, start, len(points), per_metre, per_radian)
+
+
+def _points(G: Array, per_metre: float, per_radian: float) -> Array:
+    """(12, N) components -> (N, 7) points.
+
+    Quaternions of rotations that differ by an angle are 2 sin(angle / 4) apart, so that twice of
+    it is at most the angle.
+    """
+    R = np.transpose(G[:P].reshape(3, 3, -1), (2, 1, 0))
+    q = Rotation.from_matrix(R).as_quat()
+    return np.hstack([per_metre * G[P:].T, 2.0 * per_radian * q])
+
+
+def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: Settle) -> None:
+    """Shows each row its nearest points within a radius, and more of them while it is open."""
+    count = min(CANDIDATES, tree.points.n)
+    while len(rows):
+        size = max(1, PAIRS // count)
+        parts = [rows[k : k + size] for k in range(0, len(rows), size)]
+        rows = np.concatenate([_round(tree, G, part, radius, count, settle) for part in parts])
+        if count == tree.points.n:
+            return
+        count = min(4 * count, tree.points.n)
+
+
+def _round(
+    tree: _GraspTree, G: Array, rows: Indices, radius: float, count: int, settle: Settle
+) -> Indices:
+    """Shows each row its `count` nearest points; returns the rows that want to see more."""
+    points = _points(G[:, rows], tree.per_metre, tree.per_radian)
+    reach, column = tree.points.query(points, k=range(1, count + 1), distance_upper_bound=radius)
+    i, k = np.nonzero(np.isfinite(reach))
+    stays = settle(rows, i, tree.start + column[i, k] % tree.count, reach[:, -1])
+    return rows[stays & np.isfinite(reach[:, -1])]

@@ -1,0 +1,292 @@
+"""Chains of postures from pregrasp over grasp to the top of the lift, for any serial arm.
+
+Postures at the grasp come from whoever solves the arm's inverse kinematics, numerically or in
+closed form. Each is followed along both straight ways, step by step, which makes a chain unless a
+joint gets to its limit or jumps. The best chain is filled in until the hand goes straight, and held
+against bounds of the arm's clearance; what collides is put out, and the next takes its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array
+from burg_drake.core.grasps import Outcome
+from burg_drake.motion.ik import ArmKinematics, ArmSolutions, NumericSolutions
+from burg_drake.motion.lines.chain_candidates import (
+    APPROACH,
+    GRASP,
+    LIFT,
+    RETREAT,
+    WHOLE,
+    ChainCandidates,
+    Indices,
+)
+from burg_drake.motion.lines.closed_form import DOUBT, ROWS_A_LAYER
+from burg_drake.motion.lines.dense_rows import DenseRows, NumericFiller, near_ik, straighten
+from burg_drake.motion.lines.failure_reason import EXPLAINED
+from burg_drake.motion.lines.following import Follower
+from burg_drake.motion.lines.grid_builder import START, counted_clearance
+from burg_drake.motion.lines.line_poses import LinePoses
+from burg_drake.motion.lines.line_search import Chain, Failure
+from burg_drake.motion.lines.reach_settings import ReachSettings
+from burg_drake.motion.proximity import ArmProximity
+
+WAYS = (
+    (APPROACH, Outcome.APPROACH_LINE),
+    (RETREAT, Outcome.RETREAT_LINE),
+    (LIFT, Outcome.LIFT_LINE),
+)
+"""The hand's straight ways in their order."""
+
+
+class NumericLineSearch:
+    """Looks for chains of a serial arm in a scene.
+
+    Args:
+        arm: the arm on its own.
+        lines: where the hand goes.
+        proximity: bounds of the arm's clearance.
+        home: (n,) home posture; chains that start near it are preferred [rad].
+        settings: how thoroughly to look.
+        solutions: finds postures at hand poses, within the joint limits; numerically if None.
+        beyond: likewise, without regard to the limits.
+    """
+
+    def __init__(
+        self,
+        arm: ArmKinematics,
+        lines: LinePoses,
+        proximity: ArmProximity,
+        home: Array,
+        settings: ReachSettings,
+        *,
+        solutions: ArmSolutions | None = None,
+        beyond: ArmSolutions | None = None,
+    ) -> None:
+        self.arm, self.lines, self.proximity = arm, lines, proximity
+        self.home, self.settings = home, settings
+        margin, starts = settings.limit_margin, settings.starts
+        self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
+        self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
+        self.layers, self.at_grasp = lines.layers, lines.at_grasp
+        self.follower = Follower(lines, settings.joint_travel, self.solve, self.measure)
+
+    def lifted(self, height: float) -> NumericLineSearch:
+        """See `LineSearch`."""
+        return NumericLineSearch(
+            self.arm,
+            replace(self.lines, lift=height),
+            self.proximity,
+            self.home,
+            self.settings,
+            solutions=self.solutions,
+            beyond=self.beyond,
+        )
+
+    def begin(self, X_AG: Array, clearance: Array) -> _NumericBatch:
+        """See `LineSearch`."""
+        return _NumericBatch(self, X_AG, clearance)
+
+    def solve(self, X_AH: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they
+        meet them (S,)."""
+        return near_ik(self.arm, X_AH, start, self.settings)
+
+    def measure(self, q: Array) -> tuple[Array, Array]:
+        """Clearances of postures (S, n): lower bounds, and what has to be positive for a posture to
+        count (S,) [m]: the upper bound where the last word is Drake's, else the best guess."""
+        bounds = self.proximity.bounds(q, hand=False)
+        return bounds.lower, counted_clearance(bounds, self.settings.exact)
+
+
+class _NumericBatch:
+    """See `line_search.Lines`."""
+
+    def __init__(self, search: NumericLineSearch, X_AG: Array, clearance: Array) -> None:
+        self._search, self._X_AG = search, X_AG
+        self._deviation = np.clip(0.5 * clearance, *search.settings.deviation)
+        self._round = np.zeros(len(X_AG), dtype=int)
+        self._of = [ChainCandidates.none(len(search.layers), len(search.home)) for _ in X_AG]
+        self._advance(list(range(len(X_AG))))
+
+    def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
+        """See `Lines`."""
+        found: dict[int, Chain | None] = {}
+        left = list(grasps)
+        while left:
+            best = {g: self._of[g].best() for g in left}
+            exhausted = [g for g in left if best[g] is None]
+            finished = [g for g in exhausted if self._round[g] == self._search.solutions.rounds]
+            found.update(dict.fromkeys(finished))
+            self._advance([g for g in exhausted if g not in found])
+            found.update(self._refine([(g, k) for g, k in best.items() if k is not None]))
+            left = [g for g in left if g not in found]
+        return [found[g] for g in grasps]
+
+    def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
+        """See `Lines`."""
+        candidates, k = self._of[grasp], chain.place
+        if row is None:
+            candidates.open[k] = False
+            return
+        ends = chain.at_grasp, chain.at_retreated, len(chain.q)
+        stage = GRASP if row in (0, chain.at_grasp) else WAYS[int(np.searchsorted(ends, row))][0]
+        candidates.block(k, stage, chain.q[row], chain.moved_W[row], 0.0)
+
+    def close(self, grasp: int, way: int) -> None:
+        """See `Lines`."""
+        self._of[grasp].close(way)
+
+    def failure(self, grasp: int) -> Failure:
+        """See `Lines`."""
+        search, candidates = self._search, self._of[grasp]
+        if not len(candidates):
+            return self._beyond_limits(grasp, search.at_grasp)
+        stage = int(candidates.stage[~candidates.open].max(initial=GRASP))
+        if stage == GRASP:
+            return self._explain(Outcome.ARM_COLLISION, candidates, GRASP)
+        if stage == APPROACH:
+            return self._no_approach(grasp)
+        if stage in (RETREAT, LIFT):
+            return self._explain(dict(WAYS)[stage], candidates, stage)
+        return Failure(Outcome.NO_PATH)
+
+    def _advance(self, grasps: list[int]) -> None:
+        """Goes on to the next round of postures at some grasps, and follows those that are free
+        along both lines."""
+        search = self._search
+        for turn in sorted({int(self._round[g]) for g in grasps}):
+            members = [g for g in grasps if self._round[g] == turn]
+            self._round[members] += 1
+            X_AG = self._X_AG[members].reshape(-1, 4, 4)
+            pose, q = self._postures(X_AG, search.at_grasp, turn)
+            added = [
+                self._of[g].add(pose[own] % 2, q[own], search.at_grasp)
+                for g, own in ((g, pose // 2 == at) for at, g in enumerate(members))
+            ]
+            self._follow(np.repeat(members, [len(k) for k in added]), np.concatenate(added))
+
+    def _postures(self, X_AG: Array, layer: int, turn: int) -> tuple[Indices, Array]:
+        search = self._search
+        X_AH = search.lines.X_AH(X_AG, search.layers[layer])
+        pose, q = search.solutions.solve(X_AH, turn)
+        return pose, search.arm.turned_near(q, search.home)
+
+    def _follow(self, grasp: Indices, k: Indices) -> None:
+        """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
+        search = self._search
+        places = list(zip(grasp.tolist(), k.tolist(), strict=True))
+        way = np.array([self._of[g].way[j] for g, j in places], dtype=np.intp)
+        q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
+        q = q.reshape(len(k), len(search.home))
+        found = search.follower.follow(self._X_AG[grasp, way], q)
+        for s, (g, j) in enumerate(places):
+            stage, blocked = int(found.stage[s]), found.blocked(s)
+            if stage == WHOLE:
+                self._of[g].complete(j, found.q[s], self._cost(found.q[s], found.lower[s]))
+            elif blocked is None:
+                self._of[g].stop(j, stage)
+            else:
+                moved_W = search.lines.carried(self._X_AG[g, way[s]], search.layers[blocked])
+                upper = float(found.upper[s, blocked])
+                self._of[g].block(j, stage, found.q[s, blocked], moved_W, upper)
+
+    def _cost(self, q: Array, lower: Array) -> float:
+        """Of a chain: the way of the joint that moves most from layer to layer, its distance from
+        home, and doubts whether it is free."""
+        way = np.abs(np.diff(q, axis=0)).max(axis=1).sum()
+        start = START * np.abs(q[0] - self._search.home).max()
+        return float(way + start + DOUBT * (lower <= 0.0).sum())
+
+    def _refine(self, chosen: list[tuple[int, int]]) -> dict[int, Chain]:
+        """Chains whose hand goes straight and that are not in collision as far as is known; those
+        of which that is not so are put out."""
+        if not chosen:
+            return {}
+        search = self._search
+        count = len(search.layers)
+        grasp = np.array([g for g, _ in chosen])
+        way = np.array([self._of[g].way[k] for g, k in chosen])
+        corners = np.array([self._of[g].q[k] for g, k in chosen])
+        X_AG = self._X_AG[grasp, way]
+        filler = NumericFiller(
+            *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
+        )
+        at = np.linspace(0.0, count - 1.0, (count - 1) * ROWS_A_LAYER + 1)
+        rows = straighten(filler, at, self._deviation[grasp, way])
+        lower, upper = search.measure(rows.q)
+        chains = {}
+        for i, (g, k) in enumerate(chosen):
+            chain = self._chain(g, k, rows, rows.of(i), lower, upper)
+            if chain is not None:
+                chains[g] = chain
+        return chains
+
+    def _chain(
+        self, grasp: int, k: int, rows: DenseRows, own: slice, lower: Array, upper: Array
+    ) -> Chain | None:
+        search, of = self._search, self._of[grasp]
+        layer, q = rows.layer[own], rows.q[own]
+        length = np.interp(layer, np.arange(len(search.layers)), search.layers)
+        moved_W = search.lines.carried(self._X_AG[grasp, of.way[k]], length)
+        blocked = ~(upper[own] > 0.0)
+        bad = np.flatnonzero(rows.broken[own] | blocked)
+        if len(bad):
+            ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
+            on = np.searchsorted(ends, layer[bad])  # which of the ways
+            stage, bad = WAYS[int(on.min())][0], bad[on == on.min()]
+            row = bad[upper[own][bad].argmin()]
+            if blocked[row]:
+                of.block(k, stage, q[row], moved_W[row], float(upper[own][row]))
+            else:
+                of.stop(k, stage)
+            return None
+        return Chain(
+            way=int(of.way[k]),
+            q=q,
+            at_grasp=int(np.searchsorted(layer, search.at_grasp)),
+            at_retreated=int(np.searchsorted(layer, search.lines.at_retreated)),
+            moved_W=moved_W,
+            lower=lower[own],
+            place=k,
+        )
+
+    def _no_approach(self, grasp: int) -> Failure:
+        """Whether the arm does not get along the line, or has no place at the pregrasp at all."""
+        search = self._search
+        if search.at_grasp > 0:
+            X_AG, found = self._X_AG[grasp], []
+            for turn in range(search.solutions.rounds):
+                found.append(self._postures(X_AG, 0, turn)[1])
+            q = np.concatenate(found)
+            if not len(q):
+                return self._beyond_limits(grasp, 0)
+            _, upper = search.measure(q)
+            if not (upper > 0.0).any():
+                order = np.argsort(-upper, kind="stable")[:EXPLAINED]
+                return Failure(Outcome.ARM_COLLISION, q=q[order], moved_W=np.zeros((len(order), 3)))
+        return self._explain(Outcome.APPROACH_LINE, self._of[grasp], APPROACH)
+
+    def _explain(self, outcome: Outcome, candidates: ChainCandidates, stage: int) -> Failure:
+        """Names the postures that were in the way at a stage, the nearest to being free first."""
+        q, moved_W = candidates.in_the_way(stage, EXPLAINED)
+        return Failure(outcome, q=q, moved_W=moved_W)
+
+    def _beyond_limits(self, grasp: int, layer: int) -> Failure:
+        """Whether there are postures beyond the joint limits, and by how much at least."""
+        search = self._search
+        X_AH = search.lines.X_AH(self._X_AG[grasp], search.layers[layer])
+        q = np.concatenate(
+            [search.beyond.solve(X_AH, turn)[1] for turn in range(search.beyond.rounds)]
+        )
+        if not len(q):
+            return Failure(Outcome.NO_IK)
+        arm, margin = search.arm, search.settings.limit_margin
+        q = arm.turned_near(q, 0.5 * (arm.lower + arm.upper))
+        beyond = np.maximum(arm.lower + margin - q, q - arm.upper + margin).max(axis=1)
+        return Failure(Outcome.JOINT_LIMIT, excess=max(0.0, float(beyond.min())))

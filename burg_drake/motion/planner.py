@@ -1,0 +1,172 @@
+"""From a grasp to motions that an arm can run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from burg_drake.core import Array, check_pose
+from burg_drake.motion.ik import ArmLimits
+from burg_drake.motion.lines import ReachSettings
+from burg_drake.motion.plans import Plan, PlanOrigin
+from burg_drake.motion.reach import ArmReach, Reach, Witness
+from burg_drake.motion.timing import IsFree, PathChecks, TimingSettings, time_motion
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+
+GRIP_TIME = 0.2
+"""Time to build up the force, after the fingers had time to close [s]."""
+
+
+class Planner:
+    """Plans grasps of one scene.
+
+    Attributes:
+        reach: finds the ways.
+        limits: of the arm.
+        settings: how fast, how close to the ways.
+    """
+
+    def __init__(self, reach: ArmReach, *, settings: TimingSettings | None = None) -> None:
+        """Takes the limits of the arm that `reach` is about.
+
+        Raises:
+            InvalidInputError: an arm without limits of velocity.
+        """
+        self.reach = reach
+        self.settings = settings or TimingSettings()
+        self.limits = ArmLimits.of(reach.diagram, reach.kinematics)
+
+    def plan(self, instance: str, X_OG: ArrayLike, width: float = np.nan) -> Plan | Reach:
+        """Plans a grasp.
+
+        Args:
+            instance: the target's name in the scene.
+            X_OG: (4, 4) grasp in the target's frame.
+            width: distance between the pads that hold the target [m]; NaN if it is not known.
+
+        Returns:
+            The plan, or why there is none.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose.
+            UnknownNameError: the scene has no such instance.
+        """
+        X_WG = self.reach.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
+        reach = self.reach.check(instance, X_WG, width)
+        if reach.witness is None:
+            return reach
+        return self.time(instance, reach.witness, width)
+
+    def time(self, instance: str, witness: Witness, width: float = np.nan) -> Plan:
+        """Gives a witness of `reach` its time, after shortening the transfer.
+
+        What leaves the witness's paths, rounded corners and smoothed lines, is checked for
+        collisions as the paths were.
+
+        Args:
+            instance: the target.
+            witness: its motion.
+            width: distance between the pads that hold the target [m]; NaN if it is not known.
+        """
+        edges, hand = self.reach.edges, self.reach.diagram.station.hand
+        if len(witness.transfer) > 2:
+            witness = replace(witness, transfer=self.reach.tree.shortcut(witness.transfer))
+        motion, back_W = self.reach.motion, -witness.X_WG[:3, 2]
+
+        def carrying(u_W: Array, start_W: Array) -> IsFree:
+            return lambda q: (
+                edges.first_blocked(
+                    q,
+                    hand=False,
+                    carried=instance or None,
+                    moved_W=start_W + self._along(u_W, q) if instance else None,
+                    width=width,
+                )
+                is None
+            )
+
+        checks = PathChecks(
+            transfer=lambda q: edges.first_blocked(q) is None,
+            approach=lambda q: edges.first_blocked(q, hand=False) is None,
+            retreat=carrying(back_W, np.zeros(3)),
+            lift=carrying(motion.direction_W, motion.retreat * back_W),
+        )
+        plan = time_motion(
+            witness,
+            self.limits,
+            self.reach.kinematics,
+            settings=self.settings,
+            checks=checks,
+            limit_margin=self.reach.settings.limit_margin,
+        )
+        low, high = hand.opening
+        way = high - (low if np.isnan(width) else width)
+        return replace(
+            plan,
+            close_time=way / 2.0 / hand.closing_speed + GRIP_TIME,
+            opening=high,
+            width=width,
+            origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),
+        )
+
+    def _along(self, u_W: Array, q: Array) -> Array:
+        """(M, 3) how far the hand has come from its first pose along a unit vector (3,) in the
+        world [m]."""
+        arm = self.reach.diagram.station.document.arm
+        assert arm is not None
+        p_AH = self.reach.kinematics.forward(q)[0][:, :3, 3]
+        u_A = u_W @ arm.X_WA.matrix()[:3, :3]
+        return np.asarray(np.maximum(0.0, (p_AH - p_AH[0]) @ u_A)[:, None] * u_W)
+
+    @cached_property
+    def _origin(self) -> PlanOrigin:
+        """What all plans are for, but for target and grasp; to hash documents takes as long as to
+        plan."""
+        diagram = self.reach.diagram
+        return PlanOrigin(
+            joints=tuple(joint.name() for joint in diagram.arm_joints),
+            limits=self.limits,
+            station=diagram.station.name,
+            station_content=diagram.station.content,
+            scene=diagram.scene.name,
+            scene_content=diagram.scene.content,
+            instance="",
+            X_WG=np.eye(4),
+        )
+
+
+def plan(
+    scene: Scene,
+    station: Station,
+    instance: str,
+    X_OG: ArrayLike,
+    *,
+    width: float = np.nan,
+    reach: ReachSettings | None = None,
+    timing: TimingSettings | None = None,
+) -> Plan | Reach:
+    """Plans a single grasp; `Planner` is for many of one scene.
+
+    Args:
+        scene: where the target stands.
+        station: the arm and what is around it.
+        instance: the target's name in the scene.
+        X_OG: (4, 4) grasp in the target's frame.
+        width: distance between the pads that hold the target [m]; NaN if it is not known.
+        reach: how thoroughly to look for a way.
+        timing: how fast to move.
+
+    Returns:
+        The plan, or why there is none.
+
+    Raises:
+        InvalidInputError: `X_OG` is not a pose, the station has no arm, in its home posture
+            something collides, or a joint has no limit of velocity.
+        UnknownNameError: the scene has no such instance.
+    """
+    planner = Planner(ArmReach(scene, station, settings=reach), settings=timing)
+    return planner.plan(instance, X_OG, width)

@@ -1,0 +1,6 @@
+from .trajectory import (
+    Motion as Motion,
+    Plan as Plan,
+    PlanOrigin as PlanOrigin,
+    Trajectory as Trajectory,
+)

@@ -1,0 +1,5 @@
+from .clearance_bounds import (
+    LIKELY as LIKELY,
+    ArmProximity as ArmProximity,
+    ClearanceBounds as ClearanceBounds,
+)

@@ -1,0 +1,4 @@
+from .hand_sweep import (
+    HandSweep as HandSweep,
+    Sweep as Sweep,
+)

@@ -1,0 +1,169 @@
+"""Time for the motions of a grasp: as fast as the joints may be, and the hand along its lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.motion.ik import ArmKinematics, ArmLimits
+from burg_drake.motion.plans import Motion, Plan, Trajectory
+from burg_drake.motion.reach import Witness
+from burg_drake.motion.timing.corners import IsFree, time_polyline
+from burg_drake.motion.timing.line_motion import HandSpeed, time_line
+from burg_drake.motion.timing.timing_settings import TimingSettings
+from burg_drake.station.document import GraspMotion
+
+ROUNDING = 1e-6
+"""By how much samples and their differences may exceed a limit, relative to it."""
+MORE = 1.0005
+"""What exceeds a limit is slowed down by this more than its samples say, as they miss the peaks."""
+SLOWED = 20
+"""How often that is done at most."""
+STRAIGHT = 2e-5
+"""Distance of the hand from its line that is always allowed: a witness's is no straighter [m]."""
+LIFT = GraspMotion().lift_height
+"""Height that `TimingSettings.lift_time` is for [m]."""
+NARROW = 2e-4
+"""Clearance of a hand on its lines where nobody has measured it [m]."""
+
+
+@dataclass(frozen=True)
+class PathChecks:
+    """Checks of what leaves the paths of a witness, each of rows (R, n) that the arm moves through
+    straight from row to row.
+
+    Attributes:
+        transfer: with the hand open and empty.
+        approach: the same, near the target.
+        lift, retreat: with the target in the hand.
+    """
+
+    transfer: IsFree | None = None
+    approach: IsFree | None = None
+    lift: IsFree | None = None
+    retreat: IsFree | None = None
+
+
+def time_motion(
+    witness: Witness,
+    limits: ArmLimits,
+    kinematics: ArmKinematics,
+    *,
+    settings: TimingSettings | None = None,
+    checks: PathChecks | None = None,
+    limit_margin: float = 0.0,
+) -> Plan:
+    """Gives the motions of a witness their time; each begins and ends at rest.
+
+    Args:
+        witness: the paths.
+        limits: of the joints; none is exceeded.
+        kinematics: the arm, to measure the way of the hand.
+        settings: how fast, how close to the paths.
+        checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
+            at each corner; without one for a line, it keeps to a spline through the waypoints.
+
+    Returns:
+        The plan, sampled at `settings.rate`.
+
+    Raises:
+        InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
+            keep the others.
+    """
+    settings, checks = settings or TimingSettings(), checks or PathChecks()
+    near = NARROW if np.isnan(witness.clearance) else max(0.0, witness.clearance)
+    lines = replace(settings, straightness=max(STRAIGHT, min(settings.straightness, near / 2.0)))
+    gentle = limits.gentle(settings.velocity_share, settings.ramp)
+    transfer = time_polyline(
+        _within(witness.transfer, limits, "transfer"),
+        gentle,
+        deviation=settings.corner_deviation,
+        is_free=checks.transfer,
+    )
+    slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
+    approach = time_line(
+        _within(witness.approach, limits, "approach"),
+        kinematics,
+        gentle,
+        slow,
+        lines,
+        is_free=checks.approach,
+        limit_margin=limit_margin,
+    )
+    lift = time_line(
+        _within(witness.lift, limits, "lift"),
+        kinematics,
+        gentle,
+        _lifting(_way(witness.lift, kinematics), settings),
+        lines,
+        is_free=checks.lift,
+        limit_margin=limit_margin,
+    )
+    retreat = None
+    if witness.retreat is not None:
+        back = time_line(
+            _within(witness.retreat, limits, "retreat"),
+            kinematics,
+            gentle,
+            _retreating(settings),
+            lines,
+            is_free=checks.retreat,
+            limit_margin=limit_margin,
+        )
+        retreat = _sampled(back, witness.retreat, limits, settings)
+    return Plan(
+        _sampled(transfer, witness.transfer, limits, settings),
+        _sampled(approach, witness.approach, limits, settings),
+        _sampled(lift, witness.lift, limits, settings),
+        retreat=retreat,
+    )
+
+
+def _within(q: Array, limits: ArmLimits, name: str) -> Array:
+    outside = ~((q >= limits.lower) & (q <= limits.upper))  # NaN, too
+    if outside.any():
+        row, joint = np.argwhere(outside)[0]
+        raise InvalidInputError(
+            f"{name} of a witness: waypoint {row} has joint {joint + 1} at {q[row, joint]:.4f} rad,"
+            f" outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
+        )
+    return q
+
+
+def _lifting(height: float, settings: TimingSettings) -> HandSpeed:
+    """Half of the time full acceleration, half of it full braking, as over `LIFT`: what the hand
+    holds feels the same load on any height."""
+    time = settings.lift_time * np.sqrt(height / LIFT)
+    acceleration = 4.0 * LIFT / settings.lift_time**2
+    return HandSpeed(float(acceleration * time / 2.0), acceleration, settings.ramp)
+
+
+def _retreating(settings: TimingSettings) -> HandSpeed:
+    """As slow as on the approach, and accelerated no more than on the lift."""
+    acceleration = min(settings.approach_acceleration, 4.0 * LIFT / settings.lift_time**2)
+    return HandSpeed(settings.approach_speed, acceleration, settings.ramp)
+
+
+def _way(rows: Array, kinematics: ArmKinematics) -> float:
+    """Distance between the ends of a line [m]."""
+    p = kinematics.forward(rows[[0, -1]])[0][:, :3, 3]
+    return float(np.linalg.norm(p[1] - p[0]))
+
+
+def _sampled(
+    motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
+) -> Trajectory:
+    """Samples that keep the limits, by their differences, too."""
+    motion, kept = motion.stretched(1.0 / settings.speed), limits.slowed(settings.speed)
+    for _ in range(SLOWED):
+        trajectory = Trajectory.of(motion, path[0], path[-1], settings.rate)
+        factor = kept.stretch(trajectory.peaks())
+        if factor <= 1.0 + ROUNDING:
+            return trajectory
+        motion = motion.stretched(MORE * factor)
+    raise InvalidInputError(
+        f"a motion still exceeds the arm's limits after it was slowed down {SLOWED} times, to"
+        f" {motion.duration:g} s"
+    )

@@ -1,0 +1,194 @@
+"""Where over a board an arm grasps from above: the layer that a setup page draws on the table.
+
+A point counts with a turn of the hand if the arm can execute a grasp there, straight from above,
+all the way that `motion.reach` judges: from home to the pregrasp, down to the grasp, and away from
+it as the station says. Nothing stands on the board meanwhile; obstacles of the station do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core import (
+    Array,
+    Arrays,
+    InvalidInputError,
+    content_hash,
+    kept,
+    rot_z,
+    rotation_from_rpy,
+)
+from burg_drake.motion.reach import ArmReach
+from burg_drake.motion.workspace.reachability import board_cells, grasps_over_board
+from burg_drake.motion.workspace.station_check import empty_scene
+from burg_drake.scene.document import Board
+from burg_drake.station.document import Station, world_content
+
+Indices = NDArray[np.intp]
+
+COARSEST = 4
+"""Every so many points along x and y are asked first; where four neighbours among them agree, so
+do the points between them, and where not, the points half as far apart are asked."""
+UNKNOWN = -1
+
+
+@dataclass(frozen=True, eq=False)
+class ReachLayer:
+    """Where an arm grasps from above.
+
+    Attributes:
+        x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
+            that cover the board.
+        height: of the grasps, that is of the middle between the pads, above the board [m].
+        yaw: (K,) turns of the hand about the vertical [rad], over half a turn: the other half are
+            the same grasps with the fingers swapped.
+        reached: (Y, X, K) at which the arm can execute a grasp.
+        cell: extents of a cell along x and y [m].
+    """
+
+    x: Array
+    y: Array
+    height: float
+    yaw: Array
+    reached: NDArray[np.bool_] = field(repr=False)
+    cell: tuple[float, float]
+
+    @property
+    def share(self) -> Array:
+        """(Y, X) shares of the turns that are reached."""
+        return np.asarray(self.reached.mean(axis=-1))
+
+    @property
+    def covered(self) -> float:
+        """Share of the board's area over which some turn is reached."""
+        return float(self.reached.any(axis=-1).mean())
+
+    def share_at(self, p_SQ: ArrayLike) -> Array:
+        """(N,) shares at the points that are nearest to points Q (N, 2 or more) of the scene frame
+        [m]; 0 beside the board."""
+        p = np.asarray(p_SQ, dtype=float)[:, :2]
+        size = np.array(self.cell) * (len(self.x), len(self.y))
+        cell = np.floor(p / self.cell).astype(int)
+        i, j = np.clip(cell, 0, (len(self.x) - 1, len(self.y) - 1)).T
+        on_board = ((p >= 0.0) & (p <= size)).all(axis=1)
+        return np.where(on_board, self.share[j, i], 0.0)
+
+
+def reach_from_above(
+    station: Station,
+    board: Board | None = None,
+    *,
+    height: float = 0.05,
+    spacing: float = 0.02,
+    yaws: int = 4,
+) -> ReachLayer:
+    """Asks where over an empty board the arm grasps straight from above; an answer that was given
+    before comes from the user's cache.
+
+    Args:
+        station: arm, hand, obstacles, and the hand's ways to a grasp and away from it.
+        board: A2 if None.
+        height: of the grasps above the board [m].
+        spacing: largest distance between neighbouring points [m].
+        yaws: turns of the hand, evenly over half a turn.
+
+    Raises:
+        InvalidInputError: the station has no arm, or one that collides at home; or a number is out
+            of its range.
+    """
+    if not (0.0 < spacing < np.inf and 0.0 <= height < np.inf and yaws >= 1):
+        raise InvalidInputError(
+            f"spacing {spacing:g} m must be above 0, height {height:g} m at least 0, and yaws"
+            f" {yaws} at least 1"
+        )
+    require_arm(station)
+    board = board or Board()
+    (x, y), cell = board_cells(board.size, spacing)
+    yaw = np.arange(yaws) * np.pi / yaws
+    R_WG = rotation_from_rpy((np.pi, 0.0, 0.0)) @ np.array([rot_z(angle) for angle in yaw])
+    X_WS = station.document.X_WS.matrix()
+    X_WG = grasps_over_board(X_WS, x, y, np.array([height]), R_WG)
+    X_WG = X_WG.reshape(len(y), len(x), yaws, 4, 4)
+
+    def make() -> Arrays:
+        reach = reach_without_objects(station)
+
+        def ask(j: NDArray[np.intp], i: NDArray[np.intp]) -> NDArray[np.bool_]:
+            found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
+            return np.array([one.outcome is None for one in found]).reshape(-1, yaws)
+
+        return {"reached": asked_where_needed(len(y), len(x), yaws, ask)}
+
+    asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
+    return ReachLayer(x, y, height, yaw, kept("reach-layer", asked, make)["reached"], cell)
+
+
+@lru_cache(maxsize=2)
+def reach_without_objects(station: Station) -> ArmReach:
+    """The arm over an empty board, made once a process for the same `Station`: judges grasps of no
+    instance (`""`), with the station's obstacles in place.
+
+    Raises:
+        InvalidInputError: see `ArmReach`.
+    """
+    require_arm(station)
+    return ArmReach(empty_scene(), station)
+
+
+def require_arm(station: Station) -> None:
+    """Refuses a station that cannot reach for anything.
+
+    Raises:
+        InvalidInputError: it has no arm.
+    """
+    if station.document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
+        )
+
+
+def asked_where_needed(
+    rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
+) -> NDArray[np.bool_]:
+    """(Y, X, K) answers, of which `ask` is asked those that do not follow from their neighbours.
+
+    Args:
+        rows, columns: number of points along y and x.
+        yaws: answers a point.
+        ask: of points by their rows (N,) and columns (N,) the answers (N, K).
+    """
+    found = np.full((rows, columns, yaws), UNKNOWN, dtype=np.int8)
+    stride = COARSEST
+    while stride:
+        on_y, on_x = _nodes(rows, stride), _nodes(columns, stride)
+        j, i = (index.ravel() for index in np.meshgrid(on_y, on_x, indexing="ij"))
+        new = found[j, i, 0] == UNKNOWN
+        j, i = j[new], i[new]
+        if stride < COARSEST:
+            below, above = _around(j, rows, 2 * stride), _around(i, columns, 2 * stride)
+            corners = np.stack([found[b, a] for b in below for a in above])
+            agreed = (corners == corners[0]).all(axis=(0, 2))
+            found[j[agreed], i[agreed]] = corners[0][agreed]
+            j, i = j[~agreed], i[~agreed]
+        if len(j):
+            found[j, i] = ask(j, i)
+        stride //= 2
+    return found.astype(bool)
+
+
+def _nodes(count: int, stride: int) -> Indices:
+    """Every so many of some points, and the last."""
+    return np.unique([*range(0, count, stride), count - 1])
+
+
+def _around(index: Indices, count: int, stride: int) -> tuple[Indices, Indices]:
+    """The nodes on both sides of points; twice the same for a node."""
+    nodes = _nodes(count, stride)
+    return nodes[np.searchsorted(nodes, index, side="right") - 1], nodes[
+        np.searchsorted(nodes, index)
+    ]

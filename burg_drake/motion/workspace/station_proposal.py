@@ -1,0 +1,252 @@
+"""Which station a scene can stand on: a built-in one that fits, or one laid out around the scene.
+
+For scenes that come with furniture of their own: what stands on the table of another station would
+be beside it, or in its arm.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.core.documents import Pose
+from burg_drake.core.paths import builtin_names, name_from
+from burg_drake.motion.workspace.reachability import ReachabilitySettings
+from burg_drake.motion.workspace.station_check import inspect_station
+from burg_drake.motion.workspace.usable_arm import require_usable_arm
+from burg_drake.scene.document import TOUCH_TOLERANCE, Scene, placed_vertices
+from burg_drake.station.checks import require_sound_scene
+from burg_drake.station.document import (
+    Obstacle,
+    Station,
+    StationDocument,
+    Table,
+    load_station,
+)
+
+MARGIN = 0.1
+"""How far the table of a new station reaches beyond what stands on it [m]."""
+
+DISTANCES = (0.5, 0.6, 0.4, 0.7)
+"""From the arm's base to the middle of the free objects, the best first [m]: the built-in stations
+have 0.45 to 0.47 m, and half the reach of a Panda is 0.43 m."""
+
+HEADINGS_DEG = (90.0, 45.0, 135.0, 0.0, 180.0, -45.0, -135.0, -90.0)
+"""Where the arm looks, from x of the scene, in the order in which they are tried: from in front of
+the board first."""
+
+BASE = 0.12
+"""Half the width of the square that an arm's base needs [m]."""
+
+SHOULDER = 0.6
+"""Up to that height over the base nothing may stand where the arm is [m]."""
+
+STEP = 0.05
+"""What free objects stand on is furniture if it is higher than this above the table [m]; the arm
+then gets a pedestal of this height."""
+
+TRIES = 4
+"""Places of an arm that are checked: some seconds each."""
+
+BOARD_HEIGHTS = ReachabilitySettings().heights
+"""At which the check of a station looks for what the arm reaches of the board [m]."""
+
+CELLS = 20
+"""Of the map by which places are compared, along the board's longer side."""
+
+PEDESTAL = "arm_pedestal"
+
+
+@dataclass(frozen=True, eq=False)
+class StationProposal:
+    """A station for a scene.
+
+    Attributes:
+        document: the station.
+        source: name of the built-in station that it is; empty for a new one.
+        misfits: why each of the built-in stations that were tried does not fit, by name.
+        warnings: what a check of the station says of it.
+    """
+
+    document: StationDocument
+    source: str
+    misfits: dict[str, str]
+    warnings: tuple[str, ...] = ()
+
+
+def propose_station(scene: Scene, path: Path) -> StationProposal:
+    """A station that the scene fits on: a built-in one with an arm, else a new one.
+
+    Args:
+        scene: what is to stand on it.
+        path: where the station is going to be; a new one is named after the file.
+
+    Returns:
+        The station; it passes `inspect_station`. Where no place for an arm is found, it has none.
+
+    Raises:
+        InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
+    """
+    fitting, misfits = find_built_in(scene)
+    if fitting is not None:
+        document = replace(fitting.document, name=name_from(path.stem))
+        return StationProposal(document, fitting.name, misfits)
+    bare = _without_arm(scene, path)
+    found: list[tuple[Station, tuple[str, ...]]] = []
+    settings = _coarse(scene)
+    for station in itertools.islice(_with_arms(scene, bare), TRIES):
+        with contextlib.suppress(InvalidInputError):
+            report = inspect_station(station, scene, settings=settings)
+            assert report.arm is not None
+            if report.arm.reachability.reached[: len(BOARD_HEIGHTS)].any():
+                found.append((station, report.warnings))
+        if found and not found[-1][1]:
+            break
+    nowhere = (bare, ("no place was found for an arm: it has the hand alone",))
+    station, warnings = min(found, key=lambda item: len(item[1]), default=nowhere)
+    return StationProposal(station.document, "", misfits, warnings)
+
+
+def find_built_in(scene: Scene) -> tuple[Station | None, dict[str, str]]:
+    """The first built-in station with an arm that a scene fits on; None if there is none.
+
+    Returns:
+        The station, and why each of those that were tried before does not fit, by name.
+
+    Raises:
+        InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
+    """
+    require_sound_scene(scene, _without_arm(scene, Path("station.yaml")))
+    misfits: dict[str, str] = {}
+    for name in sorted(builtin_names("stations"), key=lambda name: name != "panda_tabletop"):
+        station = load_station(name)
+        reason = misfit(scene, station)
+        if not reason:
+            return station, misfits
+        misfits[name] = reason
+    return None, misfits
+
+
+def misfit(scene: Scene, station: Station) -> str:
+    """Why a scene does not fit on a station, in a few words; empty if it does.
+
+    Everything that is fixed has to be on the station's table and clear of its obstacles, by
+    bounding boxes; objects, base and home posture of the arm have to be free, and all free objects
+    within its span.
+    """
+    if station.document.arm is None:
+        return "it has no arm"
+    X_WS = station.document.X_WS.matrix()
+    table = station.document.table
+    half, center = np.array(table.size[:2]) / 2, np.array(table.center)
+    size = f"its table is {table.size[0]:g} x {table.size[1]:g} m"
+    placed = {name: transform_points(X_WS, placed_vertices(scene, name)) for name in _names(scene)}
+    for name, p_W in {"the board": transform_points(X_WS, _corners(scene)), **placed}.items():
+        beyond = float((np.abs(p_W[:, :2] - center) - half).max())
+        if beyond > TOUCH_TOLERANCE:
+            what = name if name == "the board" else repr(name)
+            return f"{size}, and {what} would reach {1e3 * beyond:.0f} mm beyond"
+    for obstacle, box in station.document.background.items():
+        corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * box.size
+        p_WB = transform_points(box.X_WB.matrix(), corners)
+        for name in scene.background:
+            if _depth(placed[name], p_WB) > TOUCH_TOLERANCE:
+                return f"its {obstacle!r} would stand in {name!r}"
+    try:
+        require_sound_scene(scene, station)
+        far = require_usable_arm(scene, station)
+    except InvalidInputError as error:
+        return str(error).removeprefix(f"{scene.path}: ").removeprefix(f"{station.path}: ")
+    return far[0] if far else ""
+
+
+def _without_arm(scene: Scene, path: Path) -> Station:
+    """A table for all that stands in a scene, with its frame as the world's."""
+    usual = load_station("panda_tabletop")
+    points = [_corners(scene), *(placed_vertices(scene, name) for name in _names(scene))]
+    document = StationDocument(
+        name=name_from(path.stem),
+        description=f"Laid out for scene {scene.name}.",
+        hand=usual.document.hand,
+        table=_table(np.vstack(points)[:, :2]),
+    )
+    return replace(usual, document=document, arm_model=None, path=path)
+
+
+def _with_arms(scene: Scene, bare: Station) -> Iterator[Station]:
+    """The table with an arm that looks at the free objects from one side after the other, where
+    there is room for its base."""
+    usual = load_station("panda_tabletop")
+    assert usual.document.arm is not None
+    free = [placed_vertices(scene, name) for name in scene.instances] or [_corners(scene)]
+    around = [placed_vertices(scene, name) for name in _names(scene)]
+    middle = np.median([(p.min(axis=0) + p.max(axis=0)) / 2 for p in free], axis=0)
+    height = _support(scene)
+    half = np.array(bare.document.table.size[:2]) / 2
+    edges = np.array(bare.document.table.center) + np.array([-half, half])
+    for distance, heading in itertools.product(DISTANCES, HEADINGS_DEG):
+        ahead = np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
+        base = np.round(middle[:2] - distance * ahead, 3)
+        room = np.array([[*(base - BASE), 0.0], [*(base + BASE), height + SHOULDER]])
+        if any(_depth(points, room) > 0.0 for points in around):
+            continue
+        x, y = base.tolist()
+        arm = replace(usual.document.arm, X_WA=Pose((x, y, height), rpy_deg=(0.0, 0.0, heading)))
+        document = replace(bare.document, arm=arm, table=_table(np.vstack([edges, room[:, :2]])))
+        if height:
+            name = PEDESTAL
+            while name in scene.instances or name in scene.background:
+                name += "_"
+            box = Obstacle(X_WB=Pose((x, y, height / 2)), size=(2 * BASE, 2 * BASE, height))
+            document = replace(document, background={name: box})
+        yield replace(bare, document=document, arm_model=usual.arm_model)
+
+
+def _support(scene: Scene) -> float:
+    """Height of what the lowest free object stands on [m]; 0 where that is the board."""
+    lowest = [float(placed_vertices(scene, name)[:, 2].min()) for name in scene.instances]
+    floor = min(lowest, default=0.0)
+    return round(floor, 3) if floor > STEP else 0.0
+
+
+def _coarse(scene: Scene) -> ReachabilitySettings:
+    """A reachability map at the board and at the free objects, quickly."""
+    support = _support(scene)
+    raised = tuple(support + height for height in BOARD_HEIGHTS) if support else ()
+    spacing = max(ReachabilitySettings().spacing, max(scene.board.size) / CELLS)
+    return ReachabilitySettings(
+        spacing=spacing,
+        heights=(*BOARD_HEIGHTS, *raised),
+        tilts_deg=(0.0, 45.0),
+        headings=(1, 6),
+        redundant=(2, 6),
+    )
+
+
+def _names(scene: Scene) -> tuple[str, ...]:
+    return (*scene.instances, *scene.background)
+
+
+def _corners(scene: Scene) -> Array:
+    """(2, 3) opposite corners of the board in S."""
+    return np.array([[0.0, 0.0, 0.0], [*scene.board.size, 0.0]])
+
+
+def _table(points: Array) -> Table:
+    """A table under points (N, 2)."""
+    lower, upper = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    x, y = np.round((lower + upper) / 2, 3).tolist()
+    width, depth = (np.ceil((upper - lower) * 100) / 100).tolist()
+    return Table(center=(x, y), size=(width, depth, 0.05))
+
+
+def _depth(a: Array, b: Array) -> float:
+    """How deep the bounding boxes of points (N, 3) and (M, 3) are in each other [m]; below 0 if
+    they are apart."""
+    return float(np.minimum(a.max(axis=0) - b.min(axis=0), b.max(axis=0) - a.min(axis=0)).min())

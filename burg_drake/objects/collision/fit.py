@@ -1,0 +1,214 @@
+"""How well convex parts, a primitive or another mesh stand for an object's surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from burg_drake.core import Array, MeshError
+from burg_drake.objects.library import Fit
+from burg_drake.objects.physics import sample_surface
+
+MOST_VOLUME = 1.25
+"""Volume of the convex pieces over that of the surface from which on they are called coarse."""
+
+MOST_DEVIATION = 0.05
+"""Hausdorff distance over the object's diagonal from which on the pieces are called coarse."""
+
+SAMPLES = 8000
+"""Points on each surface whose distance to the other counts, beside the vertices."""
+
+TARGETS = 20000
+"""Points that stand for a surface when the triangles near a point are looked for."""
+
+CANDIDATES = 12
+"""Samples around a point whose triangles are measured exactly."""
+
+BALL = 1e-3
+"""Radius of a ball that must touch a point of the union from outside for the point to count [m]:
+reduced parts leave gaps where they were cut from each other, and nothing larger gets in there."""
+
+RESOLUTION = 1e-7
+"""Distances are not told apart more finely than this [m]."""
+
+ROUND = 256
+"""Points measured exactly at a time, those that are the farthest by the samples first."""
+
+GROWTH = 1e-6
+"""Parts are grown by this before their union is taken [m]: parts that share a face have vertices
+rounded to 1e-7 m, and without it slits between them would count as surface."""
+
+
+def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volume: float) -> Fit:
+    """How well convex parts stand for a surface.
+
+    Args:
+        surface: of the object [m].
+        parts: convex, closed, wound outward; they may touch and overlap.
+        volume: inside the surface [m^3].
+
+    Raises:
+        MeshError: a part is not closed.
+    """
+    union = union_of(parts)
+    there = _farthest(_points(surface)[0], union)
+    points, normals = _points(union)
+    back = _farthest(points[_reached(points, normals, parts)], surface)
+    return Fit(volume_ratio=float(union.volume / volume), hausdorff=max(there, back))
+
+
+def coarseness(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
+    """How coarse convex pieces are: above 1, grasps are judged on another shape than the object's.
+
+    Args:
+        fit: of the pieces; None, of a surface that is not closed, is 0.
+        surface: of the object, or the diagonal of its bounding box [m].
+    """
+    if fit is None:
+        return 0.0
+    diagonal = surface if isinstance(surface, float) else float(np.linalg.norm(surface.extents))
+    return max(fit.volume_ratio / MOST_VOLUME, fit.hausdorff / (MOST_DEVIATION * diagonal))
+
+
+def coarse_note(fit: Fit | None, diagonal: float) -> str:
+    """What to say of coarse pieces; empty if they are not."""
+    if fit is None or coarseness(fit, diagonal) <= 1.0:
+        return ""
+    return (
+        f"the convex pieces are coarse: {describe_fit(fit)}; a lower decomposition.threshold"
+        " cuts finer"
+    )
+
+
+def describe_fit(fit: Fit) -> str:
+    """For people."""
+    return f"{fit.volume_ratio:.2f} times the volume, up to {1e3 * fit.hausdorff:.1f} mm off"
+
+
+def union_of(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """The boundary of the union of closed parts.
+
+    Raises:
+        MeshError: there are no parts, or one is not a closed manifold.
+    """
+    from manifold3d import Error, Manifold, Mesh64, OpType
+
+    if not parts:
+        raise MeshError("there are no parts to take the union of; give at least one")
+    solids = []
+    for i, part in enumerate(parts):
+        grown = np.asarray(part.vertices) + GROWTH * np.asarray(part.vertex_normals)
+        solid = Manifold(Mesh64(np.ascontiguousarray(grown), part.faces.astype(np.uint64)))
+        if solid.status() != Error.NoError:
+            raise MeshError(f"part {i} is not a closed surface ({solid.status().name})")
+        solids.append(solid)
+    mesh = Manifold.batch_boolean(solids, OpType.Add).to_mesh64()
+    faces = np.asarray(mesh.tri_verts).astype(np.int64)
+    return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], faces, process=False)
+
+
+def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
+    """Hausdorff distance of two surfaces [m]: of vertices and dense samples, both ways."""
+    return max(_farthest(_points(one)[0], other), _farthest(_points(other)[0], one))
+
+
+def _points(surface: trimesh.Trimesh) -> tuple[Array, Array]:
+    """Vertices and samples (N, 3) of a surface, and its normals there."""
+    points, normals = sample_surface(surface, SAMPLES)
+    used = np.unique(surface.faces)
+    return (
+        np.vstack([surface.vertices[used], points]),
+        np.vstack([surface.vertex_normals[used], normals]),
+    )
+
+
+def _reached(points: Array, normals: Array, parts: Sequence[trimesh.Trimesh]) -> NDArray[np.bool_]:
+    """Whether a ball on the outer side of points (N, 3) of the union is clear of all parts."""
+    centers = points + BALL * normals
+    clear = np.ones(len(points), dtype=bool)
+    owners = np.zeros(len(points), dtype=int)
+    for part in parts:
+        lower, upper = part.bounds
+        near = ((centers > lower - 2 * BALL) & (centers < upper + 2 * BALL)).all(axis=1)
+        near = np.flatnonzero(clear & near)
+        planes = np.asarray(part.face_normals)
+        offset = (planes * part.triangles[:, 0]).sum(axis=1)
+        own = (points[near] @ planes.T - offset).max(axis=1) <= 10.0 * GROWTH
+        # above a corner of its own part the ball's centre is lower than its radius over the faces,
+        # but what lies on two parts may be where a gap between them ends
+        lenient = own & (owners[near] == 0)
+        owners[near] += own
+        height = (centers[near] @ planes.T - offset).max(axis=1)
+        clear[near] = height > np.where(lenient, 0.0, BALL - 10.0 * GROWTH)
+    return clear
+
+
+def _farthest(points: Array, surface: trimesh.Trimesh) -> float:
+    """Largest distance of points (N, 3) to a surface [m].
+
+    The distance to the nearest sample is an upper bound of that to the surface, that to the
+    triangles of the nearest samples a better one, mostly exact. Points are looked at in the order
+    of these bounds, until they are below what was found.
+    """
+    samples, faces = _spread(surface)
+    tree = cKDTree(samples)
+    bound, _ = tree.query(points)
+    order = np.argsort(-bound, kind="stable")
+    triangles = np.asarray(surface.triangles)
+    middle = triangles.mean(axis=1)
+    reach = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
+    largest = 0.0
+    for start in range(0, len(order), ROUND):
+        some = points[order[start : start + ROUND]]
+        if bound[order[start]] <= largest + RESOLUTION:
+            break
+        _, near = tree.query(some, k=min(CANDIDATES, len(samples)))
+        nearer = _distances(some[:, None], triangles[faces[near]]).min(axis=1)
+        for i in np.argsort(-nearer, kind="stable"):
+            if nearer[i] <= largest + RESOLUTION:
+                break
+            possible = np.linalg.norm(middle - some[i], axis=1) - reach <= nearer[i] + 1e-12
+            exact = _distances(some[i][None], triangles[possible])
+            largest = max(largest, float(exact.min()))
+    return largest
+
+
+def _spread(surface: trimesh.Trimesh) -> tuple[Array, Array]:
+    """Samples (T, 3) over a surface, each triangle's centre among them, and their faces (T,)."""
+    triangles = np.asarray(surface.triangles)
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    edges = np.cumsum(np.linalg.norm(cross, axis=1))
+    at = (np.arange(TARGETS) + 0.5) / TARGETS * edges[-1]
+    face = np.minimum(np.searchsorted(edges, at), len(triangles) - 1)
+    uv = (np.arange(1, TARGETS + 1)[:, None] * (0.7548776662466927, 0.5698402909980532)) % 1.0
+    uv = np.where(uv.sum(axis=1, keepdims=True) > 1.0, 1.0 - uv, uv)
+    t = triangles[face]
+    points = t[:, 0] + uv[:, :1] * (t[:, 1] - t[:, 0]) + uv[:, 1:] * (t[:, 2] - t[:, 0])
+    middle = triangles.mean(axis=1)
+    return np.vstack([points, middle]), np.concatenate([face, np.arange(len(triangles))])
+
+
+def _distances(points: Array, triangles: Array) -> Array:
+    """Distances [m] of points (..., 1, 3) to triangles (..., K, 3, 3), as (..., K)."""
+    a, b, c = triangles[..., 0, :], triangles[..., 1, :], triangles[..., 2, :]
+    squared = np.minimum.reduce([_to_segment(points, p, q) for p, q in ((a, b), (b, c), (c, a))])
+    normal = np.cross(b - a, c - a)
+    length = np.sqrt((normal * normal).sum(axis=-1))
+    inside = length > 0.0
+    for p, q in ((a, b), (b, c), (c, a)):
+        inside &= (np.cross(q - p, points - p) * normal).sum(axis=-1) >= 0.0
+    height = ((points - a) * normal).sum(axis=-1) / np.where(length > 0.0, length, 1.0)
+    return np.where(inside, np.abs(height), np.sqrt(squared))
+
+
+def _to_segment(points: Array, start: Array, end: Array) -> Array:
+    """Squared distances of points to segments."""
+    along = end - start
+    square = np.maximum((along * along).sum(axis=-1), 1e-300)
+    at = np.clip(((points - start) * along).sum(axis=-1) / square, 0.0, 1.0)
+    apart = points - start - at[..., None] * along
+    return (apart * apart).sum(axis=-1)

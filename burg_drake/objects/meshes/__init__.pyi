@@ -1,0 +1,16 @@
+from .cleaning import signed_volume as signed_volume
+from .offset import (
+    folded as folded,
+    offsets as offsets,
+)
+from .solids import decimated as decimated
+from .surface import (
+    FORMATS as FORMATS,
+    UNITS as UNITS,
+    Preparation as Preparation,
+    SurfaceMesh as SurfaceMesh,
+    load_mesh as load_mesh,
+    mesh_hash as mesh_hash,
+    texture_image as texture_image,
+    unit_scale as unit_scale,
+)

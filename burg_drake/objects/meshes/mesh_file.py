@@ -1,0 +1,241 @@
+"""Mesh files: read as one mesh in the file's own unit, with a content hash and its look."""
+
+from __future__ import annotations
+
+import logging
+import os
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import trimesh
+
+from burg_drake.core import MeshError, content_hash
+from burg_drake.core.files import without_warnings
+from burg_drake.objects.library import face_palette
+from burg_drake.objects.meshes.size_limits import (
+    IMAGES,
+    STL_HEADER,
+    STL_TRIANGLE,
+    announced_triangles,
+    check_bytes,
+    check_textures,
+    check_triangles,
+)
+
+FORMATS = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
+
+NO_COLOUR = (204, 204, 204, 255)
+"""Colour of parts without one, beside parts that have one."""
+
+REFERRING = (".obj", ".gltf")
+"""Mesh formats that refer to other files, such as materials and textures."""
+
+TEXT_ONLY = (".obj", ".off")
+"""Mesh formats that have no binary form here."""
+
+NEITHER = "its contents are neither text nor a known binary form"
+
+REFERRED = (".mtl", ".bin", *IMAGES)
+"""What they refer to."""
+
+
+def mesh_name(mesh: str | Path | trimesh.Trimesh) -> str:
+    """How messages call a mesh."""
+    return "mesh in memory" if isinstance(mesh, trimesh.Trimesh) else str(mesh)
+
+
+def mesh_hash(mesh: str | Path | trimesh.Trimesh) -> str:
+    """Content hash of a mesh in memory, or of a file and the textures beside it.
+
+    Raises:
+        MeshError: the file cannot be read.
+    """
+    if isinstance(mesh, trimesh.Trimesh):
+        image = texture_image(mesh)
+        look: list[Any] = [face_palette(mesh), source_rgba(mesh)]
+        if image is not None:
+            look += [np.asarray(mesh.visual.uv), np.asarray(image)]
+        return content_hash(np.asarray(mesh.vertices), np.asarray(mesh.faces), look)
+    path = Path(mesh)
+    _check_file(path)
+    try:
+        return content_hash(path, *((p.name, p) for p in _companions(path)))
+    except OSError as error:
+        raise MeshError(f"{path}: cannot read the mesh: {error.strerror or error}") from error
+
+
+def texture_image(mesh: trimesh.Trimesh):  # type: ignore[no-untyped-def]
+    """The colour image (PIL) of a textured mesh, or None."""
+    visual = mesh.visual
+    if visual.kind != "texture" or visual.uv is None or len(visual.uv) != len(mesh.vertices):
+        return None
+    material = visual.material
+    return getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
+
+
+def source_rgba(mesh: trimesh.Trimesh) -> tuple[float, float, float, float] | None:
+    """Main colour of a coloured mesh without a texture (mean over faces or vertices), or None."""
+    visual = mesh.visual
+    if visual is None or not visual.defined:
+        return None
+    if visual.kind == "texture":
+        colour = getattr(visual.material, "main_color", None)
+    else:
+        colour = np.asarray(visual.face_colors, dtype=float).mean(axis=0)
+    if colour is None:
+        return None
+    r, g, b, a = (np.round(np.asarray(colour, dtype=float) / 255.0, 4)).tolist()
+    return r, g, b, a
+
+
+def make_opaque(mesh: trimesh.Trimesh) -> float | None:
+    """Takes the alpha out of the colours of a mesh, in place; images have none where they are used.
+
+    Exporters leave an alpha in colours that is not meant to be seen: glTF ignores that of materials
+    that do not blend, and scanners fill that of vertices with anything. What is to be seen through
+    is told by the source's `rgba`.
+
+    Returns:
+        The lowest alpha that was taken out, 0 to 1; None if the mesh was opaque.
+    """
+    visual = mesh.visual
+    if visual is None or not visual.defined or texture_image(mesh) is not None:
+        return None
+    if visual.kind == "texture":
+        name = "baseColorFactor" if hasattr(visual.material, "baseColorFactor") else "diffuse"
+        colours = getattr(visual.material, name, None)
+        holder: Any = visual.material
+    else:
+        name, holder = f"{visual.kind}_colors", visual
+        colours = getattr(visual, name)
+    if colours is None or np.shape(colours)[-1] < 4:
+        return None
+    opaque = np.array(colours)
+    lowest = float(opaque[..., 3].min()) / 255.0
+    if lowest == 1.0:
+        return None
+    opaque[..., 3] = 255
+    setattr(holder, name, opaque)
+    return lowest
+
+
+def _companions(path: Path) -> list[Path]:
+    """Files in the mesh's folder, or in a folder in it, that its text names, and that those name in
+    turn."""
+    if path.suffix.lower() not in REFERRING:
+        return []
+    folder = path.parent
+    files = (*folder.glob("*"), *folder.glob("*/*"))
+    beside = sorted(p for p in files if p.suffix.lower() in REFERRED and p.is_file())
+    found: list[Path] = []
+    queue = [path]
+    while queue:
+        text = queue.pop().read_bytes()
+        named = [p for p in beside if p.name.encode() in text or quote(p.name).encode() in text]
+        fresh = [p for p in named if p not in found]
+        for file in fresh:
+            check_bytes(file)
+        found += fresh
+        queue += [p for p in fresh if p.suffix.lower() == ".mtl"]
+    return sorted(found)
+
+
+def _check_file(path: Path) -> None:
+    name = os.fsencode(path)
+    if name.decode(errors="replace") != str(path):  # its readers could not be told the name
+        shown = name.decode(errors="backslashreplace")
+        raise MeshError(f"{shown}: the name is not UTF-8; rename the file, or the folder it is in")
+    if path.is_symlink() and not path.exists():
+        raise MeshError(f"{path}: a link to a file that does not exist, or to itself")
+    if not path.is_file():
+        raise MeshError(f"{path}: the mesh file does not exist")
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(
+            f"{path}: {path.suffix} is not one of {', '.join(FORMATS)}"
+            if path.suffix
+            else f"{path}: the name has no suffix; those of meshes are {', '.join(FORMATS)}"
+        )
+    if path.stat().st_size == 0:
+        raise MeshError(f"{path}: the mesh file is empty")
+    check_bytes(path)
+
+
+def read_mesh(path: Path) -> trimesh.Trimesh:
+    """The triangles of a file; a scene of several bodies becomes one mesh.
+
+    Raises:
+        MeshError: file missing, unreadable, without triangles, or too large (`mesh_bounds`).
+    """
+    _check_file(path)
+    check_triangles(announced_triangles(path), str(path))
+    check_textures(path, _companions(path))
+    log = logging.getLogger("trimesh")
+    if not log.handlers:  # or remarks on materials would go to standard error
+        log.addHandler(logging.NullHandler())
+    try:
+        with without_warnings():  # of numbers that overflow
+            scene = trimesh.load_scene(path, process=False)
+        parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
+        mesh = _joined(parts) if parts else None
+    except Exception as error:  # the readers raise whatever their parsing stumbles over
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
+            reason = [NEITHER]
+        raise _unreadable(path, _missing_bytes(path) or reason[0]) from error
+    if mesh is None:
+        # Where a package that guesses encodings is installed, trimesh takes any bytes for a text.
+        damage = _missing_bytes(path) or _not_text(path)
+        if damage:
+            raise _unreadable(path, damage)
+        raise MeshError(f"{path}: the mesh file has no triangles")
+    return mesh
+
+
+def _unreadable(path: Path, reason: str) -> MeshError:
+    return MeshError(f"{path}: not a readable {path.suffix} mesh (cut off or damaged?): {reason}")
+
+
+def _not_text(path: Path) -> str:
+    """What is wrong with a file of a text format that holds something else, or nothing."""
+    binary = path.suffix.lower() in TEXT_ONLY and b"\0" in path.read_bytes()
+    return NEITHER if binary else ""
+
+
+def _missing_bytes(path: Path) -> str:
+    """What a binary STL file lacks by the number of triangles that it announces, or nothing."""
+    size = path.stat().st_size
+    if path.suffix.lower() != ".stl" or size < STL_HEADER:
+        return ""
+    with path.open("rb") as file:
+        count = int.from_bytes(file.read(STL_HEADER)[-4:], "little")
+    whole = STL_HEADER + STL_TRIANGLE * count
+    return f"it has {size} of {whole} bytes" if size < whole else ""
+
+
+def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """One mesh of several: textures are packed into one, and where there is a part without a
+    texture, each part gets its main colour."""
+    if len(parts) == 1:
+        return parts[0]
+    if any(texture_image(part) is None for part in parts):
+        colours = [_main_colour(part) for part in parts]
+        if any(colour is not None for colour in colours):
+            for part, colour in zip(parts, colours, strict=True):
+                visual = trimesh.visual.ColorVisuals(part)
+                visual.face_colors = NO_COLOUR if colour is None else colour
+                part.visual = visual
+    return trimesh.util.concatenate(parts)
+
+
+def _main_colour(part: trimesh.Trimesh) -> Any:
+    """(4,) or (F, 4) colours of a mesh as bytes, or None."""
+    if not part.visual.defined:
+        return None
+    if part.visual.kind != "texture":
+        return part.visual.face_colors
+    image = texture_image(part)
+    if image is not None:
+        return np.append(np.asarray(image.convert("RGB")).mean(axis=(0, 1)), 255).astype(np.uint8)
+    return part.visual.material.main_color

@@ -1,0 +1,236 @@
+"""Meshes from files or memory: loaded, scaled to metres, checked, repaired and closed.
+
+Every change is one sentence in `SurfaceMesh.repairs`; what cannot be used is one `MeshError`. glTF
+files are y-up by their specification and are turned to z-up (x, y, z) -> (x, -z, y), as Drake and
+the usual modelling tools do; the frames of all other formats are kept as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial import QhullError
+
+from burg_drake.core import Array, MeshError, make_pose
+from burg_drake.geometry import convex_hull
+from burg_drake.objects.library import face_palette
+from burg_drake.objects.meshes.cleaning import Repaired, repair, signed_volume
+from burg_drake.objects.meshes.mesh_file import (
+    FORMATS,
+    make_opaque,
+    mesh_hash,
+    mesh_name,
+    read_mesh,
+    source_rgba,
+    texture_image,
+)
+from burg_drake.objects.meshes.openings import Openings, close_openings
+from burg_drake.objects.meshes.overlap import SELF_OVERLAP, self_overlap
+from burg_drake.objects.meshes.size_limits import check_triangles
+from burg_drake.objects.meshes.solids import decimated, is_closed, united
+from burg_drake.objects.meshes.units import UNITS, check_extent, unit_scale
+
+__all__ = [
+    "FORMATS",
+    "UNITS",
+    "Preparation",
+    "SurfaceMesh",
+    "load_mesh",
+    "mesh_hash",
+    "mesh_name",
+    "source_rgba",
+    "texture_image",
+    "unit_scale",
+]
+
+FLAT = 1e-6
+"""A mesh is flat when its hull's volume, or the volume that its closed surface encloses, is below
+this share of its largest extent cubed (a sheet of paper has 5e-4)."""
+
+R_ZUP_YUP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Turns glTF's y-up to z-up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preparation:
+    """What becomes of a surface that is open or very fine.
+
+    Attributes:
+        wall_thickness: of the wall that an open surface becomes [m]; if None 2 mm, or 2 % of the
+            mesh's diagonal where that is less. Only with a thickness given, a perfectly flat
+            surface becomes a wall as well.
+        openings: what becomes of a surface whose openings are too wide to be small holes: a `wall`
+            centred on it (a towel, a bowl that is a single sheet), or the solid that flat caps over
+            its openings make (`close`: a scan that lacks its underside).
+        max_faces: closed surfaces with more faces are decimated, as contact, mass and resting poses
+            gain nothing from them; scans with the usual 16 thousand stay as they are. A wall may
+            have twice as many, for its two sides.
+    """
+
+    wall_thickness: float | None = None
+    openings: Openings = "wall"
+    max_faces: int = 20_000
+
+    def __post_init__(self) -> None:
+        thickness = self.wall_thickness
+        if thickness is not None and not 0.0 < thickness < float("inf"):
+            raise MeshError(f"wall_thickness is {thickness:g} m; it must be above 0")
+        if self.openings not in ("wall", "close"):
+            raise MeshError(f"openings is {self.openings!r}; it must be 'wall' or 'close'")
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMesh:
+    """A checked surface in metres, in the object frame O.
+
+    Attributes:
+        surface: geometry for physics: vertices merged, winding outward.
+        visual: geometry for display: the surface, or where the source has a texture or a few face
+            colours the given triangles with these (neither thickened nor decimated).
+        repairs: what was changed, one sentence each.
+        closed: whether the surface is watertight with consistent winding.
+        rgba: main colour of the source, if it has one and neither texture nor a few face colours.
+        wall: thickness of the wall that an open surface became [m]; None for others.
+    """
+
+    surface: trimesh.Trimesh
+    visual: trimesh.Trimesh
+    repairs: tuple[str, ...]
+    closed: bool
+    rgba: tuple[float, float, float, float] | None = None
+    wall: float | None = None
+
+
+def load_mesh(
+    mesh: str | Path | trimesh.Trimesh,
+    scale: float = 1.0,
+    preparation: Preparation = Preparation(),
+) -> SurfaceMesh:
+    """Loads, checks and repairs a mesh.
+
+    Args:
+        mesh: file (one of `FORMATS`; a scene of several bodies becomes one mesh), or a mesh in
+            memory.
+        scale: factor from the mesh's unit to metres, such as `unit_scale("mm")`.
+        preparation: what becomes of an open or very fine surface.
+
+    Raises:
+        MeshError: file missing or unreadable, no faces, NaN vertices, flat, or a size that tells
+            of a wrong unit.
+    """
+    name = mesh_name(mesh)
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise MeshError(f"{name}: scale is {scale:g}; give the unit in metres, such as 0.001")
+    sentences: list[str] = []
+    if isinstance(mesh, trimesh.Trimesh):
+        raw = mesh.copy()
+    else:
+        raw = read_mesh(Path(mesh))
+        if Path(mesh).suffix.lower() in (".glb", ".gltf"):
+            raw.apply_transform(make_pose(R_ZUP_YUP))
+            sentences.append("turned from glTF's y-up to z-up")
+    _check_numbers(raw, name)
+    if (alpha := make_opaque(raw)) is not None:
+        sentences.append(
+            f"colours made opaque, some had an alpha of {alpha:.2g};"
+            " rgba in an objects.yaml makes an object translucent"
+        )
+    if scale != 1.0:
+        raw.apply_scale(scale)
+        sentences.append(f"scaled by {scale:g}")
+    check_extent(float(np.ptp(raw.vertices[raw.faces].reshape(-1, 3), axis=0).max()), name, scale)
+    repaired, wall = _solid(raw, name, preparation)
+    surface = repaired.mesh
+    pictured = texture_image(raw) is not None or face_palette(raw) is not None
+    if pictured and repaired.inverted:
+        raw.invert()
+    return SurfaceMesh(
+        surface,
+        raw if pictured else surface,
+        (*sentences, *repaired.sentences),
+        is_closed(surface),
+        None if pictured else source_rgba(raw),
+        wall,
+    )
+
+
+def _solid(
+    raw: trimesh.Trimesh, name: str, preparation: Preparation
+) -> tuple[Repaired, float | None]:
+    """The repaired and closed surface, and the thickness of the wall that it became, if any."""
+    check_triangles(len(raw.faces), name)
+    repaired = repair(raw)
+    if preparation.openings == "wall" and not is_closed(repaired.mesh):
+        check_triangles(len(repaired.mesh.faces), name, wall=True)
+    if preparation.wall_thickness is None or not len(repaired.mesh.faces):
+        _check_hull(repaired.mesh, name)
+    wall = close_openings(repaired, preparation.openings, preparation.wall_thickness)
+    surface = repaired.mesh
+    _check_hull(surface, name)
+    if not is_closed(surface):
+        return repaired, wall
+    if abs(signed_volume(surface)) <= FLAT * surface.extents.max() ** 3:
+        raise MeshError(
+            f"{name}: the closed surface encloses no volume (a sheet without thickness?);"
+            " give one side of it as an open surface, which becomes a wall"
+        )
+    surface, joined = united(surface)
+    surface, coarser = decimated(surface, preparation.max_faces * (1 if wall is None else 2))
+    repaired.mesh = surface
+    repaired.sentences += joined + coarser
+    twice = self_overlap(surface)
+    if twice > SELF_OVERLAP:
+        repaired.sentences.append(
+            f"passes through itself: about {100.0 * twice:.2g} % of its inside counts twice or is"
+            " inside out; its mass properties are that much in doubt"
+        )
+    return repaired, wall
+
+
+def _check_numbers(mesh: trimesh.Trimesh, name: str) -> None:
+    faces, count = np.asarray(mesh.faces), len(mesh.vertices)
+    if len(faces) == 0:
+        raise MeshError(f"{name}: the mesh has no triangles")
+    wrong = np.nonzero(((faces < 0) | (faces >= count)).any(axis=1))[0]
+    if len(wrong):
+        raise MeshError(
+            f"{name}: {len(wrong)} of {len(faces)} triangles refer to vertices that do not exist,"
+            f" such as {faces[wrong[0]].tolist()} of {count} vertices (counted from 0)"
+        )
+    bad = int((~np.isfinite(mesh.vertices)).any(axis=1).sum())
+    if bad:
+        raise MeshError(f"{name}: {bad} of {len(mesh.vertices)} vertices are NaN or infinite")
+
+
+def _check_hull(surface: trimesh.Trimesh, name: str) -> None:
+    extent = surface.extents if len(surface.faces) else np.zeros(3)
+    limit = FLAT * extent.max() ** 3
+    points = np.asarray(surface.vertices)
+    # the few points farthest out tell most often, and at once
+    if _hull_volume(_extremes(points)) <= limit and _hull_volume(points) <= limit:
+        size = " x ".join(f"{1000 * e:.3g}" for e in extent)
+        cure = "wall_thickness (--wall-thickness) makes a wall of it"
+        if is_closed(surface):
+            cure = "give one of its two sides as an open surface, with wall_thickness"
+        raise MeshError(f"{name}: the mesh is flat ({size} mm); an object needs a volume: {cure}")
+
+
+def _extremes(points: Array) -> Array:
+    """The points (N, 3) that are farthest along the principal axes and the axes of O."""
+    if not len(points):
+        return points
+    centred = points - points.mean(axis=0)
+    axes = np.vstack([np.linalg.eigh(centred.T @ centred)[1].T, np.eye(3)])
+    along = centred @ axes.T
+    return np.asarray(points[np.unique([along.argmin(axis=0), along.argmax(axis=0)])])
+
+
+def _hull_volume(points: Array) -> float:
+    """Volume of the convex hull of points (N, 3) [m^3]; 0 if they lie in a plane."""
+    try:
+        return float(convex_hull(points).volume) if len(points) else 0.0
+    except QhullError:
+        return 0.0

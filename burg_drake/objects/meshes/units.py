@@ -1,0 +1,72 @@
+"""Units that meshes come in, and the hint at the right one when a size tells of a wrong one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from burg_drake.core import MeshError, UnknownNameError, nearest
+
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+"""Units that meshes come in [m]."""
+
+MAX_EXTENT = 2.5
+"""Largest plausible extent of a thing on a table [m]; above it the unit is taken to be wrong."""
+
+MIN_EXTENT = 1e-3
+"""Smallest plausible largest extent [m]."""
+
+USUAL_EXTENT = (0.01, 1.0)
+"""Largest extents of nearly all things on a table [m], to tell a mesh's unit by."""
+
+
+def unit_scale(name: str) -> float:
+    """Factor from a unit to metres.
+
+    Args:
+        name: a key of `UNITS`, such as `mm`.
+
+    Raises:
+        UnknownNameError: there is no such unit; the message lists them.
+    """
+    if name not in UNITS:
+        raise UnknownNameError(f"unit {name!r} is not known; {nearest(name, UNITS)}")
+    return UNITS[name]
+
+
+def length(metres: float) -> str:
+    """A length as messages write it: in millimetres, and in metres above one."""
+    return f"{metres:.4g} m" if metres > 1.0 else f"{1000.0 * metres:.4g} mm"
+
+
+def check_extent(extent: float, name: str, scale: float) -> None:
+    """Checks a size.
+
+    Args:
+        extent: largest extent, scaled [m].
+        name: how messages call the mesh.
+        scale: that it was scaled by.
+
+    Raises:
+        MeshError: the size tells of a wrong unit; the message says which ones would do.
+    """
+    if extent == 0.0:
+        raise MeshError(f"{name}: all vertices are at one point")
+    if not MIN_EXTENT <= extent <= MAX_EXTENT:
+        raise MeshError(
+            f"{name}: largest extent is {length(extent)}, but lengths are in metres;"
+            f" {_hint(extent / scale)}"
+        )
+
+
+def _hint(extent: float) -> str:
+    """Which units would make something of a mesh with this largest extent in its own unit."""
+    fits: dict[str, float] = {}
+    for low, high in (USUAL_EXTENT, (MIN_EXTENT, MAX_EXTENT)):
+        fits = fits or {u: s for u, s in UNITS.items() if low <= s * extent <= high}
+    if not fits:
+        scale = 10.0 ** (-1.0 - np.ceil(np.log10(extent)))  # 10 to 100 mm
+        return f"try scale={scale:g} (--scale {scale:g})"
+    return "try " + " or ".join(
+        f"--unit {unit} (scale={scale:g} makes it {length(scale * extent)})"
+        for unit, scale in fits.items()
+    )

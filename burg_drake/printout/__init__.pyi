@@ -1,0 +1,20 @@
+from . import page_frame as page_frame
+from .board_printout import (
+    Printout as Printout,
+    PrintSettings as PrintSettings,
+    print_board as print_board,
+)
+from .outlines import cell_outlines as cell_outlines
+from .paper import (
+    PAPERS as PAPERS,
+    Paper as Paper,
+    orientations as orientations,
+)
+from .pen import (
+    BLACK as BLACK,
+    BOLD as BOLD,
+    INK as INK,
+    POINT as POINT,
+    Pen as Pen,
+    rectangle as rectangle,
+)

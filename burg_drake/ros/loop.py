@@ -1,0 +1,98 @@
+"""The node's loop: the latest image, what it says, and lines about how it goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from burg_drake.ros.board_node import BoardNode, Sighting
+from burg_drake.ros.link import Link
+
+PATIENCE = 0.5
+"""How long one look for an image may take [s]; Ctrl-C may wait for it."""
+HINT_AFTER = 5.0
+"""Without images for so long, a line says what may be the matter [s]."""
+REASON_AFTER, REASON_EVERY = 0.5, 5.0
+"""Why there is no pose is told once it has been so for this long, and at most so often [s]. While a
+camera changes its resolution, images and camera_info disagree for a moment."""
+RATE_EVERY = 30.0
+"""How often the rate is told [s]."""
+
+
+class StatusLog:
+    """Decides what is worth a line in the log."""
+
+    def __init__(self, now: float) -> None:
+        """
+        Args:
+            now: time on any clock [s].
+        """
+        self._last_image = now
+        self._hinted = False
+        self._reason: str | None = None
+        self._reason_since = now
+        self._told: str | None = None
+        self._told_at = now - REASON_EVERY
+        self._since = now
+        self._images = self._poses = 0
+
+    def looked(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
+        """After an image: a line and whether it is a warning, or None."""
+        self._last_image, self._hinted = now, False
+        self._images += 1
+        self._poses += sighting.estimate.valid
+        reason = "" if sighting.estimate.valid else sighting.estimate.reason
+        if reason != self._reason:
+            self._reason, self._reason_since = reason, now
+        if reason == self._told:
+            return None
+        if not reason:
+            self._told = reason
+            return f"the board is in sight: {sighting.status}", False
+        if now - self._reason_since < REASON_AFTER or now - self._told_at < REASON_EVERY:
+            return None
+        self._told, self._told_at = reason, now
+        return sighting.status, True
+
+    def waited(self, publishers: Mapping[str, int], now: float) -> str | None:
+        """Without an image: a warning, once."""
+        if self._hinted or now - self._last_image < HINT_AFTER:
+            return None
+        self._hinted = True
+        silent = [topic for topic, count in publishers.items() if not count]
+        if silent:
+            return f"nobody publishes {' and '.join(silent)}; is the camera running? Still waiting"
+        return f"no images on {next(iter(publishers))}, though it is published; still waiting"
+
+    def rate(self, now: float) -> str | None:
+        """Now and then: how many images a second, and how many with a pose."""
+        elapsed = now - self._since
+        if elapsed < RATE_EVERY or not self._images:
+            return None
+        line = (
+            f"{self._images / elapsed:.1f} images a second,"
+            f" {100.0 * self._poses / self._images:.0f} % with a pose"
+        )
+        self._since, self._images, self._poses = now, 0, 0
+        return line
+
+
+def serve(link: Link, node: BoardNode) -> None:
+    """Answers every image until ROS or Ctrl-C ends it. While one is being worked at, newer ones
+    replace each other: the latest is next."""
+    account = StatusLog(time.monotonic())
+    while link.running():
+        image = link.next_image(PATIENCE)
+        if image is None:
+            hint = account.waited(link.publishers(), time.monotonic())
+            if hint:
+                link.say(hint, warning=True)
+            continue
+        sighting = node.look(image, link.camera_info)
+        link.publications.publish(sighting, node.draw)
+        news = account.looked(sighting, time.monotonic())
+        if news:
+            link.say(news[0], warning=news[1])
+        rate = account.rate(time.monotonic())
+        if rate:
+            link.say(rate)

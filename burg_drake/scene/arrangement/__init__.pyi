@@ -1,0 +1,22 @@
+from .arranging import (
+    arrange as arrange,
+    choose as choose,
+)
+from .heap import Heap as Heap
+from .object_shapes import ObjectShapes as ObjectShapes
+from .occupancy import (
+    ObjectRequest as ObjectRequest,
+    OccupiedBoard as OccupiedBoard,
+)
+from .polygons import (
+    area as area,
+    convex_polygon as convex_polygon,
+    distances as distances,
+    no_fit_polygon as no_fit_polygon,
+    without_short_sides as without_short_sides,
+)
+from .sweep import (
+    ConvexShapes as ConvexShapes,
+    Indices as Indices,
+    contact_distances as contact_distances,
+)

@@ -1,0 +1,39 @@
+from .board import Board as Board
+from .files import scene_references as scene_references
+from .layout import (
+    LAYOUTS as LAYOUTS,
+    TRIES as TRIES,
+    Layout as Layout,
+    PoseChoice as PoseChoice,
+)
+from .markers import (
+    EDGE as EDGE,
+    MarkerLayout as MarkerLayout,
+    Markers as Markers,
+    marker_dictionary as marker_dictionary,
+)
+from .origin import (
+    Ingredients as Ingredients,
+    SceneOrigin as SceneOrigin,
+)
+from .recipe import SceneRecipe as SceneRecipe
+from .scene import (
+    Instance as Instance,
+    Scene as Scene,
+    SceneDocument as SceneDocument,
+    load_scene as load_scene,
+    save_scene as save_scene,
+)
+from .validation import (
+    IN_BOUNDS_TOLERANCE as IN_BOUNDS_TOLERANCE,
+    SINK_TOLERANCE as SINK_TOLERANCE,
+    TOUCH_TOLERANCE as TOUCH_TOLERANCE,
+    Extent as Extent,
+    SceneIssue as SceneIssue,
+    length_text as length_text,
+    placed_vertices as placed_vertices,
+    read_vertices as read_vertices,
+    require_sound as require_sound,
+    surface_vertices as surface_vertices,
+    validate_scene as validate_scene,
+)

@@ -1,0 +1,41 @@
+"""The printed board: its size, and the markers on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from burg_drake.core import InvalidInputError
+from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_layout
+
+LARGEST = 100.0
+"""Side of a board [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Board:
+    """The printed board; the scene frame S has its origin in the board's corner.
+
+    Attributes:
+        size: extents along x and y [m]; A2 landscape by default.
+        markers: ArUco markers printed on it.
+    """
+
+    size: tuple[float, float] = (0.594, 0.420)
+    markers: Markers = Markers()
+
+    def __post_init__(self) -> None:
+        if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
+            raise InvalidInputError(
+                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m;"
+                " A2 is [0.594, 0.42]"
+            )
+
+    @cached_property
+    def layout(self) -> MarkerLayout:
+        """Where its markers lie; see `scene.markers.marker_layout`.
+
+        Raises:
+            InvalidInputError: they do not fit.
+        """
+        return marker_layout(self.size, self.markers)

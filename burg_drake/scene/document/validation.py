@@ -1,0 +1,221 @@
+"""Whether a scene can be built as its document says: bounds of the board, contact with the ground.
+
+Only geometry is looked at here. Overlaps of bodies depend on the contact geometry that the station
+diagram holds; `station.check` finds those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.document.scene import Scene
+
+IN_BOUNDS_TOLERANCE = 1e-4
+"""How far an object may stick out over the board's edge [m]: rounding of documents."""
+TOUCH_TOLERANCE = 1e-3
+"""How deep an object may start in another one [m]: it settles within a step."""
+SINK_TOLERANCE = 2.5e-3
+"""How deep an object may be in table, ground or a box of the station [m]: they yield in simulation,
+and what stands on an edge or a tip, as a toy airplane of 570 g on its wing, sinks in by up to 2
+mm."""
+HOVER_TOLERANCE = 1e-3
+"""How far an object may start above the board [m] before that is worth a word: trials count its
+fall among what was moved."""
+SUPPORT_TOLERANCE = 5e-3
+"""How far an object may start above another one that it may rest on [m]; only bounds are looked
+at."""
+MILLIMETRES_SUSPECTED = 5.0
+"""A coordinate on a table of this size [m] or more was probably meant in millimetres."""
+
+IssueKind = Literal["out_of_bounds", "in_ground", "hovering", "overlap"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneIssue:
+    """Something about a scene that its author should know.
+
+    Attributes:
+        instance: name of the instance it is about.
+        kind: what is wrong. `hovering` is a warning, all else are errors.
+        amount: how far beyond, below, above or into something [m].
+        message: one clear line.
+        other: what it overlaps: another instance, the table, or a body of the station.
+    """
+
+    instance: str
+    kind: IssueKind
+    amount: float
+    message: str
+    other: str = ""
+
+    @property
+    def is_error(self) -> bool:
+        """Grasps of this scene would be judged in a world other than the document's."""
+        return self.kind != "hovering"
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The box around a placed object, along the axes of the board.
+
+    Attributes:
+        low, high: (3,) its corners in the scene frame [m].
+    """
+
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, p_SV: Array) -> Extent:
+        """The box around points (N, 3)."""
+        return cls(p_SV.min(axis=0), p_SV.max(axis=0))
+
+
+def validate_scene(
+    scene: Scene, extents: Mapping[str, Extent] | None = None
+) -> tuple[SceneIssue, ...]:
+    """Checks where the instances of a scene stand on the board.
+
+    Args:
+        scene: the scene; fixed background objects may stand anywhere.
+        extents: of all instances, background included, if they are known; read from the library's
+            meshes otherwise.
+
+    Returns:
+        What was found, in the order of the document; nothing if all is well.
+    """
+    if extents is None:
+        names = (*scene.instances, *scene.background)
+        extents = {name: Extent.of(placed_vertices(scene, name)) for name in names}
+    issues: list[SceneIssue] = []
+    for name in scene.instances:
+        others = [extent for other, extent in extents.items() if other != name]
+        found = (
+            _bounds_issue(scene, name, extents[name]),
+            _ground_issue(scene, name, extents[name], others),
+        )
+        issues += [issue for issue in found if issue is not None]
+    return tuple(issues)
+
+
+def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
+    """Refuses a scene with errors; warnings pass.
+
+    Raises:
+        InvalidInputError: one line with the first error and the number of further ones.
+    """
+    errors = [issue for issue in issues if issue.is_error]
+    if errors:
+        more = len(errors) - 1
+        rest = f" (and {more} more; burg-drake scene validate lists all)" if more else ""
+        raise InvalidInputError(f"{scene.path}: {errors[0].message}{rest}")
+
+
+def placed_vertices(scene: Scene, instance: str) -> Array:
+    """(N, 3) vertices of an instance's surface in the scene frame [m]."""
+    p_OV = surface_vertices(scene.library, scene.instance(instance).object)
+    return transform_points(scene.X_SO(instance), p_OV)
+
+
+def surface_vertices(library: ObjectLibrary, name: str) -> Array:
+    """(N, 3) vertices of an object's surface in the object frame [m].
+
+    Raises:
+        UnknownNameError: there is no such object, or its mesh file is missing.
+        MeshError: the mesh file is damaged.
+    """
+    entry = library.entry(name)
+    mesh = library.path(entry.surface or entry.mesh)
+    try:
+        return read_vertices(mesh)
+    except (OSError, ValueError) as error:
+        raise library.damaged(mesh) from error
+
+
+def read_vertices(mesh: Path) -> Array:
+    """(N, 3) vertices of an .obj file as a library holds it.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or holds no vertices.
+    """
+    rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
+    p_OV = np.array(rows, dtype=float).reshape(-1, 3)
+    if not len(p_OV) or not np.isfinite(p_OV).all():
+        raise ValueError(f"{mesh} has no vertices that are numbers")
+    return p_OV
+
+
+def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
+    size = scene.board.size
+    lower, upper = extent.low, extent.high
+    beyond = {
+        "left": float(-lower[0]),
+        "right": float(upper[0] - size[0]),
+        "lower": float(-lower[1]),
+        "upper": float(upper[1] - size[1]),
+    }
+    sides = sorted((s for s in beyond if beyond[s] > IN_BOUNDS_TOLERANCE), key=lambda s: -beyond[s])
+    if not sides:
+        return None
+    where = " and ".join(f"{length_text(beyond[s])} over the {s} edge" for s in sides)
+    board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
+    hint = ""
+    if np.abs(scene.instance(name).X_SO.translation).max() >= MILLIMETRES_SUSPECTED:
+        hint = "; translations are in metres"
+    return SceneIssue(
+        instance=name,
+        kind="out_of_bounds",
+        amount=beyond[sides[0]],
+        message=f"{name!r} is out of bounds: {where} of the board ({board}){hint}",
+    )
+
+
+def _ground_issue(
+    scene: Scene, name: str, extent: Extent, others: Iterable[Extent]
+) -> SceneIssue | None:
+    lowest = float(extent.low[2])
+    if lowest < -SINK_TOLERANCE - _contact_error(scene, name):
+        height = round(scene.instance(name).X_SO.translation[2] - lowest, 4) + 0.0
+        return SceneIssue(
+            instance=name,
+            kind="in_ground",
+            amount=-lowest,
+            message=f"{name!r} is in the ground: it reaches {length_text(-lowest)} below the board;"
+            f" z = {height:.4f} would put it on top",
+        )
+    if lowest > HOVER_TOLERANCE and not any(_may_support(other, extent) for other in others):
+        return SceneIssue(
+            instance=name,
+            kind="hovering",
+            amount=lowest,
+            message=f"{name!r} hovers {length_text(lowest)} above the board;"
+            " it will fall when simulated",
+        )
+    return None
+
+
+def _contact_error(scene: Scene, name: str) -> float:
+    """How much further than what touches the ground in simulation the surface may reach [m]."""
+    entry = scene.entry(name)
+    fit = entry.contact.fit or entry.fit
+    return fit.hausdorff if fit is not None else 0.0
+
+
+def _may_support(below: Extent, above: Extent) -> bool:
+    """Whether the bounding boxes let `above` rest on `below`."""
+    overlap = (below.low < above.high) & (above.low < below.high)
+    lowest = above.low[2]
+    reach = below.low[2] < lowest < below.high[2] + SUPPORT_TOLERANCE
+    return bool(overlap[:2].all() and reach)
+
+
+def length_text(length: float) -> str:
+    """A length [m] for people."""
+    return f"{length * 1e3:.1f} mm" if length < 0.1 else f"{length:.3g} m"

@@ -1,0 +1,15 @@
+from .criterion import (
+    BodySpeed as BodySpeed,
+    settle as settle,
+)
+from .displacement import (
+    Displacement as Displacement,
+    displacement_from_document as displacement_from_document,
+)
+from .drift import predict_drift as predict_drift
+from .falling import fall as fall
+from .neighbours import Neighbours as Neighbours
+from .relaxation import (
+    RELAXING as RELAXING,
+    relax as relax,
+)

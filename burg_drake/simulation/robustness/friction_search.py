@@ -1,0 +1,91 @@
+"""The smallest friction coefficient with which a grasp still lifts its target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.core.grasps import Outcome
+from burg_drake.simulation.robustness.bisection import largest_passing
+from burg_drake.simulation.trials import HandTrial
+
+LEVERAGE = 1.25
+"""The search starts at this many times what carries the weight: few grasps are at the centre."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionSettings:
+    """Which coefficients are tried.
+
+    Attributes:
+        smallest, largest: coefficients.
+        tolerance: relative distance between the smallest that lifts and the next that does not.
+    """
+
+    smallest: float = 0.02
+    largest: float = 2.0
+    tolerance: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest < self.largest:
+            raise InvalidInputError(
+                f"friction from {self.smallest:g} to {self.largest:g}: must rise from above 0"
+            )
+        if not self.tolerance > 0.0:
+            raise InvalidInputError(f"tolerance is {self.tolerance:g}; give more than 0")
+
+
+def friction_limit(
+    trial: HandTrial,
+    instance: str,
+    X_OG: Array,
+    *,
+    mass: float | None = None,
+    lift: float | None = None,
+    settings: FrictionSettings = FrictionSettings(),
+) -> float:
+    """Looks for the smallest coefficient between target and pads with which a grasp lifts.
+
+    A grasp that lifts need not lift with every larger coefficient. What is returned is a
+    coefficient that lifts, while one that is smaller by the tolerance does not.
+
+    Args:
+        trial: executes the trials.
+        instance: the target.
+        X_OG: (4, 4) grasp in the target's frame.
+        mass: of the target in place of the library's [kg].
+        lift: length of the lift in place of the motion's [m].
+        settings: which coefficients are tried.
+
+    Returns:
+        The coefficient; 0 if it lifts with the smallest that is tried, infinity if it does not with
+        the largest.
+
+    Raises:
+        InvalidInputError: as `HandTrial.run`.
+    """
+
+    def lifts(inverse: float) -> bool:
+        result = trial.run(instance, X_OG, friction=1.0 / inverse, mass=mass, lift=lift)
+        return result.outcome is Outcome.LIFTED
+
+    largest_inverse = largest_passing(
+        lifts,
+        guess=1.0 / (LEVERAGE * friction_to_carry(trial, instance, mass)),
+        low=1.0 / settings.largest,
+        high=1.0 / settings.smallest,
+        tolerance=settings.tolerance,
+    )
+    return float("inf") if largest_inverse == 0.0 else 1.0 / largest_inverse
+
+
+def friction_to_carry(trial: HandTrial, instance: str, mass: float | None = None) -> float:
+    """Coefficient with which two pads carry the target as fast as the hand speeds up, if they grip
+    it at its centre: m (g + a) / (2 N)."""
+    settings = trial.settings
+    if mass is None:
+        mass = trial.diagram.scene.entry(instance).mass
+    gravity = float(np.linalg.norm(trial.diagram.plant.gravity_field().gravity_vector()))
+    return mass * (gravity + settings.acceleration) / (2.0 * trial.hand.document.force)

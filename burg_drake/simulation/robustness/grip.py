@@ -1,0 +1,192 @@
+"""A target that the hand holds in free air, and loads on its grip.
+
+A load is a force on the target's centre of mass, given as an acceleration times the target's mass:
+after d'Alembert that is what the target feels when the hand is accelerated the other way, without
+turning. Every load starts from the same state, so that what one of them does says nothing about the
+next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+
+from burg_drake.core import Array, inverse
+from burg_drake.simulation.trials import (
+    LEVER,
+    HandTrial,
+    TrialResult,
+    finger_contact,
+    motion_in_hand,
+)
+
+REST_SPEED = 0.002
+"""A target that moves in the hand slower than this is at rest [m/s]."""
+REST_LOOKS, REST_TIMEOUT = 10, 50
+"""The grip is loaded when the target is at rest in the standing hand at so many looks in a row, and
+after so many looks in any case."""
+STEADY_LOOKS = 3
+"""A steady load is borne when the target is at rest in the hand at so many looks in a row: what
+slides under an excess of a hundredth of its weight is faster by then."""
+
+
+class Grip:
+    """The hand with the target in it after a trial that ended with the target held.
+
+    The hand brakes and stands. From then on there is nothing but hand and target: what else is in
+    the scene neither moves nor touches them.
+
+    Args:
+        trial: its last run was one of this target, and held it.
+        instance: the target.
+        friction: its coefficient in that run, if not the library's.
+
+    Attributes:
+        weight: of the target [N].
+        friction_force: what the pads carry by friction in all, 2 mu N [N].
+    """
+
+    def __init__(self, trial: HandTrial, instance: str, friction: float | None = None) -> None:
+        self._trial = trial
+        self._plant = trial.diagram.plant
+        self._context = trial.context
+        self._plant_context = self._plant.GetMyContextFromRoot(self._context)
+        self._contacts_port = self._plant.get_contact_results_output_port()
+        self._forces_port = trial.diagram.diagram.GetInputPort("applied_forces")
+        self._target = self._plant.get_body(trial.diagram.free[instance])
+        self._gravity = float(np.linalg.norm(self._plant.gravity_field().gravity_vector()))
+        self._step = trial.diagram.engine.time_step
+        self._mass = self._target.get_mass(self._plant_context)
+        self.weight = self._mass * self._gravity
+        mu = trial.diagram.scene.entry(instance).friction if friction is None else friction
+        self.friction_force = 2.0 * mu * trial.hand.document.force
+        trial.isolate(self._target.index())
+        self._brake()
+        self._rest()
+        self._time = self._context.get_time()
+        self._state = self._context.get_discrete_state().Clone()
+        self._X_GO = self._current_X_GO()
+
+    def bears(
+        self,
+        load: Callable[[float], Array],
+        duration: float,
+        slide: float,
+        *,
+        steady_from: float = math.inf,
+    ) -> bool:
+        """Whether the grip bears a load.
+
+        Args:
+            load: (3,) acceleration in G [g] by the time since the load began [s].
+            duration: of the load [s].
+            slide: how far the point of the target at the grasp may move in the hand [m].
+            steady_from: time from which the load is constant [s], so that what is at rest stays
+                so, and the rest can be left out.
+
+        Returns:
+            Whether both fingers touch the target and it has not slid further, at every look.
+
+        Raises:
+            RuntimeError, SystemExit: from Drake.
+        """
+        self._context.SetTime(self._time)
+        self._context.SetDiscreteState(self._state)
+        self._trial.simulator.Initialize()
+        R_WG = self._trial.hand.X_WG(self._plant_context)[:3, :3]
+        steps_a_look = max(1, round(self._trial.settings.poll / self._step))
+        looks = math.ceil(duration / (steps_a_look * self._step) - 1e-9)
+        X_GO, at_rest = self._X_GO, 0
+        try:
+            for look in range(looks):
+                for k in range(look * steps_a_look, (look + 1) * steps_a_look):
+                    self._apply(self.weight * (R_WG @ load((k + 0.5) * self._step)))
+                    self._advance_by(1)
+                before, X_GO = X_GO, self._current_X_GO()
+                if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
+                    return False
+                at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
+                if look * steps_a_look * self._step >= steady_from and at_rest >= STEADY_LOOKS:
+                    return True
+            return True
+        finally:
+            self._forces_port.FixValue(self._context, [])
+
+    def _apply(self, f_W: Array) -> None:
+        """Puts a force (3,) on the target's centre of mass [N]."""
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self._target.index()
+        force.p_BoBq_B = self._target.default_com()
+        force.F_Bq_W = SpatialForce(np.zeros(3), f_W)
+        self._forces_port.FixValue(self._context, [force])
+
+    def _is_touched(self) -> bool:
+        contacts = self._trial.contacts.read(self._contacts_port.Eval(self._plant_context))
+        return finger_contact(contacts, self._trial.hand.fingers, self._target.index()).both
+
+    def _is_at_rest(self, before: Array, after: Array) -> bool:
+        """Whether the target has hardly moved in the hand from one look to the next."""
+        distance, angle = motion_in_hand(before, after)
+        return max(distance, angle * LEVER) <= REST_SPEED * self._trial.settings.poll
+
+    def _brake(self) -> None:
+        """Stops the hand as gently as it was accelerated."""
+        settings = self._trial.settings
+        braking = settings.acceleration
+        speed = self._trial.hand.lift.get_translation_rate(self._plant_context)
+        looks = math.ceil(speed / (braking * settings.poll))
+        for i in range(looks):
+            self._trial.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / looks)]))
+            self._advance()
+        self._trial.command("lift", np.zeros(2))
+
+    def _rest(self) -> None:
+        """Waits until the target is at rest in the hand."""
+        at_rest, X_GO = 0, self._current_X_GO()
+        for _ in range(REST_TIMEOUT):
+            self._advance()
+            before, X_GO = X_GO, self._current_X_GO()
+            at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
+            if at_rest >= REST_LOOKS:
+                return
+
+    def _advance(self) -> None:
+        self._advance_by(max(1, round(self._trial.settings.poll / self._step)))
+
+    def _advance_by(self, steps: int) -> None:
+        """To a whole number of steps since 0, with the rounding that Drake's own steps have."""
+        done = round(self._context.get_time() / self._step)
+        self._trial.simulator.AdvanceTo((done + steps) * self._step)
+
+    def _current_X_GO(self) -> Array:
+        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
+        return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+
+
+def take_grip(
+    trial: HandTrial,
+    instance: str,
+    X_OG: Array,
+    *,
+    friction: float | None = None,
+    mass: float | None = None,
+    lift: float | None = None,
+) -> Grip | TrialResult:
+    """Executes a grasp, and takes the hand as it then holds the target.
+
+    Args:
+        trial, instance, X_OG, friction, mass, lift: as for `HandTrial.run`.
+
+    Returns:
+        The grip; the trial's result if the target is not held at its end.
+
+    Raises:
+        InvalidInputError: as `HandTrial.run`.
+        RuntimeError, SystemExit: from Drake.
+    """
+    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
+    return Grip(trial, instance, friction) if result.outcome.held else result

@@ -1,0 +1,177 @@
+"""Brings a scene to rest: piles, heaps, and objects that are placed in the air."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.core import InvalidInputError, SimulationError
+from burg_drake.scene.document import TOUCH_TOLERANCE, Scene
+from burg_drake.simulation.rest import (
+    RELAXING,
+    BodySpeed,
+    Displacement,
+    displacement_from_document,
+    fall,
+    predict_drift,
+    relax,
+)
+from burg_drake.simulation.settling.reduced_friction import reduce_friction
+from burg_drake.simulation.settling.scene_state import placed_scene
+from burg_drake.station.checks import DEEPEST, overlaps
+from burg_drake.station.diagram import (
+    StationDiagram,
+    build_station_diagram,
+    instance_pose,
+    touching,
+)
+from burg_drake.station.document import ENGINES, Engine, Station
+
+DEFAULT_TIME_LIMIT = 10.0
+"""Simulated time allowed [s]."""
+DEFAULT_ENGINE = "screening"
+"""How time is stepped while objects fall; they come to rest in steps of their own."""
+RELAXING_TIME = 1.0
+"""Time that may be stepped in each round of relaxing [s]."""
+ROUNDS = 4
+"""After relaxing, of letting go what creeps, at most. After each, other objects may touch each
+other than before, and these are compliant in a diagram built anew."""
+SLOWER = 0.9
+"""What creeps is let go once more if it got slower by this factor, at least."""
+
+
+@dataclass(frozen=True)
+class SettledScene:
+    """A scene after a while.
+
+    Attributes:
+        scene: the scene with all free objects where they are now, but without the fallen ones.
+        duration: simulated time [s].
+        moving: objects that still move at the end, and how fast; none if all came to rest. Those
+            that creep by more than 0.5 mm or 0.1 degrees in 5 s are among them.
+        fallen: objects that fell off the table, in the document's order.
+        displacements: of the objects that did not fall, by instance.
+    """
+
+    scene: Scene
+    duration: float
+    moving: Mapping[str, BodySpeed]
+    fallen: tuple[str, ...]
+    displacements: Mapping[str, Displacement]
+
+    @property
+    def at_rest(self) -> bool:
+        """All objects are on the table, at rest."""
+        return not self.moving and not self.fallen
+
+
+def settle_scene(
+    scene: Scene,
+    station: Station,
+    *,
+    engine: Engine = ENGINES[DEFAULT_ENGINE],
+    time_limit: float = DEFAULT_TIME_LIMIT,
+    progress: Callable[[float, int], None] | None = None,
+) -> SettledScene:
+    """Simulates the objects of a scene until they are at rest.
+
+    Background objects and the station's obstacles stay where they are. The robot is left out. What
+    has fallen below the table's top is taken out of the simulation. Turning is braked a little, see
+    `BRAKING_TIME`; what is at rest does not notice.
+
+    Args:
+        scene: the scene; objects may be in the air, but not in one another.
+        station: table and pose of the board.
+        engine: how time is stepped.
+        time_limit: simulated time allowed [s].
+        progress: called now and then with the simulated time since the last call [s] and how many
+            objects still move.
+
+    Returns:
+        The settled scene. Whatever has not moved keeps its pose to the last digit; other poses are
+        rounded to a micrometre and a ten thousandth of a degree.
+
+    Raises:
+        InvalidInputError: objects overlap or are below the table's top at the start, or the time
+            limit is not above 0.
+        SimulationError: Drake cannot step the scene.
+    """
+    if not 0.0 < time_limit < np.inf:
+        raise InvalidInputError(f"time limit is {time_limit:g} s; give more than 0")
+    built = build_station_diagram(scene, station, robot="none", engine=engine)
+    _require_above(built)
+    _require_apart(built)
+    try:
+        falling = fall(built, time_limit, progress)
+        settled, moving = placed_scene(built, falling.X_WO), falling.moving
+        if not moving:
+            settled, moving = _at_rest(settled, station, progress)
+    except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+        raise SimulationError(
+            f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
+        ) from error
+    return SettledScene(
+        scene=settled,
+        duration=falling.duration,
+        moving=moving,
+        fallen=tuple(name for name in scene.instances if name not in settled.instances),
+        displacements={
+            name: displacement_from_document(built, name, instance_pose(settled, station, name))
+            for name in settled.instances
+        },
+    )
+
+
+def _at_rest(
+    scene: Scene, station: Station, progress: Callable[[float, int], None] | None
+) -> tuple[Scene, Mapping[str, BodySpeed]]:
+    """The scene once it is at rest in the world of its own diagram, and what will not rest."""
+    suspects: frozenset[str] | None = None
+    pace = np.inf
+    for rounds in itertools.count():
+        built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
+        foretold = predict_drift(built, among=suspects, once=rounds == 0)
+        if progress is not None:
+            progress(0.0, len(foretold.moving))
+        if not foretold.moving:
+            break
+        before = scene
+        if rounds == 0:
+            reduce_friction(built)
+            relaxed = relax(built, foretold.moving, RELAXING_TIME)
+            scene = placed_scene(built, relaxed.X_WO, exact=relaxed.together)
+        else:
+            beside = touching(built, built.free.values())
+            exact = [name for name in foretold.doubtful if built.free[name] in beside]
+            scene = placed_scene(built, foretold.X_WO, exact)
+        suspects = foretold.doubtful & scene.instances.keys()
+        goes_on = rounds <= 1 or foretold.pace < SLOWER * pace
+        stays = rounds > 0 and scene.document == before.document  # the first look is a short one
+        if rounds == ROUNDS or not goes_on or stays:
+            break
+        pace = foretold.pace
+    return scene, foretold.moving
+
+
+def _require_above(built: StationDiagram) -> None:
+    for name in built.free:
+        center_of_mass = (*built.scene.entry(name).mass_properties.center_of_mass, 1.0)
+        height = float((built.X_WO(name) @ center_of_mass)[2])
+        if height < 0.0:
+            raise InvalidInputError(
+                f"{built.scene.path}: {name!r} starts {-height * 1e3:.0f} mm below the table's top;"
+                " move it up"
+            )
+
+
+def _require_apart(built: StationDiagram) -> None:
+    yielding = {"table", *built.station.document.background}
+    for (a, b), depth in overlaps(built).items():
+        if depth > (DEEPEST if b in yielding else TOUCH_TOLERANCE):
+            raise InvalidInputError(
+                f"{built.scene.path}: {a!r} and {b!r} overlap by {depth * 1e3:.1f} mm, and would"
+                " burst apart; move them apart"
+            )

@@ -1,0 +1,15 @@
+from .arm_trial import ArmTrial as ArmTrial
+from .contacts import finger_contact as finger_contact
+from .execution import (
+    LEVER as LEVER,
+    motion_in_hand as motion_in_hand,
+)
+from .hand_trial import HandTrial as HandTrial
+from .result import (
+    Margins as Margins,
+    TrialResult as TrialResult,
+)
+from .trial_settings import (
+    DEFAULT_TRIAL as DEFAULT_TRIAL,
+    TrialSettings as TrialSettings,
+)

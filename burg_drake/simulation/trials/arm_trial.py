@@ -1,0 +1,226 @@
+"""The arm's trial: the whole robot goes to the grasp, closes the hand, lifts and holds.
+
+The arm begins at rest at the pregrasp, or at home if it shall do the transfer, too, and its servos
+follow the plan's trajectories. All its links touch what they touch. Outcomes and margins are those
+of the trial of the hand alone, and more: how well the arm followed its command, and what it pushed
+before the hand closed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, InvalidInputError, inverse, rotation_angle, swap_fingers
+from burg_drake.grasping.clearance import HandClearance
+from burg_drake.motion.ik import ArmKinematics
+from burg_drake.motion.plans import Plan, Trajectory
+from burg_drake.scene.document import Scene
+from burg_drake.simulation.trials.arm_carrier import ArmCarrier
+from burg_drake.simulation.trials.arm_lift_clearance import ArmLiftClearance
+from burg_drake.simulation.trials.command_sequence import CommandSequence
+from burg_drake.simulation.trials.execution import Execution
+from burg_drake.simulation.trials.result import TrialResult, collision, failure
+from burg_drake.simulation.trials.scene_trial import SceneTrial, check_overrides
+from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.station.diagram import MountedHand, build_station_diagram
+from burg_drake.station.document import ENGINES, Engine, Station
+
+REST = 0.05
+"""Time between arrival and closing, in which the arm comes to rest [s]."""
+OFF_POSITION, OFF_ANGLE = 1e-3, 1e-2
+"""A plan may lead so far from the grasp [m and rad]."""
+APART = 1e-6
+"""Ends of trajectories that are meant to meet [rad]."""
+
+
+class ArmTrial(SceneTrial):
+    """Executes plans in one scene with the whole robot.
+
+    Args:
+        scene: the scene.
+        station: a station with an arm.
+        engine: time step and contact settings.
+        settings: phases of a trial; all ways are the plan's, so that `motion` and `lift_time` do
+            not count.
+        transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
+            its contacts are looked at after every step up to the grasp, and not only at `poll`.
+        clearance: the screen of the open hand in this scene, if there is one already.
+        meshcat: where to show the trials; recording is the caller's.
+
+    Attributes:
+        diagram: the station diagram that all trials share.
+        clearance: the screen of the open hand.
+        hand: hand and arm.
+        contacts, neighbours, simulator, settings: see `SceneTrial`.
+        look: time from one look at the contacts to the next [s].
+        gravity: [m/s^2].
+
+    Raises:
+        InvalidInputError: the station has no arm.
+    """
+
+    hand: MountedHand
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        *,
+        engine: Engine = ENGINES["standard"],
+        settings: TrialSettings = DEFAULT_TRIAL,
+        transfer: bool = False,
+        clearance: HandClearance | None = None,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
+        super().__init__(diagram, MountedHand(diagram), settings)
+        if clearance is None:
+            clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
+        self.clearance = clearance
+        self._transfer = transfer
+        arm = station.document.arm
+        assert arm is not None
+        self._X_WA = arm.X_WA.matrix()
+        self._kinematics = ArmKinematics.of(diagram)
+        self._steps_a_look = max(1, round(settings.poll / engine.time_step))
+        self.look = self._steps_a_look * engine.time_step
+        self.gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
+        self._rises: dict[BodyIndex, ArmLiftClearance] = {}
+
+    def run(
+        self,
+        instance: str,
+        X_OG: Array,
+        plan: Plan,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+    ) -> TrialResult:
+        """Executes the plan of one grasp.
+
+        Args:
+            instance: name of the target in the scene.
+            X_OG: (4, 4) grasp in the target's frame.
+            plan: leads to that grasp, or to the same one with the fingers swapped.
+            friction: the target's friction coefficient, in place of the library's.
+            mass: the target's mass [kg], in place of the library's; its inertia scales with it.
+
+        Returns:
+            The outcome with its margins. A failure of the simulator is an outcome, too.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, `instance` cannot be grasped, friction is below
+                0, or the mass is not above 0; the plan is for another scene or arm, has gaps, or
+                leads elsewhere.
+        """
+        X_WG = self.X_WG(instance, X_OG)
+        check_overrides(friction, mass)
+        self._check_plan(plan, X_WG)
+        # Which finger is on which side is the plan's; of a hand that is not symmetric that matters.
+        as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
+        if rotation_angle(X_WG[:3, :3].T @ as_planned) > OFF_ANGLE:
+            X_WG = swap_fingers(X_WG)
+        screen = self.clearance.check(instance, X_WG)
+        if screen.outcome is not None:
+            return collision(screen)
+        try:
+            found = self.begin(instance, plan, friction=friction, mass=mass).run()
+            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
+        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+            self.spoil()
+            return failure(error, screen, self.context.get_time())
+
+    def begin(
+        self,
+        instance: str,
+        plan: Plan,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+    ) -> Execution:
+        """Brings the Context to the start of a trial; nothing of an earlier one remains.
+
+        All objects, the target among them, are locked until something moving touches them.
+
+        Args:
+            instance: the target.
+            plan: where the arm goes.
+            friction, mass: as in `run`.
+        """
+        target = self.diagram.free[instance]
+        moving: set[BodyIndex] = set()
+        self.prepare(instance, moving, friction, mass)
+        step = self.diagram.engine.time_step
+        to_grasp = [plan.transfer, plan.approach] if self._transfer else [plan.approach]
+        steps = 1 if self._transfer else self._steps_a_look
+        rest = max(1, round(REST / (steps * step)))
+        approach = CommandSequence(to_grasp, step, steps, self._p_WG, rest)
+        ways = [CommandSequence([way], step, self._steps_a_look, self._p_WG) for way in _ways(plan)]
+        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
+        self.hand.place(plant_context, approach.q_at_look(0))
+        self.command("arm", approach.at(0))
+        self.command("hand", self.hand.opening_command())
+        self.simulator.Initialize()
+        return Execution(self, target, moving, ArmCarrier(self, target, approach, ways))
+
+    def rise(self, target: BodyIndex) -> ArmLiftClearance:
+        """Looks along the way up with a target in the hand."""
+        if target not in self._rises:
+            self._rises[target] = ArmLiftClearance(self.diagram, target)
+        return self._rises[target]
+
+    def _check_plan(self, plan: Plan, X_WG: Array) -> None:
+        """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
+        the grasp are all that can be told.
+
+        Raises:
+            InvalidInputError: it is not.
+        """
+        if plan.origin is not None:
+            plan.require_for(self.diagram.scene, self.diagram.station)
+        joints = len(self.diagram.arm_joints)
+        parts = {name: part for name, part in plan.phases.items() if name != "close"}
+        if not self._transfer:
+            del parts["transfer"]
+        if not _ways(plan):
+            raise InvalidInputError("the plan does not move the hand with what it holds")
+        for name, part in parts.items():
+            if part.q.shape[1] != joints:
+                raise InvalidInputError(
+                    f"the plan's {name} moves {part.q.shape[1]} joints; the arm of station"
+                    f" {self.diagram.station.name!r} has {joints}"
+                )
+        names = list(parts)
+        for one, other in pairwise(names):
+            gap = float(np.abs(parts[other].q[0] - parts[one].q[-1]).max())
+            if gap > APART:
+                raise InvalidInputError(
+                    f"the plan's {other} begins {gap:.2g} rad from where its {one} ends"
+                )
+        X_WG_end = self._X_WG_at(plan.approach.q[-1:])[0]
+        distance = float(np.linalg.norm(X_WG_end[:3, 3] - X_WG[:3, 3]))
+        turns = [(inverse(X) @ X_WG_end)[:3, :3] for X in (X_WG, swap_fingers(X_WG))]
+        angle = min(float(rotation_angle(R)) for R in turns)
+        if distance > OFF_POSITION or angle > OFF_ANGLE:
+            raise InvalidInputError(
+                f"the plan leads the hand to {1e3 * distance:.1f} mm and"
+                f" {np.rad2deg(angle):.1f} degrees from the grasp; plan this grasp in this scene"
+            )
+
+    def _X_WG_at(self, q: Array) -> Array:
+        """(K, 4, 4) grasp frames in the world at arm positions (K, n)."""
+        return self._X_WA @ self._kinematics.forward(q)[0] @ self.hand.document.X_HG.matrix()
+
+    def _p_WG(self, q: Array) -> Array:
+        return self._X_WG_at(q)[:, :3, 3]
+
+
+def _ways(plan: Plan) -> list[Trajectory]:
+    """Those of retreat and lift that move the hand."""
+    parts = [plan.retreat, plan.lift]
+    return [part for part in parts if part is not None and (part.q[-1] != part.q[0]).any()]

@@ -1,0 +1,325 @@
+"""One trial on its way: approach, close, lift, hold, and the outcome with its margins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, inverse, rotation_angle
+from burg_drake.core.grasps import Outcome
+from burg_drake.simulation.trials.carrier import Carrier, HandSegment
+from burg_drake.simulation.trials.contacts import (
+    NO_CONTACT,
+    BodyContact,
+    finger_contact,
+    reached,
+    touched_from_outside,
+)
+from burg_drake.simulation.trials.mass_centers import MassCenterTracker, center_of_mass
+from burg_drake.simulation.trials.result import Margins, TrialResult
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trials.scene_trial import SceneTrial
+
+MINIMUM_LIFT = 0.5
+"""Share of the hand's way that the target must go with it to count as lifted."""
+LEVER = 0.01
+"""Turning counts as the motion of a point so far from the grasp [m], which is at a pad's rim."""
+
+
+class Execution:
+    """Runs a trial from a Context that has been brought to its start.
+
+    Locked objects are released when something moving touches them, and with them those close to
+    them: the trial goes back to the look before, where they were apart, and goes on from there.
+
+    Args:
+        trial: the trial.
+        target: the grasped body.
+        moving: the free objects that are not locked.
+        carrier: what brings the hand to the grasp and away from it.
+
+    Attributes:
+        contact: of the fingers with the target at the last look.
+    """
+
+    def __init__(
+        self, trial: SceneTrial, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
+    ) -> None:
+        diagram = trial.diagram
+        self._trial = trial
+        self._carrier = carrier
+        self._settings = trial.settings
+        self._context = trial.context
+        self._plant = diagram.plant
+        self._plant_context = self._plant.GetMyContextFromRoot(self._context)
+        self._results_port = self._plant.get_contact_results_output_port()
+        self._target = self._plant.get_body(target)
+        self._itself = {name: index for name, index in diagram.free.items() if index == target}
+        self._others = {name: index for name, index in diagram.free.items() if index != target}
+        self._still = set(diagram.free.values()) - moving
+        self._robot = set(diagram.robot_bodies)
+        self._way = sum(segment.length for segment in carrier.segments)
+        self._direction = carrier.segments[0].direction_W
+        self._center_start = self._center()
+        self._followed = 0.0
+        self._moved = self._displacements(self._others.values())
+        self._pushed: dict[str, float] = {}
+        self.contact = NO_CONTACT
+        self._X_GO_last = self.X_GO()
+        self._X_GO_grip: Array | None = None
+        self._touched = False
+        self._blocker = ""
+        self._steps = 0
+        self._steps_a_look = max(1, round(self._settings.poll / diagram.engine.time_step))
+        self._creep: list[float] = []
+        self._in_free_air = 0.0
+        self._way_blocked = False
+        self._left_to_go = 0.0
+
+    def run(self) -> TrialResult:
+        """Runs all phases.
+
+        Raises:
+            RuntimeError: the simulation failed.
+        """
+        for phase in (self.approach, self.close, self.lift, self.hold):
+            outcome = phase()
+            if outcome is not None:
+                return self.result(outcome)
+        return self.result(self.held())
+
+    def approach(self) -> Outcome | None:
+        """Brings the hand to the grasp; None if nothing fixed is in its way."""
+        carrier = self._carrier
+        if not carrier.approach_looks:
+            return None
+        target = self._displacements(self._itself.values())
+        carrier.approach()
+        for _ in range(carrier.approach_looks):
+            self.advance(carrier.approach_steps)
+            target.look(self._still)
+            if self._blocker:
+                break
+        self._pushed = self._moved.by_name(self._others) | target.by_name(self._itself)
+        return Outcome.BLOCKED if self._blocker else None
+
+    def close(self) -> Outcome | None:
+        """Closes until the fingers rest; None if both hold the target then."""
+        settings = self._settings
+        self._carrier.close()
+        slow_since = math.inf
+        timeout = max(settings.close_timeout, 2.0 * self._trial.hand.document.closing_time)
+        timeout += self._context.get_time()
+        while self._context.get_time() < timeout:
+            now = self.advance()
+            if self._trial.hand.finger_speed(self._plant_context) > settings.settled_speed:
+                slow_since = math.inf
+            else:
+                slow_since = min(slow_since, now)
+                if now - slow_since >= settings.settled_time - 1e-9:
+                    break
+        if self.contact.both:
+            self._X_GO_grip = self.X_GO()
+            return None
+        if self.contact.any:
+            return Outcome.ONE_FINGER
+        return Outcome.CLOSED_EMPTY if self._touched else Outcome.NO_CONTACT
+
+    def lift(self) -> Outcome | None:
+        """Takes the target away, along the retreat and the lift; None if it is held at the end of
+        the way and has to prove itself there."""
+        carrier = self._carrier
+        last = len(carrier.segments) - 1
+        for number, segment in enumerate(carrier.segments):
+            self._turn(segment)
+            for look in range(segment.looks):
+                carrier.lift(number, look)
+                self.advance()
+                if self._blocker:
+                    return Outcome.BLOCKED
+                if not self.contact.any:
+                    return Outcome.SLIPPED
+                if number == last and carrier.bears_the_most(look) and self._is_decided(segment):
+                    return self.held()
+        carrier.stop()
+        if self.contact.both and self.followed() >= MINIMUM_LIFT * self._way:
+            return None
+        return Outcome.SLIPPED
+
+    def hold(self) -> Outcome | None:
+        """Waits; None if the target is held at the end.
+
+        Unless the whole trial is asked for, the end is early when the grip is steady.
+        """
+        settings = self._settings
+        self._creep.clear()
+        for _ in range(max(1, round(settings.hold_time / settings.poll))):
+            self.advance()
+            if self._blocker:
+                return Outcome.BLOCKED
+            if not self.contact.any:
+                return Outcome.DROPPED
+            if self._sticks() and not self._trial.diagram.engine.whole_trial:
+                break
+        return None if self.contact.both else Outcome.DROPPED
+
+    def held(self) -> Outcome:
+        """The outcome of a target that is held to the end."""
+        disturbed = self._moved.largest > self._settings.disturbance
+        return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
+
+    def _turn(self, segment: HandSegment) -> None:
+        """From now on the way of the target counts along a segment."""
+        if segment.direction_W is not self._direction:
+            self._followed, self._center_start = self.followed(), self._center()
+            self._direction = segment.direction_W
+
+    def _is_decided(self, last: HandSegment) -> bool:
+        """Whether the target will be held to the end, as nothing is left that could change it.
+
+        While the hand accelerates upwards, the load on the grip is largest. Friction that does not
+        carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
+        not get faster, in free air and with all others at rest, is held to the end, too.
+        """
+        if self._trial.diagram.engine.whole_trial or self._way_blocked:
+            return False
+        if not self.contact.both or not (self._sticks() or self._creeps_to_a_halt()):
+            return False
+        if self._in_free_air < self._settings.steady_time - 1e-9:
+            return False
+        left = last.length - self._carrier.gone()
+        if self.followed() + left < MINIMUM_LIFT * self._way:
+            return False
+        self._way_blocked = not self._carrier.is_free_ahead()
+        if not self._way_blocked:
+            self._left_to_go = left
+        return not self._way_blocked
+
+    def _sticks(self) -> bool:
+        """Whether the grip has been steady for `steady_time`."""
+        settings = self._settings
+        recent = self._creep[-settings.steady_polls :]
+        enough = len(recent) == settings.steady_polls
+        return enough and max(recent) <= settings.creep_speed * settings.poll
+
+    def _creeps_to_a_halt(self) -> bool:
+        """Whether the target moves in the hand no faster than before, and not far any more.
+
+        Drake's friction is slightly viscous: below its limit a load does not slide but creeps, at a
+        constant speed that is the higher, the larger the time step.
+        """
+        settings = self._settings
+        n = settings.steady_polls
+        before, now = sum(self._creep[-2 * n : -n]), sum(self._creep[-n:])
+        ahead = (self._carrier.lift_time + settings.hold_time) / settings.poll
+        enough = len(self._creep) >= 2 * n
+        return enough and now <= before and now / n * ahead <= settings.creep_distance
+
+    def advance(self, steps: int | None = None) -> float:
+        """Steps to the next look at the contacts; returns the time [s].
+
+        Args:
+            steps: how many; by default those in `poll`.
+
+        Raises:
+            RuntimeError: the simulation failed.
+        """
+        before = self._time()
+        self._steps += self._steps_a_look if steps is None else steps
+        time = self._time()
+        while True:
+            state = self._context.get_discrete_state().Clone() if self._still else None
+            self._carrier.advance_to(time)
+            if not math.isfinite(self._center()[2]):
+                raise RuntimeError(f"the state is not finite at {time:.3f} s")
+            contacts = self._trial.contacts.read(self._results_port.Eval(self._plant_context))
+            moving = self._robot | (set(self._trial.diagram.free.values()) - self._still)
+            found = reached(contacts, moving, self._still)
+            if not found:
+                break
+            self._context.SetTime(before)
+            self._context.SetDiscreteState(state)
+            found = self._trial.neighbours.close_to(found) & self._still
+            self._still -= found
+            self._trial.release(found, self._still)
+        self._look(contacts)
+        return time
+
+    def _time(self) -> float:
+        """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
+        return self._steps * self._trial.diagram.engine.time_step
+
+    def _look(self, contacts: list[BodyContact]) -> None:
+        """Takes down what the contacts and poses say."""
+        settings, target = self._settings, self._target.index()
+        self.contact = finger_contact(contacts, self._trial.hand.fingers, target)
+        self._touched = self._touched or self.contact.any
+        X_GO = self.X_GO()
+        distance, angle = motion_in_hand(self._X_GO_last, X_GO)
+        self._X_GO_last = X_GO
+        if self._moved.look(self._still) <= settings.settled_speed * settings.poll:
+            self._creep.append(max(distance, angle * LEVER))
+        else:
+            self._creep.clear()
+        self._blocker = self._carrier.watch(contacts)
+        free = not touched_from_outside(contacts, self._robot | {target})
+        self._in_free_air = self._in_free_air + settings.poll if free else 0.0
+
+    def followed(self) -> float:
+        """How far the target's centre of mass has gone along the segments of the hand's way, that
+        is, risen in a lift straight up [m]."""
+        return self._followed + float((self._center() - self._center_start) @ self._direction)
+
+    def X_GO(self) -> Array:
+        """(4, 4) target in the grasp frame."""
+        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
+        return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+
+    def _center(self) -> Array:
+        """The target's centre of mass (3,) in the world [m]."""
+        return center_of_mass(self._plant, self._plant_context, self._target)
+
+    def _displacements(self, bodies: Iterable[BodyIndex]) -> MassCenterTracker:
+        """Of bodies, from where they are now."""
+        return MassCenterTracker(self._plant, self._plant_context, bodies)
+
+    def result(self, outcome: Outcome) -> TrialResult:
+        """The outcome with the margins at this moment."""
+        slip = tilt = force = area = math.nan
+        if self._X_GO_grip is not None:
+            slip, tilt = motion_in_hand(self._X_GO_grip, self.X_GO())
+            closing = self._trial.hand.X_WG(self._plant_context)[:3, 0]
+            force = float(np.abs(self.contact.force @ closing).min())
+            area = float(self.contact.area.min())
+        margins = Margins(
+            overlap=0.0,
+            slip=slip,
+            tilt=tilt,
+            pad_force=force,
+            patch_area=area,
+            lift=self.followed() + self._left_to_go,
+            others_moved=self._moved.largest,
+            end_time=self._context.get_time(),
+            tracking_error=self._carrier.tracking_error,
+            tracking_distance=self._carrier.tracking_distance,
+            pushed=max(self._pushed.values(), default=math.nan),
+        )
+        return TrialResult(
+            outcome=outcome,
+            margins=margins,
+            blocker=self._blocker if outcome is Outcome.BLOCKED else "",
+            displacements=self._moved.by_name(self._others),
+            pushed=self._pushed,
+            touched=self._carrier.touched,
+        )
+
+
+def motion_in_hand(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
+    """How a target has moved in the hand: of the point at the grasp [m], and its angle [rad]."""
+    X_GG = X_GO_later @ inverse(X_GO)
+    return float(np.linalg.norm(X_GG[:3, 3])), float(rotation_angle(X_GG[:3, :3]))

@@ -1,0 +1,134 @@
+"""The floating hand's carrier: one joint along the way, whose speed is commanded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array
+from burg_drake.simulation.trials.carrier import HandSegment
+from burg_drake.simulation.trials.contacts import BodyContact, reached
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trials.hand_trial import HandTrial
+
+
+DOWN = -1e-6
+"""Upward part of a direction (unit vector) that goes down by more than rounding."""
+
+
+class LiftPath(NamedTuple):
+    """A straight way of the hand.
+
+    Attributes:
+        direction_W: (3,) unit vector in the world.
+        length: [m].
+    """
+
+    direction_W: Array
+    length: float
+
+
+class LiftCarrier:
+    """Takes the floating hand away from the grasp; see `Carrier`.
+
+    Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
+    the new direction.
+
+    Args:
+        trial: a trial that has been brought to its start, with the hand at the grasp and the joint
+            along the first of the ways.
+        target: the grasped body.
+        ways: of the hand, at least one.
+    """
+
+    approach_looks = approach_steps = 0
+    tracking_error = tracking_distance = math.nan
+    touched = ""
+
+    def __init__(self, trial: HandTrial, target: BodyIndex, ways: Sequence[LiftPath]) -> None:
+        settings = trial.settings
+        self._trial = trial
+        self._target = target
+        self._plant = trial.diagram.plant
+        self._plant_context = self._plant.GetMyMutableContextFromRoot(trial.context)
+        self._names = trial.diagram.body_names
+        self._hand = set(trial.diagram.robot_bodies)
+        self.segments = tuple(
+            HandSegment(*way, _looks(way.length, settings) + (number + 1 < len(ways)))
+            for number, way in enumerate(ways)
+        )
+        self.lift_time = sum(settings.time_of(way.length) for way in ways)
+        self._number = 0
+        self._leaves = False
+        self._X_WG_start = trial.hand.X_WG(self._plant_context)
+
+    def approach(self) -> None:
+        """The hand stands at the grasp."""
+
+    def close(self) -> None:
+        """The fingers have been closing from the start."""
+
+    def lift(self, number: int, look: int) -> None:
+        """Commands the speed of the middle of the interval; in one interval more, where another
+        segment follows, the hand comes to rest."""
+        segment, settings = self.segments[number], self._trial.settings
+        self._leaves = True
+        if number != self._number:
+            self._number = number
+            self._X_WG_start = self._trial.hand.X_WG(self._plant_context)
+            self._trial.hand.turn_lift(self._plant_context, segment.direction_W)
+            self._trial.simulator.Initialize()
+        looks = _looks(segment.length, settings)
+        top_speed = 2 * segment.length / (looks * settings.poll)
+        speed = top_speed * max(0.0, 1 - abs(2 * look + 1 - looks) / looks)
+        self._trial.command("lift", np.array([0.0, speed]))
+
+    def stop(self) -> None:
+        """Stands still."""
+        self._trial.command("lift", np.zeros(2))
+
+    def advance_to(self, time: float) -> None:
+        """Steps; commands change only from look to look."""
+        self._trial.simulator.AdvanceTo(time)
+
+    def watch(self, contacts: list[BodyContact]) -> str:
+        """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
+        goes down."""
+        fixed = set(self._trial.diagram.fixed.values())
+        if self._leaves and self.segments[self._number].direction_W[2] < DOWN:
+            fixed.add(self._trial.diagram.table)
+        hit = reached(contacts, self._hand, fixed)
+        return self._names[min(hit)] if hit else ""
+
+    def gone(self) -> float:
+        """Position of the joint [m]."""
+        return self._trial.hand.gone(self._plant_context)
+
+    def bears_the_most(self, look: int) -> bool:
+        """The hand accelerates in the first half of a segment and brakes in the second. Straight
+        up, the first adds to the weight and the second takes away from it. Otherwise both count,
+        and standing still is in between."""
+        half = _looks(self.segments[-1].length, self._trial.settings) // 2
+        if self.segments[-1].is_straight_up:
+            return look < half
+        return look >= half + self._trial.settings.steady_polls
+
+    def is_free_ahead(self) -> bool:
+        """Looks along the joint's axis."""
+        positions = self._plant.GetPositions(self._plant_context)
+        last = self.segments[-1]
+        rise = self._trial.rise(self._target)
+        return rise.is_free(
+            self._X_WG_start, positions, last.length - self.gone(), last.direction_W
+        )
+
+
+def _looks(length: float, settings: TrialSettings) -> int:
+    """Looks on a way of a length [m]: as many to speed up as to brake."""
+    return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))

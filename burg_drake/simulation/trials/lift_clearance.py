@@ -1,0 +1,105 @@
+"""Whether hand and target can go on together without touching anything: geometry, no steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array
+from burg_drake.station.diagram import FloatingHand, StationDiagram
+from burg_drake.station.world import mesh_by_pieces
+
+STEP = 0.01
+"""Way between two looks [m]; a hand and what it meets are thicker, taken together."""
+GAP = 0.002
+"""Boxes that come no closer than this are apart [m]."""
+
+
+class HandLiftClearance:
+    """Looks along the straight way ahead of one target in the hand.
+
+    Args:
+        station_diagram: a diagram built with `robot="hand"`.
+        target: the body in the hand.
+    """
+
+    def __init__(self, station_diagram: StationDiagram, target: BodyIndex) -> None:
+        self._diagram = station_diagram
+        self._plant = plant = station_diagram.plant
+        self._context = station_diagram.diagram.CreateDefaultContext()
+        self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
+        mesh_by_pieces(station_diagram, self._context)
+        self._hand = FloatingHand(station_diagram)
+        carried = {target, *station_diagram.robot_bodies}
+        everything = {station_diagram.table, *station_diagram.free.values()}
+        everything |= set(station_diagram.fixed.values())
+        query = self._query()
+        self._carried = self._boxes(query, carried)
+        self._others = self._boxes(query, everything - carried)
+        manager = station_diagram.scene_graph.collision_filter_manager(
+            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
+        for side in (self._carried, self._others):
+            declaration = CollisionFilterDeclaration()
+            manager.Apply(declaration.ExcludeWithin(GeometrySet([g for g, _ in side])))
+        start = plant.get_body(target).floating_positions_start() + 4
+        self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
+
+    def is_free(self, X_WG: Array, positions: Array, way: float, direction_W: Array) -> bool:
+        """Whether nothing is met on the way.
+
+        Args:
+            X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
+            positions: of the plant, at present.
+            way: how far there is to go [m].
+            direction_W: (3,) unit vector of the lift.
+        """
+        self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
+        self._plant.SetPositions(self._plant_context, positions)
+        if not self._boxes_meet(way * direction_W):
+            return True
+        for gone in np.append(np.arange(STEP, way, STEP), way):
+            moved = positions.copy()
+            moved[self._places] += gone * np.append(direction_W, 1.0)
+            self._plant.SetPositions(self._plant_context, moved)
+            if self._query().HasCollisions():
+                return False
+        return True
+
+    def _boxes_meet(self, p_W: Array) -> bool:
+        """Whether an upright box about what moves, drawn out by a way (3,), meets one of the
+        others."""
+        query = self._query()
+        low, high = _bounds(query, self._carried)
+        low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
+        other_low, other_high = _bounds(query, self._others)
+        apart = (low[:, None] > other_high[None] + GAP) | (other_low[None] > high[:, None] + GAP)
+        return not apart.any(axis=2).all()
+
+    def _query(self) -> QueryObject:
+        port = self._diagram.scene_graph.get_query_output_port()
+        return port.Eval(self._diagram.scene_graph.GetMyContextFromRoot(self._context))
+
+    def _boxes(
+        self, query: QueryObject, bodies: set[BodyIndex]
+    ) -> list[tuple[GeometryId, tuple[Array, Array]]]:
+        """Collision geometries with the pose (4, 4) and half size (3,) of a box about each."""
+        inspector = query.inspector()
+        found = []
+        for index in sorted(bodies):
+            for geometry in self._plant.GetCollisionGeometriesForBody(self._plant.get_body(index)):
+                box = inspector.GetObbInGeometryFrame(geometry)
+                assert box is not None  # only half spaces have none
+                found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
+        return found
+
+
+def _bounds(
+    query: QueryObject, boxes: list[tuple[GeometryId, tuple[Array, Array]]]
+) -> tuple[Array, Array]:
+    """Lower and upper corners (N, 3) of upright boxes about geometries, in the world."""
+    X_WB = np.array([query.GetPoseInWorld(g).GetAsMatrix4() @ X_GB for g, (X_GB, _) in boxes])
+    half = np.array([half for _, (_, half) in boxes])
+    reach = np.einsum("nij,nj->ni", np.abs(X_WB[:, :3, :3]), half)
+    return X_WB[:, :3, 3] - reach, X_WB[:, :3, 3] + reach

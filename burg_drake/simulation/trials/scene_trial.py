@@ -1,0 +1,220 @@
+"""What all trials of one scene share: a diagram, and how a trial changes its Context.
+
+One compiled diagram serves all trials; a trial changes only the Context, and what it returns does
+not depend on the trials before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    RoleAssign,
+)
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, SpatialInertia
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, check_pose
+from burg_drake.simulation.rest import Neighbours
+from burg_drake.simulation.trials.contacts import ContactReader
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.station.diagram import HandHandle, StationDiagram
+from burg_drake.station.document import GraspMotion
+from burg_drake.station.world import part_rolling
+
+
+class SceneTrial:
+    """A scene on a station with a robot, and a simulator that executes grasps in it.
+
+    Args:
+        diagram: the station diagram.
+        hand: the hand in it.
+        settings: phases of a trial.
+        motion: where the hand goes, if not as the settings or else the station say.
+
+    Attributes:
+        diagram, hand, settings: as given.
+        motion: where the hand goes.
+        contacts: reader of the diagram's contact results.
+        neighbours: which free objects stand close to each other.
+        simulator: the simulator that runs the trials.
+    """
+
+    hand: HandHandle
+
+    def __init__(
+        self,
+        diagram: StationDiagram,
+        hand: HandHandle,
+        settings: TrialSettings,
+        motion: GraspMotion | None = None,
+    ) -> None:
+        self.diagram = diagram
+        self.hand = hand
+        self.settings = settings
+        self.motion = motion or settings.motion or diagram.station.document.motion
+        self.contacts = ContactReader(diagram.plant, diagram.scene_graph)
+        self.neighbours = Neighbours(diagram)
+        self._default = diagram.diagram.CreateDefaultContext()
+        self.simulator = Simulator(diagram.diagram, self._default.Clone())
+        self._prepared: tuple[str, float | None, float | None] | None = None
+        """Target, friction and mass that the Context is prepared for; None if for nothing."""
+
+    @property
+    def context(self) -> Context:
+        """Context of the trial that runs or ran last."""
+        return self.simulator.get_mutable_context()
+
+    def X_WG(self, instance: str, X_OG: Array) -> Array:
+        """A grasp (4, 4) of an instance in the world.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
+        """
+        if instance not in self.diagram.free:
+            raise InvalidInputError(
+                f"{instance!r} is not a free object of scene {self.diagram.scene.name!r};"
+                f" free are: {', '.join(self.diagram.free) or '(none)'}"
+            )
+        return self.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
+
+    def prepare(
+        self, instance: str, moving: set[BodyIndex], friction: float | None, mass: float | None
+    ) -> None:
+        """Brings objects and surfaces to the start of a trial; nothing of an earlier one remains.
+
+        Args:
+            instance: the target.
+            moving: free objects that are not locked; the same for each trial of this target.
+            friction: of the target, if not the library's.
+            mass: of the target, if not the library's [kg].
+        """
+        context = self.context
+        if self._prepared != (instance, friction, mass):
+            context.SetTimeStateAndParametersFrom(self._default)
+            self._set_still(set(self.diagram.free.values()) - moving)
+            self.set_friction(instance, friction)
+            self._set_mass(self.diagram.free[instance], mass)
+            self._prepared = (instance, friction, mass)
+        else:
+            context.SetTime(0.0)
+            context.SetDiscreteState(self._default.get_discrete_state())
+
+    def spoil(self) -> None:
+        """Has the next trial prepare the Context from scratch."""
+        self._prepared = None
+
+    def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
+        """Unlocks objects in the middle of a trial.
+
+        Args:
+            released: to be unlocked.
+            still: those that stay locked.
+        """
+        self._prepared = None
+        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
+        for index in released:
+            self.diagram.plant.get_body(index).Unlock(plant_context)
+        resting = GeometrySet(self._geometries(self._resting(still)))
+        declaration = CollisionFilterDeclaration()
+        declaration.AllowWithin(GeometrySet(self._geometries(released)))
+        declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
+        self._filter(declaration)
+        part_rolling(self.diagram, self.context)
+        self.simulator.Initialize()
+
+    def isolate(self, target: BodyIndex) -> None:
+        """Leaves hand and target alone with each other, in the middle of a trial: all other objects
+        are locked, and neither they nor what is fixed can be touched."""
+        self._prepared = None
+        others = set(self.diagram.free.values()) - {target}
+        self._set_still(others)
+        carried = GeometrySet(self._geometries({target, *self.diagram.robot_bodies}))
+        resting = GeometrySet(self._geometries(self._resting(others)))
+        self._filter(CollisionFilterDeclaration().ExcludeBetween(carried, resting))
+        self.simulator.Initialize()
+
+    def set_friction(self, instance: str, friction: float | None) -> None:
+        """Gives the fingers, and the target if `friction` is given, one coefficient.
+
+        Drake combines two coefficients a and b to 2ab/(a+b); of two equal ones that is the same.
+        """
+        self._prepared = None
+        bodies = list(self.hand.fingers)
+        if friction is None:
+            friction = self.diagram.scene.entry(instance).friction
+        else:
+            bodies.append(self.diagram.free[instance])
+        coulomb = CoulombFriction(friction, friction)
+        graph, plant = self.diagram.scene_graph, self.diagram.plant
+        graph_context = graph.GetMyMutableContextFromRoot(self.context)
+        inspector = graph.model_inspector()
+        for geometry in self._geometries(set(bodies)):
+            properties = ProximityProperties(inspector.GetProximityProperties(geometry))
+            properties.UpdateProperty("material", "coulomb_friction", coulomb)
+            graph.AssignRole(
+                graph_context, plant.get_source_id(), geometry, properties, RoleAssign.kReplace
+            )
+
+    def command(self, model: str, desired_state: Array) -> None:
+        """Sets the servo command of `hand` (4,), `lift` (2,) or an `arm` with n joints (2 n,)."""
+        port = self.diagram.diagram.GetInputPort(f"{model}.desired_state")
+        port.FixValue(self.context, desired_state)
+
+    def _set_still(self, still: set[BodyIndex]) -> None:
+        """Locks free objects in place, and drops their contact with what never moves."""
+        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
+        for index in still:
+            self.diagram.plant.get_body(index).Lock(plant_context)
+        geometries = GeometrySet(self._geometries(self._resting(still)))
+        self._filter(CollisionFilterDeclaration().ExcludeWithin(geometries))
+
+    def _filter(self, declaration: CollisionFilterDeclaration) -> None:
+        graph = self.diagram.scene_graph
+        graph_context = graph.GetMyMutableContextFromRoot(self.context)
+        graph.collision_filter_manager(graph_context).Apply(declaration)
+
+    def _resting(self, still: set[BodyIndex]) -> set[BodyIndex]:
+        """What does not move while these objects are locked."""
+        return still | {self.diagram.table} | set(self.diagram.fixed.values())
+
+    def _geometries(self, bodies: set[BodyIndex]) -> list[GeometryId]:
+        return collision_geometries(self.diagram.plant, bodies)
+
+    def _set_mass(self, target: BodyIndex, mass: float | None) -> None:
+        if mass is None:
+            return
+        body = self.diagram.plant.get_body(target)
+        unit = body.default_spatial_inertia().get_unit_inertia()
+        body.SetSpatialInertiaInBodyFrame(
+            self.diagram.plant.GetMyMutableContextFromRoot(self.context),
+            SpatialInertia(mass, body.default_com(), unit),
+        )
+
+
+def collision_geometries(plant: MultibodyPlant, bodies: Iterable[BodyIndex]) -> list[GeometryId]:
+    """Collision geometries of bodies, in the plant's order."""
+    return [
+        geometry
+        for index in sorted(bodies)
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
+    ]
+
+
+def check_overrides(friction: float | None, mass: float | None) -> None:
+    """Refuses what is no friction coefficient or mass.
+
+    Raises:
+        InvalidInputError: friction is below 0, or the mass is not above 0.
+    """
+    if friction is not None and not 0.0 <= friction < np.inf:
+        raise InvalidInputError(f"friction is {friction}; give a coefficient of 0 or more")
+    if mass is not None and not 0.0 < mass < np.inf:
+        raise InvalidInputError(f"mass is {mass} kg; give more than 0")

@@ -1,0 +1,9 @@
+from .scene_check import (
+    DEEPEST as DEEPEST,
+    SceneCheck as SceneCheck,
+)
+from .scene_issues import (
+    check_scene as check_scene,
+    overlaps as overlaps,
+)
+from .sound_scene import require_sound_scene as require_sound_scene

@@ -1,0 +1,252 @@
+"""The one place that builds Drake diagrams: a scene on a station, with a hand, an arm or neither.
+
+Ports of the diagram (MODEL is `hand`, `arm` or `lift`; n joints of the arm):
+
+    inputs   MODEL.desired_state      positions and velocities for the joint servos
+             MODEL.feedforward        what the servos add to it [Nm, N]; nothing if not connected
+             applied_forces           list of ExternallyAppliedSpatialForce
+    outputs  MODEL.actuation          what the joints got, within the model's effort limits [Nm, N]
+             MODEL.state, state, contact_results, body_poses, geometry_query,
+             camera.NAME.color_image, .depth_image, .label_image, .pose, .point_cloud (with cameras)
+
+Connect the `desired_state` of all models, or of none, which leaves the joints without actuation:
+with some of them, Drake ends the process.
+
+With `drivers=True` arm and hand are commanded as Drake's stations are, and measure as they do:
+
+    inputs   arm.position (n), or arm.desired_state (2 n), but not both
+             hand.position            distance between the pads [m]; or hand.desired_state
+             hand.force_limit         of each pad [N]; the document's force if not connected
+             plan, plan.start_time    a `Plan` to play, and from when on [s]; 0 if not connected.
+                                      Once it has begun, it goes before the other commands
+    outputs  arm.position_commanded, .position_measured, .velocity_estimated (n), .estimated_state
+             arm.torque_commanded, .torque_measured, .external_torque (n) [Nm]
+             hand.state_measured      distance between the pads and its rate [m, m/s]
+             hand.force_measured      of a pad [N]
+             wrist.force_torque       of the hand on the arm, in H: torque, then force [Nm, N]
+             reaction_forces          of all joints
+
+All inputs may be left out then: what nobody commands holds still. docs/diagram.md says what each
+means. Gravity does not pull the robot, as a real one compensates its own weight, unless the station
+gives its arm an inverse-dynamics controller (`ArmControl`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, get_args
+
+from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.tree import (
+    BodyIndex,
+    Joint,
+)
+from pydrake.planning import RobotDiagram, RobotDiagramBuilder
+
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
+from burg_drake.scene.document import Scene
+from burg_drake.station.control import export_driven_ports, export_ports
+from burg_drake.station.diagram.leaning import soften_touching
+from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.world import (
+    RISE as RISE,
+    Robot,
+    add_board,
+    add_cameras,
+    add_instance,
+    add_obstacles,
+    add_rise,
+    add_robot,
+    add_table,
+    joint_actuators,
+    part_rolling,
+    set_default_posture,
+    set_packages,
+)
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat, SceneGraph
+
+
+@dataclass(frozen=True, eq=False)
+class StationDiagram:
+    """A built diagram and the names to find things in it.
+
+    Attributes:
+        diagram: the Drake diagram; keep it alive while its plant is used.
+        scene, station, robot, engine: what it was built from.
+        free: body of each instance that is not background, by name.
+        fixed: bodies of background instances and obstacles, by name.
+        table: the table's body.
+        robot_bodies: all bodies of hand and arm.
+    """
+
+    diagram: RobotDiagram
+    scene: Scene
+    station: Station
+    robot: Robot
+    engine: Engine
+    free: dict[str, BodyIndex]
+    fixed: dict[str, BodyIndex]
+    table: BodyIndex
+    robot_bodies: tuple[BodyIndex, ...]
+
+    @property
+    def plant(self) -> MultibodyPlant:
+        """The plant, finalized."""
+        return self.diagram.plant()
+
+    @property
+    def scene_graph(self) -> SceneGraph:
+        """The scene graph."""
+        return self.diagram.scene_graph()
+
+    @property
+    def arm_joints(self) -> tuple[Joint, ...]:
+        """The arm's joints in the order of the station's home posture; none without an arm."""
+        if self.robot != "arm":
+            return ()
+        model = self.plant.GetModelInstanceByName("arm")
+        return tuple(actuator.joint() for actuator in joint_actuators(self.plant, model))
+
+    @property
+    def body_names(self) -> dict[BodyIndex, str]:
+        """What people call a body: the names of instances and obstacles, `table`, robot links."""
+        names = {index: name for name, index in {**self.free, **self.fixed}.items()}
+        links = {i: self.plant.get_body(i).name() for i in self.robot_bodies}
+        return names | links | {self.table: "table"}
+
+    def X_WO(self, instance: str) -> Array:
+        """(4, 4) pose at which the document places an instance."""
+        return instance_pose(self.scene, self.station, instance)
+
+
+def instance_pose(scene: Scene, station: Station, instance: str) -> Array:
+    """`X_WO` (4, 4) of an instance as the documents place it."""
+    return station.document.X_WS.matrix() @ scene.X_SO(instance)
+
+
+def build_station_diagram(
+    scene: Scene,
+    station: Station,
+    *,
+    robot: Robot = "arm",
+    engine: Engine = ENGINES["standard"],
+    meshcat: Meshcat | None = None,
+    drivers: bool = False,
+    cameras: bool | str | Sequence[str] = False,
+    weld_objects: bool = False,
+) -> StationDiagram:
+    """Builds the diagram of a scene on a station.
+
+    Objects are rigid, but those that touch other objects are compliant (see `station.touching`).
+
+    Args:
+        scene: what stands on the board.
+        station: robot, table, board pose and cameras.
+        robot: `arm` mounts the hand on the station's arm. `hand` lets it hang on one prismatic
+            joint `lift` along world z between the frames `lift_base` (in the world) and
+            `lift_mount` (on the hand), which are set per grasp through the Context; before that
+            the hand is above the board, pointing down. `none` leaves the robot out.
+        engine: time step and contact settings.
+        meshcat: where to show the diagram live, if anywhere.
+        drivers: let positions, widths or a plan command the robot, and measure what it feels; see
+            the ports above. Needs an arm.
+        cameras: add the station's cameras, all or the named ones; needs the renderer's system
+            libraries. The board's markers are drawn with cameras or `meshcat` only; it is plain
+            where nobody looks.
+        weld_objects: for a plant of the robot alone that is not simulated: what would be free
+            stands where it is placed, and can be lifted off by a joint `RISE` of its model along
+            world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
+            (see `station.hollow`).
+
+    Returns:
+        The diagram. In its default context all stands as the documents say, the hand is open and
+        the arm is in its home posture.
+
+    Raises:
+        UnknownNameError: no such `robot` or camera.
+        InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station,
+            a home posture that does not fit the arm, or two things of the same name.
+        MissingDependencyError: cameras without the renderer's system libraries.
+    """
+    if drivers and (robot != "arm" or weld_objects):
+        raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
+    if robot not in get_args(Robot):
+        raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
+    builder = RobotDiagramBuilder(time_step=engine.time_step)
+    plant = builder.plant()
+    set_packages(builder.parser(), {})
+    builder.parser().SetAutoRenaming(True)
+    _set_engine(plant, engine)
+
+    table = add_table(plant, station)
+    add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
+    add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
+    free = {name: add(name) for name in scene.instances}
+    fixed = {name: add(name) for name in scene.background}
+    for name, body in fixed.items():
+        X_WO = instance_pose(scene, station, name)
+        plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
+    for name, body in (free if weld_objects else {}).items():
+        add_rise(plant, body, RigidTransform(instance_pose(scene, station, name)))
+    fixed |= add_obstacles(plant, station)
+    models = add_robot(builder, station, robot)
+
+    plant.Finalize()
+    for name, body in ({} if weld_objects else free).items():
+        X_WO = instance_pose(scene, station, name)
+        plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform(X_WO))
+    set_default_posture(plant, station, models)
+
+    if drivers:
+        export_driven_ports(builder, scene, station, models)
+    else:
+        export_ports(builder, station, models, controlled=not weld_objects)
+    if cameras:
+        named = (cameras,) if isinstance(cameras, str) else cameras
+        add_cameras(builder, station, None if named is True else named)
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(builder.builder(), builder.scene_graph(), meshcat)
+    built = StationDiagram(
+        diagram=builder.Build(),
+        scene=scene,
+        station=station,
+        robot=robot,
+        engine=engine,
+        free={name: body.index() for name, body in free.items()},
+        fixed={name: body.index() for name, body in fixed.items()},
+        table=table.index(),
+        robot_bodies=tuple(i for m in models.values() for i in plant.GetBodyIndices(m)),
+    )
+    if not weld_objects:
+        part_rolling(built)
+        soften_touching(built)
+    return built
+
+
+def _set_engine(plant: MultibodyPlant, engine: Engine) -> None:
+    plant.set_contact_model(
+        {
+            "hydroelastic_with_fallback": ContactModel.kHydroelasticWithFallback,
+            "point": ContactModel.kPoint,
+        }[engine.contact_model]
+    )
+    plant.set_discrete_contact_approximation(
+        {
+            "lagged": DiscreteContactApproximation.kLagged,
+            "similar": DiscreteContactApproximation.kSimilar,
+            "sap": DiscreteContactApproximation.kSap,
+        }[engine.contact_approximation]
+    )
+    plant.set_stiction_tolerance(engine.stiction_tolerance)
+    plant.set_contact_surface_representation(
+        {
+            "polygon": HydroelasticContactRepresentation.kPolygon,
+            "triangle": HydroelasticContactRepresentation.kTriangle,
+        }[engine.contact_surface]
+    )

@@ -1,0 +1,29 @@
+from .board_visibility import (
+    frustum as frustum,
+    seen_share as seen_share,
+)
+from .boxes import boxes_in_scene as boxes_in_scene
+from .content import world_content as world_content
+from .engine import (
+    ENGINES as ENGINES,
+    Engine as Engine,
+    engine_preset as engine_preset,
+)
+from .grasp_motion import GraspMotion as GraspMotion
+from .gripper_document import (
+    Finger as Finger,
+    Hand as Hand,
+    load_hand as load_hand,
+    locate_hand as locate_hand,
+)
+from .station_document import (
+    HALF_PIXEL as HALF_PIXEL,
+    MODEL_NAMES as MODEL_NAMES,
+    Arm as Arm,
+    Camera as Camera,
+    Obstacle as Obstacle,
+    Station as Station,
+    StationDocument as StationDocument,
+    Table as Table,
+    load_station as load_station,
+)

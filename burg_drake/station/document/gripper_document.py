@@ -1,0 +1,142 @@
+"""The gripper document: a parallel hand as data.
+
+Whether it fits its model is the matter of `station.hand_check`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from burg_drake.core import Array, FieldError, UnknownNameError, inverse
+from burg_drake.core.documents import Pose, load_document
+from burg_drake.core.paths import NO_PACKAGES, Packages, named_packages, require_name, resolve
+
+LONGEST_CLOSING = 60.0
+"""Time in which an open hand has to close [s]; the slowest on sale take half of it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finger:
+    """One finger of a parallel hand.
+
+    Attributes:
+        body: link of the finger in the hand's model.
+        joint: prismatic joint that moves it.
+        pad: name of the collision geometry that touches the object; compliant, as objects are not.
+        closed: joint position with the pads at the smallest distance [m].
+        open: joint position with the pads at the largest distance [m].
+    """
+
+    body: str
+    joint: str
+    pad: str
+    closed: float
+    open: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hand:
+    """Schema of a hand document in `models/hands`.
+
+    Attributes:
+        name: the hand's name.
+        description: for people.
+        source: where the figures come from.
+        model: reference to the hand's model file.
+        body: link that the arm carries; its frame is H.
+        X_HG: grasp frame in H (midway between the pads; +z approach, +x closing).
+        opening: smallest and largest distance between the pads [m].
+        force: force of each finger on the object while gripping [N].
+        closing_speed: speed of each finger while closing [m/s].
+        coupled: one drive moves both fingers, each in proportion to its way from open to closed;
+            where the model does not say so by itself (`mimic`), it is made so.
+        fingers: the two fingers; the first one is on the side of +x of G.
+    """
+
+    version: int = 1
+    name: str
+    description: str = ""
+    source: str = ""
+    model: str
+    body: str
+    X_HG: Pose
+    opening: tuple[float, float]
+    force: float
+    closing_speed: float
+    coupled: bool = True
+    fingers: tuple[Finger, Finger]
+
+    def __post_init__(self) -> None:
+        require_name(self.name, "name")
+        low, high = self.opening
+        if not 0.0 <= low < high:
+            raise FieldError(
+                f"opening {list(self.opening)} must rise from 0 or above [m]", "opening"
+            )
+        for name, unit in (("force", "N"), ("closing_speed", "m/s")):
+            if not (value := getattr(self, name)) > 0.0:
+                raise FieldError(f"{name} is {value:g} {unit}; it has to be above 0", name)
+        if self.closing_time > LONGEST_CLOSING:
+            raise FieldError(
+                f"closing_speed is {self.closing_speed:g} m/s, with which the open hand takes"
+                f" {self.closing_time:.3g} s to close; at most {LONGEST_CLOSING:g} s can be"
+                " simulated",
+                "closing_speed",
+            )
+        for i, finger in enumerate(self.fingers):
+            if finger.closed == finger.open:
+                raise FieldError(
+                    f"finger {finger.body!r}: closed and open are both {finger.open:g} m",
+                    *("fingers", i, "closed"),
+                )
+        one, other = self.fingers
+        for name in ("body", "joint"):
+            if (shared := getattr(other, name)) == getattr(one, name):
+                raise FieldError(f"both fingers name the {name} {shared!r}", "fingers", 1, name)
+
+    @property
+    def closing_time(self) -> float:
+        """Time that the open hand takes to close [s]."""
+        return (self.opening[1] - self.opening[0]) / 2.0 / self.closing_speed
+
+    def X_AH(self, X_AG: Array) -> Array:
+        """Hand body poses (..., 4, 4) that bring the grasp frame to `X_AG` (..., 4, 4)."""
+        return X_AG @ inverse(self.X_HG.matrix())
+
+
+def load_hand(reference: str, base: Path | None = None) -> Hand:
+    """Loads a hand document by path or built-in name such as `panda_hand`.
+
+    Raises:
+        UnknownNameError: no such hand.
+        DocumentError: the file does not fit the schema.
+    """
+    return load_document(resolve(reference, "models/hands", base), Hand)
+
+
+def locate_hand(
+    reference: str, base: Path | None = None, packages: Packages = NO_PACKAGES
+) -> tuple[Hand, Path, Path]:
+    """Loads a hand document and finds the model file that it names.
+
+    Args:
+        reference: built-in name or path, relative to `base`.
+        base: folder of the document that names it.
+        packages: what a station says of packages.
+
+    Returns:
+        The hand, its model file, and the document's file.
+
+    Raises:
+        UnknownNameError: no such hand, model, or package that the model names.
+        DocumentError: the file does not fit the schema.
+    """
+    path = resolve(reference, "models/hands", base, packages)
+    hand = load_document(path, Hand)
+    try:
+        model = resolve(hand.model, base=path.parent, packages=packages)
+        named_packages(model, packages)
+        return hand, model, path
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path}: model: {error}") from error

@@ -1,0 +1,62 @@
+from .board_visual import (
+    board_meshes as board_meshes,
+    marker_grid as marker_grid,
+)
+from .camera_sensors import (
+    LIGHTS as LIGHTS,
+    add_cameras as add_cameras,
+)
+from .gripper import (
+    gripper_of as gripper_of,
+    station_gripper as station_gripper,
+)
+from .hand_check import (
+    HandFigures as HandFigures,
+    check_hand as check_hand,
+)
+from .hand_model import (
+    STALL as STALL,
+    add_hand as add_hand,
+    find_hand as find_hand,
+)
+from .instances import (
+    PLACE as PLACE,
+    RISE as RISE,
+    add_instance as add_instance,
+    add_rise as add_rise,
+    taken_name as taken_name,
+)
+from .mesh_pieces import (
+    is_mesh as is_mesh,
+    mesh_by_pieces as mesh_by_pieces,
+)
+from .model_file import (
+    add_models as add_models,
+    held_remarks as held_remarks,
+    set_packages as set_packages,
+)
+from .robot import (
+    ROBOT_MODELS as ROBOT_MODELS,
+    Robot as Robot,
+    add_robot as add_robot,
+    inverse_dynamics as inverse_dynamics,
+    joint_actuators as joint_actuators,
+    set_default_posture as set_default_posture,
+)
+from .rolling import (
+    is_ball as is_ball,
+    part_rolling as part_rolling,
+)
+from .surroundings import (
+    DISSIPATION as DISSIPATION,
+    OBSTACLE_COLOR as OBSTACLE_COLOR,
+    TABLE_COLOR as TABLE_COLOR,
+    TABLE_MODULUS as TABLE_MODULUS,
+    FixedBox as FixedBox,
+    add_board as add_board,
+    add_obstacles as add_obstacles,
+    add_table as add_table,
+    obstacle_boxes as obstacle_boxes,
+    table_box as table_box,
+    taken_obstacle as taken_obstacle,
+)

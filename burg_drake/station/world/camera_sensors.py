@@ -1,0 +1,117 @@
+"""The station's cameras as Drake sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from pydrake.geometry import (
+    ClippingRange,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    LightParameter,
+    MakeRenderEngineVtk,
+    RenderCameraCore,
+    RenderEngineVtkParams,
+)
+from pydrake.math import RigidTransform
+from pydrake.perception import BaseField, DepthImageToPointCloud
+from pydrake.planning import RobotDiagramBuilder
+from pydrake.systems.sensors import CameraInfo, PixelType, RgbdSensor
+
+from burg_drake.core import MissingDependencyError
+from burg_drake.station.document import HALF_PIXEL, Camera, Station
+from burg_drake.station.world.area_camera import AreaCamera, finer
+from burg_drake.system_libraries import apt_command, missing_render_libraries
+
+RENDERER = "burg_drake"
+LIGHTS = [
+    LightParameter(
+        type="directional", frame=frame, direction=np.array(direction), intensity=intensity
+    )
+    for frame, direction, intensity in (
+        ("world", (-0.3, 0.3, -1.0), 0.6),
+        ("camera", (0.2, 0.1, 1.0), 0.65),
+    )
+]
+"""Room light from above, and a weaker light that goes with the camera, so that nothing is black.
+Without shadows, which cost three times the rendering."""
+
+
+def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera]:
+    """Drake's render cameras of a station camera."""
+    (fx, fy), (cx, cy) = camera.focal, camera.principal_point
+    info = CameraInfo(camera.width, camera.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)
+    near, far = camera.depth_range
+    core = RenderCameraCore(RENDERER, info, ClippingRange(near / 2, far * 2), RigidTransform())
+    return ColorRenderCamera(core, False), DepthRenderCamera(core, DepthRange(near, far))
+
+
+def add_cameras(
+    builder: RobotDiagramBuilder, station: Station, names: Iterable[str] | None = None
+) -> None:
+    """Adds a renderer and one `RgbdSensor` a camera, ports exported as `camera.NAME.*`.
+
+    Args:
+        builder: of the diagram.
+        station: has the cameras.
+        names: those to add; all if not given.
+
+    Raises:
+        UnknownNameError: the station has no such camera.
+        MissingDependencyError: a system library of the renderer is missing (it would crash).
+    """
+    names = station.document.cameras if names is None else names
+    cameras = {name: station.camera(name) for name in names}
+    missing = missing_render_libraries()
+    if missing:
+        raise MissingDependencyError(
+            f"cameras need the system libraries {', '.join(missing)}; run: {apt_command()}"
+        )
+    scene_graph, system = builder.scene_graph(), builder.builder()
+    scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams(lights=LIGHTS)))
+    for name, camera in cameras.items():
+        color, depth = render_cameras(camera)
+        sensor = system.AddSystem(
+            RgbdSensor(
+                scene_graph.world_frame_id(),
+                RigidTransform(np.array(camera.X_WC.matrix())),
+                color,
+                depth,
+            )
+        )
+        sensor.set_name(f"camera.{name}")
+        query = scene_graph.get_query_output_port()
+        system.Connect(query, sensor.query_object_input_port())
+        color_image = sensor.color_image_output_port()
+        if camera.samples > 1:
+            fine, _ = render_cameras(finer(camera))
+            area = AreaCamera(fine, camera.samples, scene_graph.world_frame_id())
+            system.AddNamedSystem(f"camera.{name}.area", area)
+            system.Connect(query, area.GetInputPort("geometry_query"))
+            system.Connect(sensor.body_pose_in_world_output_port(), area.GetInputPort("X_WC"))
+            color_image = area.GetOutputPort("color_image")
+        for port, image in (
+            (color_image, "color_image"),
+            (sensor.depth_image_32F_output_port(), "depth_image"),
+            (sensor.label_image_output_port(), "label_image"),
+        ):
+            system.ExportOutput(port, f"camera.{name}.{image}")
+        X_WC = sensor.body_pose_in_world_output_port()
+        cloud = system.AddNamedSystem(f"camera.{name}.cloud", _point_cloud(camera))
+        system.Connect(sensor.depth_image_32F_output_port(), cloud.depth_image_input_port())
+        system.Connect(color_image, cloud.color_image_input_port())
+        system.Connect(X_WC, cloud.camera_pose_input_port())
+        system.ExportOutput(X_WC, f"camera.{name}.pose")
+        system.ExportOutput(cloud.point_cloud_output_port(), f"camera.{name}.point_cloud")
+
+
+def _point_cloud(camera: Camera) -> DepthImageToPointCloud:
+    """Makes coloured points of the depth image. It takes pixels by their indices, which are
+    OpenCV's coordinates of their centres: with Drake's principal point all would be half a pixel
+    aside."""
+    info = CameraInfo(camera.width, camera.height, *camera.focal, *camera.principal_point)
+    return DepthImageToPointCloud(
+        info, PixelType.kDepth32F, fields=int(BaseField.kXYZs) | int(BaseField.kRGBs)
+    )

@@ -1,0 +1,1 @@
+from .setup_page import SetupPage as SetupPage

@@ -1,0 +1,53 @@
+"""The panel that fills the board at random, or clears it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+
+from burg_drake.compose.commands import MOST, Clear, RandomConfiguration
+from burg_drake.compose.editing import SessionView
+from burg_drake.scene.document import LAYOUTS
+from burg_drake.ui.widgets import PageActions, quiet_button
+
+LARGEST_SEED = 2**31 - 1
+
+
+class FillPanel:
+    """Puts objects on the board at random, or takes all away.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        icon = viser.Icon
+        with gui.add_folder("Random configuration"):
+            self._count = gui.add_number(
+                "Objects", 0, min=0, max=MOST, step=1, hint="0: those that are on the board"
+            )
+            self._layout = gui.add_dropdown("Layout", LAYOUTS)
+            self._seed: Any = gui.add_number(
+                "Seed", 1, min=0, max=LARGEST_SEED, step=1, hint="Of the next configuration"
+            )
+            actions.clicked(
+                quiet_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
+            )
+            self._clear = actions.clicked(
+                quiet_button(gui, "Clear scene", width=6, icon=icon.TRASH),
+                lambda: actions.session.do(Clear()),
+            )
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view."""
+        self._clear.disabled = not view.instances
+
+    def _shuffle(self) -> None:
+        seed = self._seed.value
+        self._seed.value = min(seed + 1, LARGEST_SEED)  # also if there is no room this time
+        self._actions.session.do(
+            RandomConfiguration(seed, self._count.value or None, self._layout.value)
+        )

@@ -1,0 +1,187 @@
+"""The panel of what is selected: its name, numbers for its pose, and what can be done with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from burg_drake.compose.commands import Delete, Duplicate, MoveObjects, Rename, SetFixed, Turn
+from burg_drake.compose.editing import SessionView
+from burg_drake.core import Array, rotation_from_rpy, rpy_from_rotation
+from burg_drake.ui.widgets import (
+    NAMING,
+    PageActions,
+    all_of,
+    box,
+    dot,
+    look_of,
+    quiet,
+    quiet_button,
+    title,
+)
+
+QUARTER_DEG = 90.0
+DECIMALS_MM, DECIMALS_DEG = 2, 2
+LARGEST_MM = 100_000.0
+
+
+class ObjectPanel:
+    """Shows the selection and edits it.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        self._text = gui.add_html("")
+        self._one = gui.add_folder(None)
+        with self._one:
+            self._name = actions.typed(gui.add_text("Name", ""), self._rename, after=NAMING)
+            self._fixed = actions.chosen(
+                gui.add_checkbox(
+                    "Background", False, hint="It stays where it is when the scene is simulated"
+                ),
+                self._fix,
+            )
+            self._planar = _Numbers(gui, actions, free=False)
+            self._free = _Numbers(gui, actions, free=True)
+        self._restrict = actions.chosen(
+            gui.add_checkbox(
+                "x, y, yaw only",
+                True,
+                hint="Objects keep their height and tilt while they are moved; without it they are"
+                " free, and have handles for all six directions",
+            ),
+            lambda planar: actions.session.restrict_movement(planar),
+        )
+        self._some = gui.add_folder(None)
+        with self._some:
+            self._buttons(gui, actions)
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view."""
+        names = view.selection
+        self._restrict.value = view.planar
+        self._one.visible = len(names) == 1
+        self._some.visible = bool(names)
+        self._text.content = _about(view)
+        if len(names) == 1:
+            self._name.show(names[0])
+            self._fixed.value = view.instances[names[0]] in view.document.background
+            for numbers, shown in ((self._planar, view.planar), (self._free, not view.planar)):
+                numbers.show(view.X_SO(names[0]), shown)
+
+    def _rename(self, new: str) -> None:
+        names = self._actions.session.view.selection
+        if len(names) == 1:
+            self._actions.session.do(Rename(names[0], new), field="name")
+
+    def _fix(self, fixed: bool) -> None:
+        self._actions.session.do(SetFixed(self._actions.session.view.selection, fixed))
+
+    def _buttons(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        icon, selected = viser.Icon, actions.with_selection
+        actions.clicked(
+            quiet_button(gui, "−90°", width=3, hint="Turn clockwise"),
+            selected(lambda names: Turn(names, -QUARTER_DEG)),
+        )
+        actions.clicked(
+            quiet_button(gui, "+90°", width=3, hint="Turn counter-clockwise"),
+            selected(lambda names: Turn(names, QUARTER_DEG)),
+        )
+        actions.clicked(
+            quiet_button(gui, "Copy", width=3, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
+            selected(Duplicate),
+        )
+        actions.clicked(
+            quiet_button(gui, "Delete", width=3, icon=icon.TRASH, hint="Delete (Del)"),
+            selected(Delete),
+        )
+
+
+class _Numbers:
+    """Fields of a pose: x, y and yaw, or all six."""
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, *, free: bool) -> None:
+        self._actions, self._free = actions, free
+        limit = LARGEST_MM
+        if free:
+            position: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.01)
+            angles: Any = gui.add_vector3("roll, pitch, yaw [°]", (0.0, 0.0, 0.0), step=0.01)
+        else:
+            position = gui.add_vector2("x, y [mm]", (0.0, 0.0), step=0.01)
+            angles = gui.add_number("yaw [°]", 0.0, step=0.01, min=-limit, max=limit)
+        self._position = actions.typed(position, self._place)
+        self._angles = actions.typed(angles, self._turn)
+
+    def show(self, X_SO: Array, visible: bool) -> None:
+        """Shows a pose (4, 4), or nothing."""
+        position, angles = _numbers(X_SO)
+        self._position.handle.visible = self._angles.handle.visible = visible
+        self._position.show(position if self._free else position[:2])
+        self._angles.show(angles if self._free else angles[2])
+
+    def _place(self, typed_mm: tuple[float, ...]) -> None:
+        """Moves the selected object; numbers that were left alone stay exact."""
+        if (X_SO := self._selected()) is None:
+            return
+        shown_mm, _ = _numbers(X_SO)
+        typed_mm = (*typed_mm, shown_mm[2])[:3]
+        exact_mm = 1e3 * X_SO[:3, 3]
+        p_mm = [e if t == s else t for t, s, e in zip(typed_mm, shown_mm, exact_mm, strict=True)]
+        X_SO[:3, 3] = 1e-3 * np.array(p_mm)
+        self._move(X_SO, "position")
+
+    def _turn(self, typed: Any) -> None:
+        """Turns the selected object; angles that were left alone stay exact."""
+        if (X_SO := self._selected()) is None:
+            return
+        _, shown_deg = _numbers(X_SO)
+        typed_deg = tuple(typed) if self._free else (*shown_deg[:2], typed)
+        exact_deg = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
+        rpy = [e if t == s else t for t, s, e in zip(typed_deg, shown_deg, exact_deg, strict=True)]
+        if typed_deg != shown_deg:
+            X_SO[:3, :3] = rotation_from_rpy(np.deg2rad(rpy))
+        self._move(X_SO, "angles")
+
+    def _selected(self) -> Array | None:
+        """(4, 4) pose of the selected object; None unless it is one."""
+        view = self._actions.session.view
+        return view.X_SO(view.selection[0]) if len(view.selection) == 1 else None
+
+    def _move(self, X_SO: Array, field: str) -> None:
+        session = self._actions.session
+        session.do(MoveObjects({session.view.selection[0]: X_SO}), field=field)
+
+
+def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """x, y, z [mm] and roll, pitch, yaw [degrees], rounded for people."""
+    position = tuple((np.round(1e3 * X_SO[:3, 3], DECIMALS_MM) + 0.0).tolist())
+    angles = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
+    return position, tuple((np.round(angles, DECIMALS_DEG) + 0.0).tolist())
+
+
+def _about(view: SessionView) -> str:
+    names = view.selection
+    if not names:
+        return all_of(
+            box(
+                quiet(
+                    "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag beside"
+                    " objects selects all in a rectangle."
+                )
+            )
+        )
+    if len(names) > 1:
+        return all_of(box(title(f"{len(names)} objects"), quiet(", ".join(names))))
+    status = view.status.get(names[0], "ok")
+    entry = view.library.objects.get(view.instances[names[0]].object)
+    kind = view.instances[names[0]].object
+    if entry is not None and not entry.is_fixed:
+        kind = f"{kind}, {1e3 * entry.mass:.0f} g"
+    look = look_of(status)
+    return all_of(box(title(names[0]), quiet(kind), dot(look.hex), look.words))

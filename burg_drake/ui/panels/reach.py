@@ -1,0 +1,110 @@
+"""The panel of reach: where on the board the arm grasps from above."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import viser
+
+from burg_drake.compose.background import BackgroundJob, BackgroundWorker, Cancelled
+from burg_drake.compose.editing import SessionView
+from burg_drake.scene.document import Board
+from burg_drake.ui.panels.reach_task import ReachTask
+from burg_drake.ui.view import BoardLayers, BoardOverlay
+from burg_drake.ui.widgets import PageActions, all_of, box, quiet
+
+if TYPE_CHECKING:
+    from burg_drake.motion.workspace import ReachLayer
+
+HEIGHT_MM = 50.0
+HIGHEST_MM = 1000.0
+OPACITY = 0.55
+PIXELS = 8
+"""Of the picture, a cell; so that its cells keep sharp edges."""
+
+
+class ReachPanel:
+    """Shows what the arm reaches.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+        layers: of the board.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
+        self._actions, self._layers = actions, layers
+        self._worker = BackgroundWorker()
+        self._asked: tuple[Board, float] | None = None
+        self._job: BackgroundJob[ReachLayer] | None = None
+        with gui.add_folder("Reach"):
+            self._on = gui.add_checkbox(
+                "Arm's reach", False, hint="Where the arm can grasp straight from above"
+            )
+            self._height = gui.add_number(
+                "Height [mm]",
+                HEIGHT_MM,
+                min=0.0,
+                max=HIGHEST_MM,
+                step=5.0,
+                hint="Of the middle between the fingers above the board",
+            )
+            self._text = gui.add_html("")
+            actions.chosen(self._on, lambda on: self.show(actions.session.view))
+            actions.typed(self._height, lambda height: self.show(actions.session.view))
+
+    def close(self) -> None:
+        """Ends the worker process."""
+        self._worker.close()
+
+    def show(self, view: SessionView) -> None:
+        """Brings layer and panel to a view; computes what is not known yet."""
+        self._height.visible = bool(self._on.value)
+        if not self._on.value:
+            self._drop()
+            return
+        asked = view.document.board, 1e-3 * float(self._height.value)
+        if asked == self._asked:
+            return
+        self._drop()
+        self._asked = asked
+        station = self._actions.session.station
+        if station.document.arm is None:
+            self._say("The station has no arm.")
+            return
+        self._say("Computing, the first time for half a minute ...")
+        self._job = self._worker.ask(ReachTask(station, *asked), self._told)
+
+    def _drop(self) -> None:
+        self._asked = None
+        job, self._job = self._job, None
+        if job is not None:
+            job.cancel()
+        self._layers.show("reach", None)
+        self._say("")
+
+    def _told(self, job: BackgroundJob[ReachLayer]) -> None:
+        """Called by the worker's thread."""
+        if job.done:
+            self._actions.ask(lambda: self._finish(job), patient=True)
+
+    def _finish(self, job: BackgroundJob[ReachLayer]) -> None:
+        if job is not self._job:
+            return
+        if job.error is not None:
+            if not isinstance(job.error, Cancelled):
+                self._say(str(job.error))
+            return
+        from burg_drake.visualization.pictures import reach_image, reachability_key
+
+        layer = job.wait()
+        width, depth = self._actions.session.view.document.board.size
+        pixels = reach_image(layer, pixels=PIXELS)
+        self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), OPACITY))
+        share = f"Some turn of the hand reaches {layer.covered:.0%} of the board."
+        self._text.content = all_of(box(reachability_key(), quiet(share)))
+
+    def _say(self, line: str) -> None:
+        content = all_of(box(quiet(line))) if line else ""
+        if self._text.content != content:
+            self._text.content = content

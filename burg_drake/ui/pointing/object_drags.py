@@ -1,0 +1,129 @@
+"""Objects dragged with the mouse: over the board, or, with Shift, about the vertical.
+
+A drag moves in the plane through the point that was grabbed, parallel to the board: what is under
+the pointer stays under it, from wherever the camera looks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from burg_drake.compose.editing import Drag
+from burg_drake.core import Array, BurgError, make_pose, rot_z
+from burg_drake.ui.pointing.centers import about, common_middle
+from burg_drake.ui.pointing.pointer import Eye
+from burg_drake.ui.widgets import PageActions
+
+UP = np.array([0.0, 0.0, 1.0])
+FULL_TURN = 2.0 * np.pi
+"""By which an object turns while the pointer goes across the whole page [rad]."""
+
+
+@dataclass(eq=False)
+class _Held:
+    """A drag of a page.
+
+    Attributes:
+        drag: of the session.
+        X_SO: (4, 4) poses by instance at the start.
+        p_SM: (3,) what turns go about [m].
+        p_SG: (3,) what was grabbed [m].
+        x: of the pointer on the page at the start, 0 to 1.
+    """
+
+    drag: Drag
+    X_SO: dict[str, Array]
+    p_SM: Array
+    p_SG: Array
+    x: float
+
+
+class ObjectDrags:
+    """Makes handles in the scene draggable.
+
+    Args:
+        actions: what may be done with the session.
+    """
+
+    def __init__(self, actions: PageActions) -> None:
+        self._actions = actions
+        self._held: dict[int, _Held] = {}
+
+    def attach(self, handle: Any, name: str) -> None:
+        """Lets pages drag an instance by a handle of viser."""
+
+        async def move(event: Any) -> None:
+            self._follow(event, name, turns=False)
+
+        async def turn(event: Any) -> None:
+            self._follow(event, name, turns=True)
+
+        handle.on_drag("left")(move)
+        handle.on_drag("left", modifier="shift")(turn)
+
+    def drop(self, client_id: int) -> None:
+        """A page is gone; what it held stays where it is."""
+        self._actions.ask(lambda: self._end(client_id))
+
+    def put_back(self, client_id: int) -> bool:
+        """Puts back what a page drags; False if it drags nothing."""
+        held = self._held.pop(client_id, None)
+        if held is None or held.drag.is_over:
+            return False
+        held.drag.cancel()
+        return True
+
+    def _follow(self, event: Any, name: str, *, turns: bool) -> None:
+        """Takes what has happened on a page as an action; the event loop goes on at once."""
+        client, who = event.client, event.client_id
+        x = float(event.end_screen_pos[0])
+        if event.phase == "start":
+            p_SG = np.array(event.start_position)
+            self._actions.ask(lambda: self._begin(who, name, p_SG, x), client)
+        elif event.phase == "update":
+            eye, p_SQ = Eye.of(client.camera), np.array(event.end_position)
+            self._actions.ask(
+                lambda: self._turn(who, x) if turns else self._move(who, eye, p_SQ),
+                client,
+                key=f"drag {who}",
+            )
+        else:
+            self._actions.ask(lambda: self._end(who), client)
+
+    def _begin(self, who: int, name: str, p_SG: Array, x: float) -> None:
+        self._end(who)
+        view = self._actions.session.view
+        names = view.selection if name in view.selection else (name,)
+        X_SO = {held: view.X_SO(held) for held in names}
+        drag = self._actions.session.drag(names)
+        self._held[who] = _Held(drag, X_SO, common_middle(view, names), p_SG, x)
+
+    def _move(self, who: int, eye: Eye, p_SQ: Array) -> None:
+        held = self._held.get(who)
+        if held is None:
+            return
+        p_SP = eye.on_plane(p_SQ, held.p_SG, UP)
+        if p_SP is not None:
+            self._carry(who, held, make_pose(p_AB=p_SP - held.p_SG))
+
+    def _turn(self, who: int, x: float) -> None:
+        held = self._held.get(who)
+        if held is not None:
+            R = rot_z(FULL_TURN * (x - held.x))
+            self._carry(who, held, about(held.p_SM, R, np.zeros(3)))
+
+    def _carry(self, who: int, held: _Held, X: Array) -> None:
+        """Holds what is dragged where a motion (4, 4) in S brings it from the start."""
+        try:
+            held.drag.move({name: X @ X_SO for name, X_SO in held.X_SO.items()})
+        except BurgError:
+            self._held.pop(who, None)  # told once; the rest of the gesture is nothing any more
+            raise
+
+    def _end(self, who: int) -> None:
+        held = self._held.pop(who, None)
+        if held is not None and not held.drag.is_over:
+            held.drag.end()

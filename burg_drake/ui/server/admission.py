@@ -1,0 +1,140 @@
+"""Who may come in: looks at every request that reaches the door, websocket handshakes among them.
+
+A page that only this machine can reach is open to its browsers, as long as they name this machine
+as their host and no other site asks. One that other machines can reach wants a token besides: the
+first browser that brings it gets a cookie in its place, and the token is used up.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import threading
+from collections.abc import Callable
+from http import HTTPStatus
+from urllib.parse import parse_qs
+
+from websockets.asyncio.server import ServerConnection
+from websockets.http11 import Request, Response
+
+from burg_drake.core import HEADERS, RequestError, require_own_host
+from burg_drake.ui.server.html_page import POLICY, first_page
+
+TOKEN_BYTES = 24
+MOST_CONNECTIONS = 32
+"""Of browsers, each of which costs memory for what has yet to be sent to it."""
+ONCE = ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade")
+"""Headers that decide; twice in a request they would mean one thing here, another thing there."""
+
+
+class Admission:
+    """Judges requests.
+
+    Args:
+        host: the address that is listened on.
+        port: likewise.
+        title: of the page.
+        by_token: whether browsers need one.
+
+    Attributes:
+        on_admitted: called, in the server's thread, when a browser has used up the token, with
+            that browser's address.
+    """
+
+    def __init__(self, host: str, port: int, *, title: str, by_token: bool) -> None:
+        self.host = host
+        self.page = first_page(title)
+        self.on_admitted: Callable[[str], None] = lambda address: None
+        self._lock = threading.Lock()
+        self._token = secrets.token_urlsafe(TOKEN_BYTES) if by_token else None
+        self._secret = secrets.token_urlsafe(TOKEN_BYTES)
+        self._cookie = f"burg_drake_{port}"
+
+    @property
+    def token(self) -> str | None:
+        """What the next browser has to bring; None if none is asked for."""
+        with self._lock:
+            return self._token
+
+    def process_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Answers a request, as websockets asks for it.
+
+        Returns:
+            The page, a refusal, or None to go on with a websocket's handshake.
+        """
+        try:
+            return self._answer(connection, request)
+        except RequestError as error:
+            return self._response(connection, error.code, f"burg_drake: {error}\n")
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        for name in ONCE:
+            if len(request.headers.get_all(name)) > 1:
+                raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
+        path, _, query = request.path.partition("?")
+        upgrade = "Upgrade" in request.headers
+        require_own_host(request.headers.get, served=self.host, is_page=path == "/" and not upgrade)
+        if path != "/":
+            raise RequestError(HTTPStatus.NOT_FOUND, "there is only one page, /")
+        if upgrade:
+            self._require_browser(connection, request)
+            return None
+        return self._page(connection, request, query)
+
+    def _require_browser(self, connection: ServerConnection, request: Request) -> None:
+        """What opens a websocket is our page: browsers always say whose page asks."""
+        if "Origin" not in request.headers:
+            raise RequestError(HTTPStatus.FORBIDDEN, "a websocket of no page is refused")
+        if not self._has_cookie(request):
+            raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
+        if len(connection.server.connections) >= MOST_CONNECTIONS:
+            raise RequestError(
+                HTTPStatus.SERVICE_UNAVAILABLE, "too many browsers have the page open"
+            )
+
+    def _page(self, connection: ServerConnection, request: Request, query: str) -> Response:
+        cookie = None
+        if not self._has_cookie(request):
+            self._use_token(parse_qs(query).get("token", [""])[-1], connection)
+            cookie = f"{self._cookie}={self._secret}; Path=/; HttpOnly; SameSite=Strict"
+        response = self._response(connection, HTTPStatus.OK, self.page, "text/html")
+        if cookie is not None:
+            response.headers["Set-Cookie"] = cookie
+        return response
+
+    def _use_token(self, given: str, connection: ServerConnection) -> None:
+        with self._lock:
+            if self._token is None or not hmac.compare_digest(given.encode(), self._token.encode()):
+                raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
+            self._token = secrets.token_urlsafe(TOKEN_BYTES)
+        peer = connection.remote_address
+        self.on_admitted(str(peer[0]) if peer else "")
+
+    def _has_cookie(self, request: Request) -> bool:
+        """Whether this browser was admitted; without a token all are."""
+        if self._token is None:
+            return True
+        secret = self._secret.encode()
+        cookies = request.headers.get("Cookie", "").split(";")
+        given = (cookie.strip().partition("=") for cookie in cookies)
+        return any(
+            name == self._cookie and hmac.compare_digest(value.encode(), secret)
+            for name, _, value in given
+        )
+
+    def _response(
+        self, connection: ServerConnection, code: HTTPStatus, body: str, kind: str = "text/plain"
+    ) -> Response:
+        response = connection.respond(code, body)
+        del response.headers["Content-Type"]
+        response.headers["Content-Type"] = f"{kind}; charset=utf-8"
+        for name, value in HEADERS.items():
+            response.headers[name] = value
+        response.headers["Content-Security-Policy"] = POLICY
+        return response
+
+
+NO_TOKEN = (
+    "this page opens by the address with a token that burg-drake printed last; each opens it in one"
+    " browser"
+)

@@ -1,0 +1,97 @@
+"""The board and the station around it in the browser."""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, InvalidInputError, inverse, quaternion_from_rotation
+from burg_drake.scene.document import Board
+from burg_drake.station.document import Station
+from burg_drake.station.world import marker_grid
+from burg_drake.ui.widgets import FIXED
+
+PIXELS = 1600
+"""Of the longer side of the board's picture."""
+PAPER, INK, RIM = 252, 40, 200
+"""Grey values of the paper, of its markers, and of its edge."""
+BELOW = 3e-4
+"""The board's picture is that far below the plane on which objects stand [m]."""
+TABLE_BELOW = 2e-3
+TABLE_COLOR = (222, 216, 206)
+
+
+def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
+    """(H, W, 3) the printed sheet from above, its upper edge at the top.
+
+    A board that its markers do not fit on is white.
+    """
+    scale = PIXELS / max(board.size)
+    width, height = (max(2, round(scale * side)) for side in board.size)
+    gray = np.full((height, width), PAPER, dtype=np.uint8)
+    if markers:
+        try:
+            x, y, black = marker_grid(board)
+        except InvalidInputError:
+            pass
+        else:
+            columns = np.clip(np.searchsorted(x, (np.arange(width) + 0.5) / scale) - 1, 0, None)
+            rows = np.clip(np.searchsorted(y, (np.arange(height) + 0.5) / scale) - 1, 0, None)
+            gray[black[columns][:, rows].T[::-1]] = INK
+    gray[[0, 1, -1, -2]] = RIM
+    gray[:, [0, 1, -1, -2]] = RIM
+    return np.repeat(gray[..., None], 3, axis=2)
+
+
+class BoardView:
+    """Shows the board, and once the station: table and obstacles.
+
+    Args:
+        scene: viser's.
+        station: around the board.
+    """
+
+    def __init__(self, scene: viser.SceneApi, station: Station | None) -> None:
+        self._scene = scene
+        self._shown: tuple[Board, bool] | None = None
+        if station is not None:
+            self._show_station(station)
+
+    def show(self, board: Board, *, markers: bool = True) -> None:
+        """Brings the browser to a board."""
+        if self._shown == (board, markers):
+            return
+        self._shown = board, markers
+        width, height = board.size
+        self._scene.add_image(
+            "/board",
+            sheet_picture(board, markers=markers),
+            width,
+            height,
+            format="png",
+            position=(width / 2.0, height / 2.0, -BELOW),
+            wxyz=(0.0, 1.0, 0.0, 0.0),  # viser's pictures hang with y down
+            cast_shadow=False,
+        )
+
+    def _show_station(self, station: Station) -> None:
+        X_SW = inverse(station.document.X_WS.matrix())
+        table = station.document.table
+        X_WT = np.eye(4)
+        X_WT[:3, 3] = *table.center, -table.size[2] / 2.0 - TABLE_BELOW
+        self._box("/station/table", X_SW @ X_WT, table.size, TABLE_COLOR)
+        for name, obstacle in station.document.background.items():
+            self._box(f"/station/{name}", X_SW @ obstacle.X_WB.matrix(), obstacle.size, FIXED)
+
+    def _box(
+        self, name: str, X_SB: Array, size: tuple[float, ...], color: tuple[int, int, int]
+    ) -> None:
+        self._scene.add_box(
+            name,
+            color=color,
+            dimensions=size,  # type: ignore[arg-type]
+            position=X_SB[:3, 3],
+            wxyz=quaternion_from_rotation(X_SB[:3, :3]),
+            cast_shadow=False,
+        )

@@ -1,0 +1,133 @@
+"""Small pictures of a library's objects, made in the background and kept in the user's cache."""
+
+from __future__ import annotations
+
+import logging
+import subprocess
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core import BurgError, MissingDependencyError, content_hash, kept
+from burg_drake.core.workers import cause_of_death, start_worker
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.system_libraries import describe_missing, missing_render_libraries
+
+SIZE = (176, 132)
+"""Width and height [pixel]; shown at half of that where the screen is fine enough."""
+Wanted = tuple[str, int | None]
+"""An object, and in which stable pose; None: as it looks best."""
+
+_log = logging.getLogger("burg_drake")
+
+
+class ObjectPictures:
+    """Pictures of one library.
+
+    Args:
+        library: where the objects are.
+        on_ready: called in a thread of this class's when a picture is there.
+
+    Attributes:
+        missing: why there are no pictures, in one line; empty if there are.
+    """
+
+    def __init__(self, library: ObjectLibrary, on_ready: Callable[[Wanted], None]) -> None:
+        self.library = library
+        self.missing = ""
+        self._on_ready = on_ready
+        self._known: dict[Wanted, bytes | None] = {}
+        self._wanted: list[Wanted] = []
+        self._condition = threading.Condition()
+        self._closed = False
+        self._worker: tuple[subprocess.Popen[bytes], Connection[Any, Any]] | None = None
+        self._thread = threading.Thread(target=self._run, name="object-pictures", daemon=True)
+        self._thread.start()
+
+    def get(self, name: str, stable_pose: int | None = None) -> bytes | None:
+        """A PNG, if it is there; else it is made, the newest wish first."""
+        wanted = (name, stable_pose)
+        with self._condition:
+            if wanted in self._known:
+                return self._known[wanted]
+            if wanted in self._wanted:
+                self._wanted.remove(wanted)
+            self._wanted.append(wanted)
+            self._condition.notify()
+        return None
+
+    def close(self) -> None:
+        """Ends thread and process."""
+        with self._condition:
+            self._closed = True
+            self._condition.notify()
+            if self._worker is not None:
+                self._worker[0].kill()
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._make_all()
+        finally:
+            self._end_worker()
+
+    def _make_all(self) -> None:
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: bool(self._wanted) or self._closed)
+                if self._closed:
+                    return
+                wanted = self._wanted[-1]
+            png = self._made(wanted)
+            with self._condition:
+                self._known[wanted] = png
+                self._wanted.remove(wanted)
+                if self._closed:
+                    return
+            self._on_ready(wanted)
+
+    def _made(self, wanted: Wanted) -> bytes | None:
+        name, stable_pose = wanted
+        if self.missing:
+            return None
+        try:
+            content = content_hash(self.library.content[name], str(stable_pose), list(SIZE))
+            arrays = kept("picture", content, lambda: {"png": self._rendered(wanted)})
+            return bytes(np.asarray(arrays["png"], dtype=np.uint8))
+        except MissingDependencyError as error:
+            self.missing = f"no pictures: {error}"
+        except (BurgError, OSError) as error:
+            _log.debug("no picture of %s: %s", name, error)
+        return None
+
+    def _rendered(self, wanted: Wanted) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        missing = missing_render_libraries()
+        if missing:
+            raise MissingDependencyError(describe_missing(missing))
+        with self._condition:
+            if self._closed:
+                raise BurgError("the page was closed")
+            if self._worker is None:
+                self._worker = start_worker("burg_drake.ui.view.picture_worker")
+            process, connection = self._worker
+        try:
+            connection.send((str(self.library.root), *wanted, SIZE))
+            png, why = connection.recv()
+        except (EOFError, OSError) as error:
+            if self._closed:
+                raise BurgError("the page was closed") from error
+            self._worker = None
+            raise MissingDependencyError(cause_of_death(process)) from error
+        if png is None:
+            raise BurgError(why)
+        return np.frombuffer(png, dtype=np.uint8)
+
+    def _end_worker(self) -> None:
+        if self._worker is not None:
+            process, connection = self._worker
+            connection.close()
+            process.kill()
+            process.wait()

@@ -1,0 +1,35 @@
+from .buttons import (
+    picture_button as picture_button,
+    quiet_button as quiet_button,
+    show_picture as show_picture,
+    strong_button as strong_button,
+    upload_button as upload_button,
+)
+from .dialogs import confirm as confirm
+from .page_actions import PageActions as PageActions
+from .scene_files import scene_names as scene_names
+from .shortcuts import (
+    Call as Call,
+    register as register,
+    show_overlay as show_overlay,
+)
+from .status_colors import (
+    FIXED as FIXED,
+    LOOKS as LOOKS,
+    Rgb as Rgb,
+    look_of as look_of,
+)
+from .texts import (
+    all_of as all_of,
+    box as box,
+    dot as dot,
+    head as head,
+    listing as listing,
+    notice as notice,
+    quiet as quiet,
+    status_chip as status_chip,
+    style as style,
+    table as table,
+    title as title,
+)
+from .typed_field import NAMING as NAMING

@@ -1,0 +1,141 @@
+"""Keys, each with what it does: one table for the page and the overlay that lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import viser
+
+from burg_drake.ui.widgets.page_actions import PageActions
+from burg_drake.ui.widgets.texts import all_of, box, table
+from burg_drake.visualization.style import element
+
+Modifier = Literal["cmd/ctrl", "shift", "cmd/ctrl+shift"]
+
+
+@dataclass(frozen=True)
+class Shortcut:
+    """A key.
+
+    Attributes:
+        name: what of the page it calls.
+        key: as viser calls it.
+        modifier: held meanwhile, or None.
+        label: what it does, for people.
+    """
+
+    name: str
+    key: str
+    modifier: Modifier | None
+    label: str
+
+    @property
+    def keys(self) -> str:
+        """Such as `Ctrl+Z`."""
+        parts = [] if self.modifier is None else self.modifier.split("+")
+        return "+".join([_SPOKEN.get(part, part) for part in (*parts, self.key)])
+
+
+_SPOKEN = {
+    "cmd/ctrl": "Ctrl",
+    "shift": "Shift",
+    "escape": "Esc",
+    "delete": "Del",
+    "backspace": "Backspace",
+    "arrowleft": "←",
+    "arrowright": "→",
+    "arrowup": "↑",
+    "arrowdown": "↓",
+}
+
+SHORTCUTS: tuple[Shortcut, ...] = (
+    Shortcut("undo", "Z", "cmd/ctrl", "Undo"),
+    Shortcut("redo", "Z", "cmd/ctrl+shift", "Redo"),
+    Shortcut("redo", "Y", "cmd/ctrl", "Redo"),
+    Shortcut("save", "S", "cmd/ctrl", "Save the scene"),
+    Shortcut("all", "A", "cmd/ctrl", "Select all objects"),
+    Shortcut("none", "escape", None, "Select nothing, or put back what is dragged"),
+    Shortcut("delete", "delete", None, "Delete what is selected"),
+    Shortcut("delete", "backspace", None, "Delete what is selected"),
+    Shortcut("duplicate", "D", "cmd/ctrl", "Duplicate what is selected"),
+    Shortcut("left", "arrowleft", None, "Move 5 mm to the left"),
+    Shortcut("right", "arrowright", None, "Move 5 mm to the right"),
+    Shortcut("far", "arrowup", None, "Move 5 mm away"),
+    Shortcut("near", "arrowdown", None, "Move 5 mm nearer"),
+    Shortcut("left_finely", "arrowleft", "shift", "Move 1 mm to the left"),
+    Shortcut("right_finely", "arrowright", "shift", "Move 1 mm to the right"),
+    Shortcut("far_finely", "arrowup", "shift", "Move 1 mm away"),
+    Shortcut("near_finely", "arrowdown", "shift", "Move 1 mm nearer"),
+    Shortcut("turn_left", "Q", None, "Turn by 15° counter-clockwise"),
+    Shortcut("turn_right", "E", None, "Turn by 15° clockwise"),
+    Shortcut("next_pose", "P", None, "Next stable pose"),
+    Shortcut("snap", "G", None, "Snap to the grid"),
+    Shortcut("put_down", "B", None, "Put down until it stands"),
+    Shortcut("settle", "S", "shift", "Settle in physics"),
+    Shortcut("top", "T", None, "View from above"),
+    Shortcut("front", "F", None, "View from the front"),
+    Shortcut("colors", "C", None, "Next colours"),
+    Shortcut("help", "H", None, "List these keys"),
+)
+
+MOUSE: tuple[tuple[str, str], ...] = (
+    ("Click", "Select an object; beside all objects: none"),
+    ("Ctrl+click", "Select one more, or one less"),
+    ("Shift+drag beside objects", "Select all in a rectangle"),
+    ("Drag an object", "Move it, and all that is selected with it, over the board"),
+    ("Shift+drag an object", "Turn it about the vertical"),
+    ("Drag beside objects, wheel, right drag", "Turn the view, come nearer, shift the view"),
+)
+
+Call = Callable[[viser.ClientHandle | None], Any]
+
+
+def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, Call]) -> None:
+    """Makes the keys work, and lists them in viser's palette of commands (Ctrl+K).
+
+    Args:
+        gui: of viser.
+        actions: what may be done.
+        calls: by the names of `SHORTCUTS`; each gets the page that the key was pressed on.
+    """
+    for shortcut in SHORTCUTS:
+        call = calls[shortcut.name]
+        command = gui.add_command(
+            shortcut.label,
+            hotkey=shortcut.key,  # type: ignore[arg-type]
+            modifier=shortcut.modifier,
+        )
+
+        @command.on_trigger
+        async def _(event: Any, call: Call = call) -> None:
+            actions.ask(lambda: call(event.client), event.client)
+
+    typed = gui.add_command("Take what was typed", hotkey="enter", modifier="alt+shift")
+
+    @typed.on_trigger  # by first_page.js; any action makes what was typed before it count
+    async def _(event: Any) -> None:
+        actions.ask(lambda: None, event.client)
+
+
+def show_overlay(client: viser.ClientHandle | None) -> None:
+    """Lists mouse and keys on a page."""
+    if client is None:
+        return
+    with client.gui.add_modal("Mouse and keys"):
+        client.gui.add_html(overlay_text())
+
+
+def overlay_text() -> str:
+    """The list as HTML."""
+
+    def key(text: str) -> Any:
+        return element("span", text, class_="bd-key")
+
+    keys: dict[str, list[str]] = {}
+    for shortcut in SHORTCUTS:
+        keys.setdefault(shortcut.label, []).append(shortcut.keys)
+    rows = [(key(how), what) for how, what in MOUSE]
+    rows += [(key(" or ".join(how)), what) for what, how in keys.items()]
+    return all_of(box(table(("Do", "What happens"), rows)))

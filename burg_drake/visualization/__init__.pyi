@@ -1,0 +1,1 @@
+from .page import save_html as save_html

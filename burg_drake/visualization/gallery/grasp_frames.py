@@ -1,0 +1,212 @@
+"""Grasp frames of file formats in Meshcat: an open hand for each, with our frame G and theirs, F.
+
+The hands hang side by side in a plane that the camera faces, each with a small object between its
+fingers; everything below `/drake/frames`: `hands/NAME`, `objects/NAME`, `G/NAME`, `F/NAME` and
+`labels/NAME`, with the name of the first of several formats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Box, Mesh, Meshcat, Rgba
+from pydrake.math import RigidTransform
+
+from burg_drake.core import Array, make_pose, rot_z, transform_points
+from burg_drake.formats.common import GraspFormat, Gripper, convention_of, grouped
+from burg_drake.station.document import Hand
+from burg_drake.visualization.gallery.library import FIELD_OF_VIEW_DEG
+from burg_drake.visualization.meshcat import (
+    VIEW_ASPECT,
+    HandVisual,
+    TriadStyle,
+    aim_at,
+    camera_rotation,
+    draw_triad,
+    hand_visuals,
+    label_mesh,
+)
+from burg_drake.visualization.style import LegendEntry
+
+ROOT = "/drake/frames"
+ELEVATION = np.deg2rad(22.0)
+"""By which the camera looks down [rad]."""
+R_WC = camera_rotation(ELEVATION)
+"""(3, 3) the camera."""
+YAW = np.deg2rad(-28.0)
+"""By which hands are turned, so that no axis of G points at the camera [rad]."""
+OPACITY = 0.36
+"""Of hands: frames are inside of them."""
+OBJECT_COLOR = Rgba(0.93, 0.70, 0.25, 0.5)
+"""To be seen through, too."""
+OBJECT_SIZE = (0.34, 0.24, 0.40)
+"""Of the small object, as shares of the hand's opening."""
+OURS = TriadStyle(length=0.066, radius=0.0009, head=0.007)
+THEIRS = TriadStyle(length=0.044, radius=0.0026, head=0.013)
+"""Thin and long, thick and short: both are seen where they coincide."""
+LETTER_HEIGHT = 0.017
+CAPTION_HEIGHT = 0.0155
+"""From line to line [m]."""
+LINES = 4
+"""Of a caption."""
+CELL_GAP = 0.035
+"""Between neighbours [m]."""
+
+
+@dataclass(frozen=True)
+class FrameGrid:
+    """A grid of cells in the picture.
+
+    Attributes:
+        columns, rows: numbers of cells.
+        width, height: of a cell [m].
+        foot, head: of a cell's contents, from G upwards [m].
+    """
+
+    columns: int
+    rows: int
+    width: float
+    height: float
+    foot: float
+    head: float
+
+    def place(self, index: int) -> tuple[float, float]:
+        """Where in the picture G of a hand is, to the right and up [m]."""
+        row, column = divmod(index, self.columns)
+        return self.width * column, -self.height * row
+
+    def bounds(self) -> Array:
+        """(2, 2) lower and upper corner in the picture [m]."""
+        left, right = -0.5 * self.width, self.width * (self.columns - 0.5)
+        return np.array([[left, self.foot - self.height * (self.rows - 1)], [right, self.head]])
+
+
+def show_frames(
+    hand: Hand, model: Path, gripper: Gripper, formats: Sequence[GraspFormat], meshcat: Meshcat
+) -> tuple[LegendEntry, ...]:
+    """Shows a hand for each format, or for several of the same convention, with both frames.
+
+    Args:
+        hand: its document.
+        model: its model file.
+        gripper: what formats know of it.
+        formats: at least one.
+        meshcat: where; what it showed below `/drake/frames` before is removed.
+
+    Returns:
+        Switches for frames, hands and objects.
+
+    Raises:
+        InvalidInputError: the hand's model cannot be loaded.
+    """
+    meshcat.Delete(ROOT)
+    visuals = hand_visuals(hand, model, opacity=OPACITY)
+    groups = grouped(formats, gripper)
+    captions = [_caption(group, gripper) for group in groups]
+    sheet = _sheet(len(groups), *_extent(visuals, hand), max(w for _, w in captions))
+    for k, (group, caption) in enumerate(zip(groups, captions, strict=True)):
+        name, (u, v) = group[0].name, sheet.place(k)
+        X_WG = in_picture(u, v) @ pointing_down()
+        for i, visual in enumerate(visuals):
+            path = f"{ROOT}/hands/{name}/{i}"
+            meshcat.SetObject(path, visual.shape, visual.color)
+            X_WV = hand.X_AH(X_WG) @ visual.X_HV
+            meshcat.SetTransform(path, RigidTransform(X_WV))
+        _draw_object(meshcat, f"{ROOT}/objects/{name}", hand, X_WG)
+        X_WF = X_WG @ group[0].X_GF(gripper)
+        draw_triad(meshcat, f"{ROOT}/G/{name}", X_WG, OURS)
+        draw_triad(meshcat, f"{ROOT}/F/{name}", X_WF, THEIRS)
+        _write_letters(meshcat, f"{ROOT}/labels/{name}", X_WF)
+        _write(meshcat, f"{ROOT}/labels/{name}/caption", caption, in_picture(u, v + sheet.foot))
+    _aim(meshcat, sheet.bounds())
+    return (
+        LegendEntry("F, the frame of the format: thick, with letters", "#1f52cc", (f"{ROOT}/F",)),
+        LegendEntry("G, the frame of burg_drake: thin", "#8a99c0", (f"{ROOT}/G",)),
+        LegendEntry("hand", "#c9ced4", (f"{ROOT}/hands",)),
+        LegendEntry("object", "#edc26b", (f"{ROOT}/objects",)),
+        LegendEntry("names", "#34393f", (f"{ROOT}/labels",)),
+    )
+
+
+def pointing_down() -> Array:
+    """(4, 4) pose, but for the place, of G in the world: approaching along -z."""
+    return make_pose(rot_z(YAW) @ np.diag([1.0, -1.0, -1.0]))
+
+
+def in_picture(u: float, v: float) -> Array:
+    """(4, 4) the world's axes at a point of the plane through W that the camera faces.
+
+    Args:
+        u, v: to the right and up in the picture [m].
+    """
+    return make_pose(p_AB=u * R_WC[:, 0] - v * R_WC[:, 1])
+
+
+def _sheet(count: int, lower: Array, upper: Array, caption: float) -> FrameGrid:
+    """As many columns and rows as let the camera come nearest.
+
+    Args:
+        count: of hands.
+        lower, upper: (2,) bounds of a hand in the picture, around G [m].
+        caption: width of the widest [m].
+    """
+    foot = float(lower[1]) - LINES * CAPTION_HEIGHT
+    width = max(float(upper[0] - lower[0]), caption) + CELL_GAP
+    height = float(upper[1]) - foot + CELL_GAP
+    grids = [(columns, -(-count // columns)) for columns in range(1, count + 1)]
+    columns, rows = min(grids, key=lambda g: max(g[0] * width / VIEW_ASPECT, g[1] * height))
+    return FrameGrid(columns, rows, width, height, foot, float(upper[1]))
+
+
+def _extent(visuals: Sequence[HandVisual], hand: Hand) -> tuple[Array, Array]:
+    """Corners (2,) in the picture [m] of a hand with the longest axes, G in the middle."""
+    X_WH = hand.X_AH(pointing_down())
+    points = [transform_points(X_WH @ v.X_HV, v.corners) for v in visuals]
+    margin = max(OURS.length + 0.5 * CAPTION_HEIGHT, THEIRS.length + LETTER_HEIGHT)
+    seen = np.vstack([*points, [[0.0, 0.0, -margin]]]) @ R_WC[:, :2] * (1.0, -1.0)
+    lower, upper = seen.min(axis=0), seen.max(axis=0)
+    half = max(-lower[0], upper[0])
+    return np.array([-half, lower[1]]), np.array([half, upper[1]])
+
+
+def _caption(formats: Sequence[GraspFormat], gripper: Gripper) -> tuple[Mesh, float]:
+    found = convention_of(formats[0], gripper)
+    lines = (
+        ", ".join(format.name for format in formats),
+        f"approach {found.approach}, closing {found.closing}",
+        f"origin: {found.origin}",
+        f"poses in the {found.frame} frame",
+    )
+    return label_mesh(lines, CAPTION_HEIGHT)
+
+
+def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
+    x, y, z = hand.opening[1] * np.array(OBJECT_SIZE)
+    meshcat.SetObject(path, Box(x, y, z), OBJECT_COLOR)
+    X_GO = make_pose(p_AB=(0.0, 0.0, 0.25 * z))
+    meshcat.SetTransform(path, RigidTransform(X_WG @ X_GO))
+
+
+def _write_letters(meshcat: Meshcat, path: str, X_WF: Array) -> None:
+    """x, y, z beyond the tips of a frame's axes."""
+    for k, letter in enumerate("xyz"):
+        middle = X_WF[:3, 3] + (THEIRS.length + 0.5 * LETTER_HEIGHT) * X_WF[:3, k]
+        foot = make_pose(p_AB=middle + 0.4 * LETTER_HEIGHT * R_WC[:, 1])
+        _write(meshcat, f"{path}/{letter}", label_mesh((letter,), LETTER_HEIGHT), foot)
+
+
+def _write(meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WL: Array) -> None:
+    """Puts the middle of a text's foot at a place (4, 4), to be read by the camera."""
+    text, width = label
+    X_LT = make_pose(R_WC @ np.diag([1.0, -1.0, -1.0]), -0.5 * width * R_WC[:, 0])
+    meshcat.SetObject(path, text)
+    meshcat.SetTransform(path, RigidTransform(X_WL @ X_LT))
+
+
+def _aim(meshcat: Meshcat, bounds: Array) -> None:
+    """Fits corners (2, 2) of the picture into the view."""
+    corners = np.array([in_picture(u, v)[:3, 3] for u in bounds[:, 0] for v in bounds[:, 1]])
+    aim_at(meshcat, corners, R_WC[:, 2], field_of_view_deg=FIELD_OF_VIEW_DEG)

@@ -1,0 +1,180 @@
+"""Meshes and labels as glTF in memory: Meshcat keeps their buffers once, wherever it shows them.
+
+An OBJ is sent and saved anew, as text, at each place where it is shown; of a glTF only a short
+description is, and the buffers are stored by their content. That makes the page of six scans ten
+times smaller. Drake turns glTF, which has y up, so that z is up; files here are written for that.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image, ImageDraw, ImageFont
+from pydrake.common import MemoryFile
+from pydrake.geometry import InMemoryMesh, Mesh
+
+from burg_drake.core import MeshError
+from burg_drake.visualization.style import linear_light
+
+ROUGHNESS = 0.65
+"""Of all surfaces: the gloss of paint and plastic."""
+
+ALBEDO = 0.44
+"""Factor on all colours: Meshcat lights glTF, unlike OBJ, by the bright sky of its background too,
+and would show it paler."""
+
+X_YUP_ZUP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=float)
+"""Undoes Drake's turn of glTF from y up to z up."""
+
+MAX_TEXTURE = 1024
+"""Larger textures are reduced to this width and height [pixel], enough for a gallery."""
+
+LABEL_PIXELS = 44
+"""Height of a line of a label in its texture [pixel]."""
+LABEL_INK = (52, 57, 64)
+"""Colour of labels, as sRGB bytes."""
+
+
+def gltf_mesh(path: Path, *, opacity: float = 1.0) -> Mesh:
+    """A visual mesh file (.obj, with its materials and textures) as a glTF in memory.
+
+    Args:
+        path: the mesh [m].
+        opacity: 0 to 1, on top of the materials'.
+
+    Returns:
+        Drake's shape; the same look at the same place as the file's.
+
+    Raises:
+        MeshError: the file is damaged.
+    """
+    try:
+        scene = trimesh.load(path, force="scene", process=False)
+    except Exception as error:  # the reader raises whatever it stumbles over
+        raise MeshError(f"{path} is damaged or no mesh") from error
+    if scene.is_empty:
+        raise MeshError(f"{path} is damaged or no mesh")
+    for part in scene.geometry.values():
+        material = getattr(part.visual, "material", None)
+        if material is not None and getattr(material, "image", None) is not None:
+            material.image = _small_texture(material.image)
+    files = scene.export(file_type="gltf", include_normals=True)
+    document = json.loads(files["model.gltf"])
+    for material in document.get("materials", ()):
+        surface = material.setdefault("pbrMetallicRoughness", {})
+        surface |= {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
+        r, g, b, a = surface.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))
+        surface["baseColorFactor"] = [*(ALBEDO * _linear(c) for c in (r, g, b)), opacity * a]
+        material["doubleSided"] = opacity == 1.0  # else backs would shine through
+        if opacity < 1.0:
+            material["alphaMode"] = "BLEND"
+    buffers = [files[buffer["uri"]] for buffer in document["buffers"]]
+    return _shape(document, buffers, path.name)
+
+
+def label_mesh(lines: tuple[str, ...], height: float, stretch: float = 1.0) -> tuple[Mesh, float]:
+    """Text as a picture in the plane z = 0 that reads along +x from the origin, top line first.
+
+    Args:
+        lines: of text; the first is bold.
+        height: from line to line, before stretching [m]; the last line's foot is at y = 0.
+        stretch: of the letters along y.
+
+    Returns:
+        Drake's shape, seen from +z, and its width [m].
+    """
+    image = _text_image(lines)
+    width = height * image.width / LABEL_PIXELS
+    top = stretch * height * len(lines)
+    data = io.BytesIO()
+    image.save(data, format="PNG", optimize=True)
+    corners = np.array([[0, 0, 0], [width, 0, 0], [width, top, 0], [0, top, 0]], dtype="<f4")
+    uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype="<f4")
+    faces = np.array([0, 1, 2, 0, 2, 3], dtype="<u2")
+    buffers = [a.tobytes() for a in (corners, uv, faces)]
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}
+                ]
+            }
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": 4,
+                "type": "VEC3",
+                "min": corners.min(axis=0).tolist(),
+                "max": corners.max(axis=0).tolist(),
+            },
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": i, "byteLength": len(b)} for i, b in enumerate(buffers)],
+        "buffers": [{"byteLength": len(b)} for b in buffers],
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "materials": [
+            {
+                "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+                "alphaMode": "BLEND",
+                "extensions": {"KHR_materials_unlit": {}},
+            }
+        ],
+        "textures": [{"source": 0}],
+        "images": [{"uri": _data_uri("image/png", data.getvalue())}],
+    }
+    return _shape(document, buffers, "label"), width
+
+
+def _shape(document: dict[str, Any], buffers: list[bytes], name: str) -> Mesh:
+    for buffer, data in zip(document["buffers"], buffers, strict=True):
+        buffer["uri"] = _data_uri("application/octet-stream", data)
+    root = {"matrix": X_YUP_ZUP.T.reshape(-1).tolist(), "children": document["scenes"][0]["nodes"]}
+    document["scenes"][0]["nodes"] = [len(document["nodes"])]
+    document["nodes"].append(root)
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile(json.dumps(document), ".gltf", name)))
+
+
+def _small_texture(image: Image.Image) -> Image.Image:
+    """A texture for the gallery: reduced, and as a JPEG unless it is transparent."""
+    small = image.copy()
+    small.thumbnail((MAX_TEXTURE, MAX_TEXTURE), reducing_gap=2.0)
+    if small.mode in ("RGBA", "LA", "PA") or "transparency" in small.info:
+        return small
+    data = io.BytesIO()
+    small.convert("RGB").save(data, format="JPEG", quality=85)
+    return Image.open(data)
+
+
+def _data_uri(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def _linear(value: float) -> float:
+    """Linear light of an sRGB value in [0, 1], as glTF has its colour factors."""
+    return float(linear_light(value))
+
+
+def _text_image(lines: tuple[str, ...]) -> Image.Image:
+    font = ImageFont.load_default(0.76 * LABEL_PIXELS)
+    width = max(2, *(int(np.ceil(font.getlength(line))) + 4 for line in lines))
+    ink = Image.new("L", (width, LABEL_PIXELS * len(lines)))
+    draw = ImageDraw.Draw(ink)
+    for row, line in enumerate(lines):
+        bold = int(row == 0)
+        draw.text((2, LABEL_PIXELS * (row + 0.8)), line, 255, font, anchor="ls", stroke_width=bold)
+    image = Image.new("LA", ink.size, round(float(np.mean(LABEL_INK))))
+    image.putalpha(ink)
+    return image

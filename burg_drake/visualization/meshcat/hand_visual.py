@@ -1,0 +1,122 @@
+"""What a hand looks like, open, for pictures without a plant that steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Rgba,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.planning import RobotDiagramBuilder
+
+from burg_drake.core import Array
+from burg_drake.core.paths import NO_PACKAGES, Packages
+from burg_drake.station.document import Hand
+from burg_drake.station.world import add_hand
+from burg_drake.visualization.meshcat.gltf import gltf_mesh
+
+DEFAULT_COLOR = (0.8, 0.8, 0.8, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class HandVisual:
+    """A visual geometry of a hand.
+
+    Attributes:
+        shape: for Meshcat.
+        model: the shape as the hand's model has it, for renderers.
+        color: of shapes that have none of their own.
+        X_HV: (4, 4) where it is on the open hand.
+        slide: (3,) how far it moves in H for each metre by which the hand closes.
+        corners: (N, 3) that its bounds follow from, in its own frame V [m].
+    """
+
+    shape: Shape
+    model: Shape
+    color: Rgba
+    X_HV: Array
+    slide: Array
+    corners: Array
+
+
+def hand_visuals(
+    hand: Hand, model: Path, *, opacity: float = 1.0, packages: Packages = NO_PACKAGES
+) -> tuple[HandVisual, ...]:
+    """The visual geometries of an open hand.
+
+    Args:
+        hand: the document.
+        model: the model file.
+        opacity: 0 to 1.
+        packages: what a station says of packages.
+
+    Raises:
+        InvalidInputError: the model cannot be loaded.
+    """
+    builder = RobotDiagramBuilder()
+    plant = builder.plant()
+    added = add_hand(builder, hand, model, packages)
+    plant.WeldFrames(plant.world_frame(), added.body.body_frame(), RigidTransform())
+    plant.Finalize()
+    for finger, joint in zip(hand.fingers, added.joints, strict=True):
+        joint.set_default_translation(finger.open)
+    diagram = builder.Build()
+    context, closed = (
+        plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext()) for _ in range(2)
+    )
+    for finger, joint in zip(hand.fingers, added.joints, strict=True):
+        joint.set_translation(closed, finger.closed)
+    way = hand.opening[1] - hand.opening[0]
+    inspector = diagram.scene_graph().model_inspector()
+    visuals = []
+    for index in plant.GetBodyIndices(added.instance):
+        body = plant.get_body(index)
+        X_HB = plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+        p_HB_closed = plant.EvalBodyPoseInWorld(closed, body).translation()
+        slide = np.round((p_HB_closed - X_HB[:3, 3]) / way, 9)
+        for geometry in plant.GetVisualGeometriesForBody(body):
+            shape = inspector.GetShape(geometry)
+            given = inspector.GetIllustrationProperties(geometry).GetPropertyOrDefault(
+                "phong", "diffuse", Rgba(*DEFAULT_COLOR)
+            )
+            color = Rgba(given.r(), given.g(), given.b(), opacity * given.a())
+            X_HV = X_HB @ inspector.GetPoseInFrame(geometry).GetAsMatrix4()
+            drawn = _drawn(shape, opacity)
+            visuals.append(HandVisual(drawn, shape, color, X_HV, slide, _corners(shape)))
+    return tuple(visuals)
+
+
+def _drawn(shape: Shape, opacity: float) -> Shape:
+    """A visual as Meshcat gets it; of the colours of meshes only those of .obj become fainter."""
+    if isinstance(shape, Mesh) and shape.source().is_path():
+        path = Path(shape.source().path())
+        if path.suffix.lower() == ".obj" and np.array_equal(shape.scale3(), np.ones(3)):
+            return gltf_mesh(path, opacity=opacity)
+    return shape
+
+
+def _corners(shape: Shape) -> Array:
+    """Points (N, 3) around a shape, tightly [m]."""
+    if isinstance(shape, Mesh | Convex):
+        hull = shape.GetConvexHull()
+        return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
+    size = {
+        Box: lambda s: (s.width(), s.depth(), s.height()),
+        Sphere: lambda s: 3 * (2 * s.radius(),),
+        Cylinder: lambda s: (2 * s.radius(), 2 * s.radius(), s.length()),
+        Capsule: lambda s: (2 * s.radius(), 2 * s.radius(), s.length() + 2 * s.radius()),
+        Ellipsoid: lambda s: (2 * s.a(), 2 * s.b(), 2 * s.c()),
+    }.get(type(shape), lambda s: (0.0, 0.0, 0.0))(shape)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return signs * np.array(size) / 2.0

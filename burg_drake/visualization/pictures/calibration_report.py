@@ -1,0 +1,220 @@
+"""The page about a calibration: residuals, coverage, lens, and how far each part is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from burg_drake.cameras.calibration import CELLS, Calibration, coverage, image_grid, uncertainty
+from burg_drake.core import Array
+from burg_drake.core.files import atomic_write
+from burg_drake.visualization.style import Html, element, join
+
+WIDTH = 460.0
+"""Of a drawing of the image [CSS pixels]."""
+INK, RULE, ACCENT, SHADE = "#1f2630", "#c4cad4", "#b3261e", "#2f6db5"
+STYLE = f"""
+body {{ font: 15px/1.5 system-ui, sans-serif; color: {INK}; max-width: 62rem; margin: 2rem auto;
+  padding: 0 1rem; }}
+h1 {{ font-size: 1.4rem; }} h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; }}
+table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
+td, th {{ padding: .15rem .9rem .15rem 0; text-align: right; border-bottom: 1px solid #e4e7ec; }}
+td:first-child, th:first-child {{ text-align: left; }}
+figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }}
+figcaption {{ font-size: .85rem; max-width: {WIDTH:.0f}px; }}
+.advice {{ color: {ACCENT}; }}
+svg {{ max-width: 100%; height: auto; }}
+"""
+
+
+def write_report(calibration: Calibration, advice: list[str], path: str) -> None:
+    """Writes the page, which needs no other file and no network.
+
+    Args:
+        calibration: what it is about.
+        advice: sentences about what would be better.
+        path: file to write.
+
+    Raises:
+        InvalidInputError: the place cannot be written to.
+    """
+    k = calibration.intrinsics
+    body = join(
+        element("h1", "Calibration of a camera"),
+        element(
+            "p",
+            f"{k.width} x {k.height} pixels; {len(calibration.views)} views; lens model"
+            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square)",
+        ),
+        *(element("p", line, class_="advice") for line in advice),
+        element("h2", "Camera"),
+        _parameters(calibration),
+        element("h2", "Over the image"),
+        _figure(_residuals(calibration)),
+        _figure(_coverage(calibration)),
+        _figure(_uncertainty(calibration)),
+        _figure(_distortion(calibration)),
+        element("h2", "Views"),
+        _views(calibration),
+        _rejected(calibration),
+    )
+    head = join(
+        element("meta", charset="utf-8"),
+        element("title", "Calibration of a camera"),
+        element("style", Html(STYLE)),
+    )
+    page = element("html", element("head", head), element("body", body), lang="en")
+    atomic_write(path, f"<!DOCTYPE html>\n{page}\n")
+
+
+def _parameters(calibration: Calibration) -> Html:
+    rows = [
+        element("tr", *(element("td", text) for text in (name, f"{value:.6g}", f"{deviation:.2g}")))
+        for name, (value, deviation) in calibration.parameters.items()
+    ]
+    heads = ("parameter", "value", "standard deviation")
+    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+
+
+def _views(calibration: Calibration) -> Html:
+    largest = max(used.rms for used in calibration.views)
+    rows = []
+    for used in calibration.views:
+        bar = element(
+            "rect", x=0, y=4, width=f"{120.0 * used.rms / largest:.1f}", height=9, fill=SHADE
+        )
+        texts = (
+            used.view.name,
+            str(len(used.view.ids)),
+            f"{math.degrees(used.tilt):.0f}",
+            f"{used.view.blur:.2f}",
+            f"{used.rms:.3f}",
+        )
+        drawn = element("svg", bar, width=122, height=16)
+        rows.append(element("tr", *(element("td", text) for text in texts), element("td", drawn)))
+    heads = ("image", "corners", "tilt (degrees)", "blur (pixels)", "residual (pixels)", "")
+    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+
+
+def _rejected(calibration: Calibration) -> Html:
+    if not calibration.rejected:
+        return Html()
+    lines = (element("li", f"{name} {why}".strip()) for name, why in calibration.rejected)
+    return join(element("h2", "Left out"), element("ul", *lines))
+
+
+def _figure(drawn: tuple[Html, str]) -> Html:
+    return element("figure", drawn[0], element("figcaption", drawn[1]))
+
+
+def _image(calibration: Calibration, *shapes: Html) -> Html:
+    """An SVG in pixels of the image, with its frame."""
+    k = calibration.intrinsics
+    frame = element(
+        "rect", x=-0.5, y=-0.5, width=k.width, height=k.height, fill="none", stroke=RULE,
+        stroke_width=_line(calibration),
+    )  # fmt: skip
+    return element(
+        "svg",
+        *shapes,
+        frame,
+        width=WIDTH,
+        height=WIDTH * k.height / k.width,
+        viewBox=f"-0.5 -0.5 {k.width} {k.height}",
+    )
+
+
+def _line(calibration: Calibration) -> float:
+    """Width of a line that is one pixel of the screen wide [pixels of the image]."""
+    return round(calibration.intrinsics.width / WIDTH, 3)
+
+
+def _arrows(calibration: Calibration, start: Array, vectors: Array, color: str) -> list[Html]:
+    ends = np.concatenate([start, start + vectors], axis=1).round(1)
+    path = "".join(f"M{a:g} {b:g}L{c:g} {d:g}" for a, b, c, d in ends.tolist())
+    width = _line(calibration)
+    dots = "".join(f"M{a:g} {b:g}h0" for a, b, _, _ in ends.tolist())
+    return [
+        element("path", d=path, stroke=color, stroke_width=width, fill="none"),
+        element(
+            "path", d=dots, stroke=INK, stroke_width=2 * width, stroke_linecap="round", fill="none"
+        ),
+    ]
+
+
+def _residuals(calibration: Calibration) -> tuple[Html, str]:
+    corners = np.concatenate([used.view.corners for used in calibration.views])
+    residuals = np.concatenate([used.residuals for used in calibration.views])
+    scale = _round(0.03 * calibration.intrinsics.width / max(calibration.rms, 1e-6))
+    arrows = _arrows(calibration, corners, scale * residuals, ACCENT)
+    return (
+        _image(calibration, *arrows),
+        f"Residuals of all corners, {scale:g} times as long. Where neighbours agree, the lens model"
+        " is too simple or the target is bent.",
+    )
+
+
+def _cells(calibration: Calibration, shades: Array, words: list[str], color: str) -> Html:
+    """A grid over the image: shades (rows, columns) from 0 to 1, and what each cell says."""
+    k = calibration.intrinsics
+    rows, columns = shades.shape
+    width, height = k.width / columns, k.height / rows
+    shapes = []
+    for index, word in enumerate(words):
+        row, column = divmod(index, columns)
+        x, y = column * width - 0.5, row * height - 0.5
+        opacity = round(float(0.85 * shades[row, column]), 3)
+        shapes.append(
+            element("rect", x=x, y=y, width=width, height=height, fill=color, fill_opacity=opacity)
+        )
+        place = {"x": x + width / 2, "y": y + 0.6 * height, "text_anchor": "middle"}
+        ink = "#ffffff" if opacity > 0.5 else INK
+        shapes.append(element("text", word, **place, font_size=0.026 * k.width, fill=ink))
+    return _image(calibration, *shapes)
+
+
+def _coverage(calibration: Calibration) -> tuple[Html, str]:
+    size = (calibration.intrinsics.width, calibration.intrinsics.height)
+    counts = coverage([used.view for used in calibration.views], size)
+    shades = np.sqrt(counts / max(1, counts.max()))
+    drawn = _cells(calibration, shades, [str(n) for n in counts.ravel().tolist()], SHADE)
+    return (
+        drawn,
+        "Corners seen in each part of the image. Where there are none, the lens is a guess.",
+    )
+
+
+def _uncertainty(calibration: Calibration) -> tuple[Html, str]:
+    rows, columns = CELLS
+    k = calibration.intrinsics
+    u = (np.arange(columns) + 0.5) * k.width / columns - 0.5
+    v = (np.arange(rows) + 0.5) * k.height / rows - 0.5
+    of_cells = uncertainty(calibration, np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2))
+    worst = float(uncertainty(calibration, image_grid(k)).max())
+    shades = np.clip(of_cells / max(1.0, of_cells.max()), 0.0, 1.0).reshape(CELLS)
+    drawn = _cells(calibration, shades, [f"{value:.2f}" for value in of_cells.tolist()], ACCENT)
+    return drawn, (
+        "How far the camera model may be off, as the scatter of the residuals tells it [pixels];"
+        f" {worst:.2f} at worst, at the edge."
+    )
+
+
+def _distortion(calibration: Calibration) -> tuple[Html, str]:
+    k = calibration.intrinsics
+    seen = image_grid(k, 17, 13)
+    moved = seen - k.undistort(seen)
+    longest = float(np.linalg.norm(moved, axis=1).max())
+    scale = _round(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
+    arrows = _arrows(calibration, seen - scale * moved, scale * moved, SHADE)
+    return (
+        _image(calibration, *arrows),
+        f"Where the lens moves points of a straight image to (dots: from), {scale:g} times as long;"
+        f" {longest:.1f} pixels at most.",
+    )
+
+
+def _round(value: float) -> float:
+    """One digit of a number, rounded down."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return float(f"{math.floor(value / power) * power:.1g}")
