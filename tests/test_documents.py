@@ -172,6 +172,13 @@ def test_names_in_the_text_exist(page: Path) -> None:
             pkgutil.resolve_name(f"burg_drake{name}")
 
 
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_paths_in_the_text_exist(page: Path) -> None:
+    rooms = "burg_drake|benchmarks|docs|examples|models|tests|tools|\\.github"
+    for path in re.findall(rf"`((?:{rooms})/[\w./*-]*)`", page.read_text("utf-8")):
+        assert list(ROOT.glob(path)), path
+
+
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.runs for b in BLOCKS[p])], ids=ids)
 def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "camera" in page.read_text("utf-8") and missing_render_libraries():
