@@ -1,17 +1,143 @@
-"""What the documents point to is there."""
+"""What the documents say is so: links lead somewhere, names exist, commands and YAML fit.
+
+Their Python runs in `test_document_code`.
+"""
 
 from __future__ import annotations
 
+import ast
+import importlib
+import inspect
+import pkgutil
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from burg_drake.apps.cli import build_parser
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.documents.schema import parse_document
+from burg_drake.evaluation.cluster.document import ClusterDocument
+from burg_drake.experiment.trials.sheet import TrialSheet
+from burg_drake.scene.document.scene import SceneDocument
+from burg_drake.station.document.gripper_document import Hand
+from burg_drake.station.document.station_document import StationDocument
+from tests.pages import PAGES, ROOT, Block, blocks
+
+SCHEMAS = {
+    "name: breakfast": SceneDocument,
+    "dictionary: ARUCO": SceneDocument,
+    "hand: wsg_50": StationDocument,
+    "kind: inverse_dynamics": StationDocument,
+    "least_lift: ": StationDocument,
+    "coupled: true": Hand,
+    "focal: ": Intrinsics,
+    "stratum: ": TrialSheet,
+    "tls: {": ClusterDocument,
+    "jobqueue:": ClusterDocument,
+}
+"""By words of a document in YAML, what it is."""
+PARTS = {
+    SceneDocument: "version: 1\nname: part\nlibrary: household\n",
+    StationDocument: "version: 1\nname: part\n",
+}
+"""What stands before a part of such a document."""
+BLOCKS = {page: list(blocks(page)) for page in PAGES}
 
 
-@pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CHANGELOG.md"])
-def test_relative_links_lead_somewhere(name: str) -> None:
-    targets = re.findall(r"\]\(([^)#]+)\)", (ROOT / name).read_text(encoding="utf-8"))
-    missing = [t for t in targets if "://" not in t and not (ROOT / t).exists()]
-    assert not missing
+def ids(value: Any) -> str:
+    return value.stem if isinstance(value, Path) else f"{value.page.stem}:{value.line}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target, anchor in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text("utf-8")):
+        if "://" not in target:
+            there = page.parent / target if target else page
+            assert there.exists(), target
+            assert not anchor or anchor in anchors(there), f"{target}#{anchor}"
+
+
+def anchors(page: Path) -> set[str]:
+    """Of the headings, as GitHub makes them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_names_in_the_text_exist(page: Path) -> None:
+    for code in re.findall(r"`[^`\n]+`", page.read_text("utf-8")):
+        for name in re.findall(r"\bburg(?:_drake)?((?:\.[A-Za-z_]\w*)+)\b", code):
+            pkgutil.resolve_name(f"burg_drake{name}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_paths_in_the_text_exist(page: Path) -> None:
+    rooms = "burg_drake|benchmarks|docs|examples|models|tests|tools"
+    for path in re.findall(rf"`((?:{rooms})/[\w./*-]*)`", page.read_text("utf-8")):
+        assert list(ROOT.glob(path)), path
+
+
+NOT_RUN = [b for page in PAGES for b in BLOCKS[page] if b.language == "python" and not b.runs]
+
+
+@pytest.mark.parametrize("block", NOT_RUN, ids=ids)
+def test_what_does_not_run_is_about_what_there_is(block: Block) -> None:
+    names: dict[str, Any] = {"burg": importlib.import_module("burg_drake")}
+    for node in ast.walk(block.module):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                names[alias.asname or alias.name] = importlib.import_module(alias.name)
+        elif isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(str(node.module))
+            names |= {a.asname or a.name: getattr(module, a.name) for a in node.names}
+    for node in ast.walk(block.module):
+        if isinstance(node, ast.Attribute):
+            looked_up(node, names)
+        elif isinstance(node, ast.Call) and (called := looked_up(node.func, names)):
+            given = {keyword.arg: None for keyword in node.keywords if keyword.arg}
+            inspect.signature(called).bind(*node.args, **given)
+
+
+def looked_up(node: ast.expr, names: dict[str, Any]) -> Any:
+    """What an expression of names stands for; None for what only a run would make."""
+    if isinstance(node, ast.Name):
+        return names.get(node.id)
+    if isinstance(node, ast.Attribute):
+        owner = looked_up(node.value, names)
+        return None if owner is None else getattr(owner, node.attr)
+    return None
+
+
+PARSER = build_parser()
+COMMANDS = [b for page in PAGES for b in BLOCKS[page] if any(b.commands())]
+
+
+@pytest.mark.parametrize("block", COMMANDS, ids=ids)
+def test_commands_are_understood(block: Block) -> None:
+    for arguments in block.commands():
+        PARSER.parse_args(arguments)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_commands_in_the_text_exist(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """They are often cut short: verb and options have to be known, others may be missing."""
+    for code in re.findall(r"`burg-drake ([^`\n]+)`", page.read_text("utf-8")):
+        try:
+            PARSER.parse_args(re.sub(r"[][]", "", code).split())
+        except SystemExit as end:
+            told = capsys.readouterr().err
+            assert not end.code or "required" in told or "expected" in told, told
+
+
+DOCUMENTS = [b for page in PAGES for b in BLOCKS[page] if b.language == "yaml"]
+
+
+@pytest.mark.parametrize("block", DOCUMENTS, ids=ids)
+def test_yaml_fits_its_schema(block: Block) -> None:
+    (schema,) = [schema for words, schema in SCHEMAS.items() if words in block.code]
+    code = block.code
+    if not code.startswith("version: "):
+        code = PARTS[schema] + code
+    parse_document(code, schema, block.page.name)
