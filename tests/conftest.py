@@ -56,7 +56,7 @@ PHYSICS = tuple(
         *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
         *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
         *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),
-        *("visualization", "test_packaging.py", "test_readme.py"),
+        *("visualization", "test_document_code.py", "test_packaging.py"),
     )
 )
 """Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
@@ -69,6 +69,8 @@ def _is_physics(path: Path) -> bool:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "physics: Drake, renderers, programs; see PHYSICS")
+    if gone := [str(path) for path in PHYSICS if not path.exists()]:
+        raise pytest.UsageError(f"{__file__}: PHYSICS names {', '.join(gone)}; name it as it is")
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
