@@ -104,6 +104,9 @@ from .evaluation.robustness.assessment import (
 from .evaluation.robustness.probes import (
     RobustnessSettings as RobustnessSettings,
 )
+from .evaluation.run.settings import (
+    EvaluationSettings as EvaluationSettings,
+)
 from .evaluation.stages.counts import (
     GraspCount as GraspCount,
     count_grasps as count_grasps,
@@ -184,6 +187,7 @@ from .grasping.comparison.summary import (
     summarize as summarize,
 )
 from .grasping.sampling.antipodal import (
+    AntipodalSettings as AntipodalSettings,
     sample_antipodal as sample_antipodal,
 )
 from .grasping.sampling.approach import (

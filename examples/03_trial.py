@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from burg_drake import HandTrial, load_scene, load_station, sample_antipodal
+from burg_drake import AntipodalSettings, HandTrial, load_scene, load_station, sample_antipodal
 from burg_drake.core.content import rng_from
 
 scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
 mesh = scene.library.surface("box")
-grasps = sample_antipodal(
-    mesh, 500, rng_from("example"), opening=station.hand.opening, object="box"
-)
+settings = AntipodalSettings(opening=station.hand.opening)
+grasps = sample_antipodal(mesh, 500, rng_from("example"), settings, object="box")
 
 trial = HandTrial(scene, station)  # one diagram for all trials of the scene
 X_WG = trial.diagram.X_WO("box") @ grasps.X_OG

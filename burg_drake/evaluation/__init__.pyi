@@ -25,6 +25,7 @@ from .results.summary import (
 from .results.summary_tables import (
     summary_view as summary_view,
 )
+from .run.settings import EvaluationSettings as EvaluationSettings
 from .stages.judge import (
     Decision as Decision,
     Judge as Judge,
