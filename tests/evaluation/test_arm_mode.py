@@ -24,6 +24,8 @@ from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 GRASPS = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])

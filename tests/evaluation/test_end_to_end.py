@@ -25,6 +25,8 @@ from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene,
 from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 SCENE, STATION = "tabletop_six", "panda_tabletop"
 BOX = (0.06, 0.158, 0.21)
 """Size of the built-in box [m]; its frame is in the middle of the bottom, its narrow side x."""

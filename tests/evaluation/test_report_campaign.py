@@ -31,6 +31,8 @@ from burg_drake.evaluation.store.stored_rows import StoredRows
 from burg_drake.scene.document.scene import Scene
 from burg_drake.visualization.style.palette import group_of
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 pytest.importorskip("pyarrow")
 PER_OBJECT = 8
 

@@ -399,10 +399,9 @@ def test_the_same_bits_whatever_was_executed_before(crowd: ArmTrial, make_scene)
         return exact(execute(trial, from_above(0.066, y=0.01), friction=0.02, mass=0.5))
 
     trials = (lifted, pushed, slips)
-    new = [ArmTrial(crowd.diagram.scene, make_arm_station()) for _ in range(2)]
-    found = [run(new[0]) for run in trials]
+    new = ArmTrial(crowd.diagram.scene, make_arm_station())
+    found = [run(new) for run in trials]
     assert len({result["outcome"] for result in found}) == 3
-    assert [run(new[1]) for run in (pushed, slips)] == found[1:]
     assert [run(crowd) for run in trials[::-1]] == found[::-1]
 
 
