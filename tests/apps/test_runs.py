@@ -217,8 +217,8 @@ def test_replay_compares_with_the_engine_of_the_row(
     changed = row.replace("whole_trial=False", "whole_trial=True")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 2
-    assert "engine 'standard' and engine_settings contradict" in capsys.readouterr().err
-    changed = changed.replace(",standard,", ",standard (custom),")
+    assert "engine 'screening' and engine_settings contradict" in capsys.readouterr().err
+    changed = changed.replace(",screening,", ",screening (custom),")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 1
     out = capsys.readouterr().out.splitlines()
