@@ -110,6 +110,7 @@ def test_what_was_ended_from_outside_is_tried_again_by_the_same_command(
     run.candidates.grasps.save(tmp_path / "grasps.npz")
     command = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
     command += ["--grasps", str(tmp_path / "grasps.npz"), "--workers", "1", "--quiet"]
+    command += ["--engine", "screening"]
     assert main(command) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line == (

@@ -160,9 +160,7 @@ def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
     box_scene: Scene, arm_trial: ArmTrial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From look to look of a fast transfer the hand moves by less than a small object's size."""
-    trial = ArmTrial(
-        box_scene, make_arm_station(), engine=QUICK, transfer=True, clearance=arm_trial.clearance
-    )
+    trial = ArmTrial(box_scene, make_arm_station(), transfer=True, clearance=arm_trial.clearance)
     plan = straight_plan(trial, trial.X_WG("box", CENTRE))
     plan = replace(plan, transfer=timed(np.linspace(HOME, plan.approach.q[0], 5), 0.5))
     plant_context = trial.diagram.plant.GetMyContextFromRoot(trial.context)
