@@ -18,7 +18,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.trajectory import Plan, PlanOrigin
+from burg_drake.motion.plans.grasp_plan import Plan
+from burg_drake.motion.plans.planned_motion import PlanOrigin
 from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.arm_trial import ArmTrial
 from burg_drake.simulation.trials.contacts import BodyContact
@@ -178,7 +179,7 @@ def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert ways.sum() > 0.2
     assert ways.max() < 0.005
-    assert ways.max() > 0.005 / round(trial.look / trial.diagram.engine.time_step)
+    assert ways.max() > 0.005 / round(trial.settings.poll / trial.diagram.engine.time_step)
 
 
 # --- statics ------------------------------------------------------------------------------------
