@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move
+from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects
 from burg_drake.compose.background.settling import SettlingProposal
 from burg_drake.compose.document.checker import known_scene
 from burg_drake.compose.editing.view import SessionView
@@ -37,7 +37,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     session.restrict_movement(False)
     X_SO = session.view.X_SO("box")
     X_SO[2, 3] += 0.03
-    hovering = session.do(Move({"box": X_SO}))
+    hovering = session.do(MoveObjects({"box": X_SO}))
     views: list[SessionView] = []
     session.on_change(views.append)
     proposal = session.settle().wait(PATIENCE)

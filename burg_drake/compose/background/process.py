@@ -208,7 +208,7 @@ def _finish(job: BackgroundJob[T], future: Future[T]) -> None:
     job.finish(_outcome(job, future))
 
 
-def _outcome(job: BackgroundJob[T], future: Future[T]) -> T | BurgError:
+def _outcome(job: BackgroundJob[Any], future: Future[Any]) -> Any:
     """The result of a job, or why there is none."""
     if job.cancelled or future.cancelled():
         job.cancelled = True
