@@ -32,8 +32,8 @@ from burg_drake.motion.plans.plan_record import (
 from burg_drake.motion.plans.trajectory import PHASES, Plan
 
 if TYPE_CHECKING:
-    from burg_drake.scene.document import Scene
-    from burg_drake.station.document import Station
+    from burg_drake.scene.document import SceneLike
+    from burg_drake.station.document import StationLike
 
 
 def write_json(plan: Plan, path: str | Path) -> None:
@@ -61,7 +61,7 @@ def write_json(plan: Plan, path: str | Path) -> None:
 
 
 def load_plan(
-    path: str | Path, *, scene: Scene | None = None, station: Station | None = None
+    path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
 ) -> Plan:
     """Reads what `Plan.to_json` or `Plan.to_csv` has written.
 

@@ -19,7 +19,7 @@ from burg_drake.core import Array, InvalidInputError, inverse, rotation_angle, s
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.plans import Plan, Trajectory
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
 from burg_drake.simulation.trials.arm_lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.command_sequence import CommandSequence
@@ -28,7 +28,7 @@ from burg_drake.simulation.trials.result import TrialResult, collision, failure
 from burg_drake.simulation.trials.scene_trial import SceneTrial, check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import MountedHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
 REST = 0.05
 """Time between arrival and closing, in which the arm comes to rest [s]."""
@@ -68,8 +68,8 @@ class ArmTrial(SceneTrial):
 
     def __init__(
         self,
-        scene: Scene,
-        station: Station,
+        scene: SceneLike,
+        station: StationLike,
         *,
         engine: Engine = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
@@ -77,6 +77,7 @@ class ArmTrial(SceneTrial):
         clearance: HandClearance | None = None,
         meshcat: Meshcat | None = None,
     ) -> None:
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
         super().__init__(diagram, MountedHand(diagram), settings)
         if clearance is None:

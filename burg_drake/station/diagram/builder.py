@@ -48,10 +48,10 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 from burg_drake.station.control import export_driven_ports, export_ports
 from burg_drake.station.diagram.leaning import soften_touching
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, Station, StationLike, as_station
 from burg_drake.station.world import (
     RISE as RISE,
     Robot,
@@ -131,8 +131,8 @@ def instance_pose(scene: Scene, station: Station, instance: str) -> Array:
 
 
 def build_station_diagram(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     robot: Robot = "arm",
     engine: Engine = ENGINES["standard"],
@@ -174,6 +174,7 @@ def build_station_diagram(
             a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
+    scene, station = as_scene(scene), as_station(station)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if robot not in get_args(Robot):
