@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from burg_drake.core import wilson_interval
-from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.evaluation.records import CPU_COLUMNS, PUSHED, Columns, motion_in
+from burg_drake.core.grasps import CPU_COLUMNS, LIFT_HEIGHT, PUSHED, Mode, Outcome, Stage
+from burg_drake.evaluation.records import Columns, motion_in
 from burg_drake.evaluation.results.notes import run_notes
 from burg_drake.evaluation.results.shortened_lifts import ShortLifts, short_lifts
-from burg_drake.evaluation.stages import LIFT_HEIGHT, Mode
 from burg_drake.evaluation.store import Run, member_codes
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import writable_folder
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
@@ -34,7 +34,6 @@ from burg_drake.evaluation.robustness.probes import (
     make_probes,
 )
 from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_columns
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.workers import judge_all
 

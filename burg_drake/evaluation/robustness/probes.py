@@ -14,9 +14,9 @@ from itertools import count, takewhile
 from typing import TYPE_CHECKING
 
 from burg_drake.core import InvalidInputError, UnknownNameError, content_hash, nearest
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Decide, Decision, Screen, Verdict, trial_decision
+from burg_drake.evaluation.stages import Decide, Decision, Screen, trial_decision
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.robustness import (
     FrictionSettings,

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.evaluation.records import JOURNAL_FILE, MOVED, PUSHED, Columns, read_journal
+from burg_drake.core.grasps import MOVED, PUSHED
+from burg_drake.evaluation.records import JOURNAL_FILE, Columns, read_journal
 from burg_drake.evaluation.store.part_file import (
     CANDIDATE,
     Part,

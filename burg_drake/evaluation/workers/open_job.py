@@ -6,8 +6,9 @@ import pickle
 from collections import deque
 from collections.abc import Sequence
 
+from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import ScreenAnswers, Verdict
+from burg_drake.evaluation.stages import ScreenAnswers
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.worker import JudgingTask, Screening
 

@@ -21,9 +21,8 @@ from collections.abc import Generator, Iterable, Iterator
 from multiprocessing.connection import wait
 
 from burg_drake.core import BurgError, SimulationError
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.open_job import TASK_SIZE, OpenJob

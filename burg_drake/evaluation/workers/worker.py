@@ -10,16 +10,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from burg_drake.core import BurgError, SimulationError
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import (
-    Judge,
-    ScreenAnswers,
-    Verdict,
-    judge_grasp,
-    one_line,
-    screen_grasps,
-)
+from burg_drake.evaluation.stages import Judge, ScreenAnswers, judge_grasp, one_line, screen_grasps
 from burg_drake.evaluation.workers.limits import (
     WorkerLimits,
     let_time_limits_end_this_process,
