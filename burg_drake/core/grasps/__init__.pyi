@@ -11,11 +11,7 @@ from .csv_metadata_file import (
     csv_metadata as csv_metadata,
     metadata_path as metadata_path,
 )
-from .grasp_set import (
-    FIXED_COLUMNS as FIXED_COLUMNS,
-    GraspSet as GraspSet,
-    parts_of as parts_of,
-)
+from .grasp_set import GraspSet as GraspSet
 from .mode import (
     MODES as MODES,
     Mode as Mode,
@@ -27,7 +23,11 @@ from .outcome import (
     RealOutcome as RealOutcome,
     Stage as Stage,
 )
-from .storage import FORMAT as FORMAT
+from .provenance import parts_of as parts_of
+from .storage import (
+    FIXED_COLUMNS as FIXED_COLUMNS,
+    FORMAT as FORMAT,
+)
 from .verdict import (
     Findings as Findings,
     Margins as Margins,
