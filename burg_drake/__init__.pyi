@@ -131,9 +131,11 @@ from .evaluation.workers.executor import (
     Executor as Executor,
     LocalExecutor as LocalExecutor,
 )
+from .experiment.comparison.comparing import (
+    compare as compare,
+)
 from .experiment.comparison.comparison import (
     Comparison as Comparison,
-    compare as compare,
 )
 from .experiment.gap.changes import (
     gap_changes as gap_changes,
@@ -203,11 +205,11 @@ from .motion.planner import (
     Planner as Planner,
     plan as plan,
 )
-from .motion.plans.plan_file import (
+from .motion.plans.grasp_plan import (
+    Plan as Plan,
     load_plan as load_plan,
 )
 from .motion.plans.trajectory import (
-    Plan as Plan,
     Trajectory as Trajectory,
 )
 from .motion.reach.arm_reach import (

@@ -46,16 +46,14 @@ from burg_drake.evaluation.store import (
     save_run,
 )
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
-from burg_drake.scene.document import Scene, load_scene
-from burg_drake.station.document import Station, load_station
-
-SceneReference = Scene | str | Path
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import StationLike, as_station
 
 
 @overload
 def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts, too
-    scene: SceneReference,
-    station: Station | str | Path,
+    scene: SceneLike,
+    station: StationLike,
     out: str | Path,
     *,
     grasps: Given | None = ...,
@@ -69,8 +67,8 @@ def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts
 
 @overload
 def evaluate(
-    scene: Sequence[SceneReference],
-    station: Station | str | Path,
+    scene: Sequence[SceneLike],
+    station: StationLike,
     out: str | Path,
     *,
     grasps: Given | None = ...,
@@ -83,8 +81,8 @@ def evaluate(
 
 
 def evaluate(
-    scene: SceneReference | Sequence[SceneReference],
-    station: Station | str | Path,
+    scene: SceneLike | Sequence[SceneLike],
+    station: StationLike,
     out: str | Path,
     *,
     grasps: Given | None = None,
@@ -132,7 +130,7 @@ def evaluate(
             all is judged.
     """
     settings = settings or EvaluationSettings()
-    station = station if isinstance(station, Station) else load_station(station)
+    station = as_station(station)
     if executor is None:
         executor = LocalExecutor(default_workers() if workers is None else workers)
     elif workers is not None:
@@ -149,13 +147,13 @@ def evaluate(
 
 
 def _evaluate_one(
-    scene: SceneReference,
+    scene: SceneLike,
     request: Request,
     folder: Path,
     executor: Executor,
     progress: bool | Listener,
 ) -> Run:
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    scene = as_scene(scene)
     station, mode = request.station, request.mode
     request.asked(scene)
     given = request.given(scene)

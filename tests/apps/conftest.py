@@ -63,6 +63,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         folder,
         settings=EvaluationSettings(mode="hand"),
         grasps={"box": grasps},
+        engine="screening",
         workers=1,
         progress=False,
     )

@@ -23,7 +23,7 @@ from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
 
 pytestmark = pytest.mark.usefixtures("judged_here")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from burg_drake.apps.options import DEFAULT_APPROACH_ANGLE, grasps_per_object
 
 if TYPE_CHECKING:
+    from burg_drake.core.grasps import Mode
     from burg_drake.evaluation.run import EvaluationSettings
-    from burg_drake.evaluation.stages import Mode
     from burg_drake.station.document import GraspMotion
 
 

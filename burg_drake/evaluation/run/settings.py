@@ -10,8 +10,8 @@ from burg_drake.core import InvalidInputError
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
 
 if TYPE_CHECKING:
+    from burg_drake.core.grasps import Mode
     from burg_drake.evaluation.records import Shard, TableFormat
-    from burg_drake.evaluation.stages import Mode
     from burg_drake.station.document import Engine, GraspMotion
 
 

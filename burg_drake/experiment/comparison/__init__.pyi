@@ -1,7 +1,5 @@
-from .comparison import (
-    Comparison as Comparison,
-    compare as compare,
-)
+from .comparing import compare as compare
+from .comparison import Comparison as Comparison
 from .record import (
     comparison_json as comparison_json,
     plain as plain,
