@@ -61,9 +61,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "tabletop_six",
         "panda_tabletop",
         folder,
-        settings=EvaluationSettings(mode="hand"),
+        settings=EvaluationSettings(mode="hand", engine="screening"),
         grasps={"box": grasps},
-        engine="screening",
         workers=1,
         progress=False,
     )
