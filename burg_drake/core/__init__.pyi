@@ -17,6 +17,7 @@ from .errors import (
     MissingDependencyError as MissingDependencyError,
     SimulationError as SimulationError,
     UnknownNameError as UnknownNameError,
+    WorkerEnded as WorkerEnded,
     did_you_mean as did_you_mean,
     listing as listing,
     nearest as nearest,
