@@ -61,11 +61,9 @@ from .motion.planner import (
     Planner as Planner,
     plan as plan,
 )
-from .motion.plans.plan_file import (
-    load_plan as load_plan,
-)
-from .motion.plans.trajectory import (
+from .motion.plans.grasp_plan import (
     Plan as Plan,
+    load_plan as load_plan,
 )
 from .motion.reach.arm_reach import (
     ArmReach as ArmReach,

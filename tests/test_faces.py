@@ -101,7 +101,7 @@ def private_names(module: ast.Module) -> list[str]:
         name
         for name in taken
         if re.match(r"burg_drake\b", name)
-        and not any(name == one or name.startswith(f"{one}.") and is_value(one) for one in public)
+        and not any(name == one or (name.startswith(f"{one}.") and is_value(one)) for one in public)
     ]
 
 

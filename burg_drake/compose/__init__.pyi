@@ -35,7 +35,10 @@ from .document.history import (
 )
 from .document.state import State as State
 from .document.surroundings import Surroundings as Surroundings
-from .editing.drag import Drag as Drag
+from .editing.drag import (
+    Drag as Drag,
+    DragOwner as DragOwner,
+)
 from .editing.editor import Editor as Editor
 from .editing.view import SessionView as SessionView
 from .session import ComposeSession as ComposeSession

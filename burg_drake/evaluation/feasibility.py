@@ -78,12 +78,12 @@ def reach(
         exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
             screening, several times faster.
         plans: folder that gets the timed motion of each grasp that the arm can execute, as
-            `INSTANCE-GRASP.json`, see `motion.plan_file`: a new or empty one, or that of an
+            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
             interrupted call, which the same call goes on with. What is finished is kept, and
             grasps are tried again whose worker process was ended from outside or whose plan is
             missing.
         plan_format: `csv` for tables, with what their columns are beside them; see
-            `motion.plan_csv`. `load_plan` reads both.
+            `plans.csv_file`. `load_plan` reads both.
         retry_failed: try all grasps again that an earlier call with these `plans` could not judge.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.

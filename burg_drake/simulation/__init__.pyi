@@ -17,11 +17,13 @@ from .robustness.perturbation import (
     SuccessRate as SuccessRate,
     success_rate as success_rate,
 )
-from .trials.arm_lift_clearance import ArmLiftClearance as ArmLiftClearance
 from .trials.carrier import Carrier as Carrier
 from .trials.contacts import BodyContact as BodyContact
 from .trials.execution import Execution as Execution
 from .trials.lift_carrier import LiftPath as LiftPath
-from .trials.lift_clearance import HandLiftClearance as HandLiftClearance
+from .trials.lift_clearance import (
+    ArmLiftClearance as ArmLiftClearance,
+    HandLiftClearance as HandLiftClearance,
+)
 from .trials.result import Margins as Margins
 from .trials.scene_trial import SceneTrial as SceneTrial

@@ -91,7 +91,7 @@ def test_failures_to_report_end_with_1(
 ) -> None:
     failed = run.results["id"][:2].tolist()
     monkeypatch.setattr(Run, "failures", failed)
-    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", lambda *a, **k: run)
+    monkeypatch.setattr("burg_drake.evaluation.evaluate", lambda *a, **k: run)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: 2 of 3 grasps could not be simulated, such as {failed[0]}")
@@ -139,7 +139,7 @@ def test_interrupted_evaluation_says_how_to_go_on(
     def interrupt(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", interrupt)
+    monkeypatch.setattr("burg_drake.evaluation.evaluate", interrupt)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 130
     assert capsys.readouterr().err == (
         "burg-drake: interrupted; the same command goes on from here\n"

@@ -25,7 +25,7 @@ from burg_drake.evaluation.feasibility import reach, reach_columns
 from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.table_file import read_table, write_table
 from burg_drake.evaluation.stages.judge import Verdict
-from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Station, load_station

@@ -19,7 +19,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.robustness.shares import lifted_shares
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
+from burg_drake.experiment.comparison.comparing import SUCCESSES, compare
 from burg_drake.experiment.comparison.placement_error import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page

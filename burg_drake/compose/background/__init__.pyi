@@ -10,4 +10,5 @@ from .process import (
 from .settling import (
     Settle as Settle,
     SettlingProposal as SettlingProposal,
+    moved_names as moved_names,
 )

@@ -9,15 +9,15 @@ from .csv_metadata_file import (
     csv_metadata as csv_metadata,
     metadata_path as metadata_path,
 )
-from .grasp_set import (
-    FIXED_COLUMNS as FIXED_COLUMNS,
-    GraspSet as GraspSet,
-    parts_of as parts_of,
-)
+from .grasp_set import GraspSet as GraspSet
 from .outcome import (
     UNTRIED as UNTRIED,
     Outcome as Outcome,
     RealOutcome as RealOutcome,
     Stage as Stage,
 )
-from .storage import FORMAT as FORMAT
+from .provenance import parts_of as parts_of
+from .storage import (
+    FIXED_COLUMNS as FIXED_COLUMNS,
+    FORMAT as FORMAT,
+)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.core.grasps import Outcome
 from burg_drake.core.terminal import TextTable, count, duration, figure, percent
-from burg_drake.evaluation.results.summary import OutcomeCounts, Summary
+from burg_drake.evaluation.results.counts import OutcomeCounts, Summary
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult

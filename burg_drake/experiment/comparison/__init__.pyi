@@ -1,7 +1,7 @@
+from .comparing import compare as compare
 from .comparison import (
     Comparison as Comparison,
     Coverage as Coverage,
-    compare as compare,
 )
 from .disagreement import Disagreement as Disagreement
 from .groups import (

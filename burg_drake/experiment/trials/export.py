@@ -1,6 +1,6 @@
 """The timed motions of trials, for the robot: one file a trial, named by its number.
 
-017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plan_file`
+017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `plans.grasp_plan`
 index.csv                    all trials, with their files, or what hinders the arm
 runs/KEY/                    what was asked of each run's grasps, and the answers: the same call
                              goes on from there

@@ -8,7 +8,7 @@ before the hand closed.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -21,11 +21,12 @@ from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.plans import Plan, Trajectory
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
-from burg_drake.simulation.trials.arm_lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.result import TrialResult, collision, failure
-from burg_drake.simulation.trials.scene_trial import SceneTrial, check_overrides
+from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import MountedHand, build_station_diagram
 from burg_drake.station.document import ENGINES, Engine, Station
@@ -38,7 +39,7 @@ APART = 1e-6
 """Ends of trajectories that are meant to meet [rad]."""
 
 
-class ArmTrial(SceneTrial):
+class ArmTrial(GraspTrial):
     """Executes plans in one scene with the whole robot.
 
     Args:
@@ -57,8 +58,6 @@ class ArmTrial(SceneTrial):
         clearance: the screen of the open hand.
         hand: hand and arm.
         contacts, neighbours, simulator, settings: see `SceneTrial`.
-        look: time from one look at the contacts to the next [s].
-        gravity: [m/s^2].
 
     Raises:
         InvalidInputError: the station has no arm.
@@ -78,18 +77,15 @@ class ArmTrial(SceneTrial):
         meshcat: Meshcat | None = None,
     ) -> None:
         diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
-        super().__init__(diagram, MountedHand(diagram), settings)
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
-        self.clearance = clearance
+        super().__init__(diagram, MountedHand(diagram), settings, clearance)
         self._transfer = transfer
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(diagram)
         self._steps_a_look = max(1, round(settings.poll / engine.time_step))
-        self.look = self._steps_a_look * engine.time_step
-        self.gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
         self._rises: dict[BodyIndex, ArmLiftClearance] = {}
 
     def run(
@@ -125,15 +121,8 @@ class ArmTrial(SceneTrial):
         as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
         if rotation_angle(X_WG[:3, :3].T @ as_planned) > OFF_ANGLE:
             X_WG = swap_fingers(X_WG)
-        screen = self.clearance.check(instance, X_WG)
-        if screen.outcome is not None:
-            return collision(screen)
-        try:
-            found = self.begin(instance, plan, friction=friction, mass=mass).run()
-            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
-        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.spoil()
-            return failure(error, screen, self.context.get_time())
+        begin = partial(self.begin, instance, plan, friction=friction, mass=mass)
+        return self.execute(instance, X_WG, begin)
 
     def begin(
         self,
@@ -166,7 +155,9 @@ class ArmTrial(SceneTrial):
         self.command("arm", approach.at(0))
         self.command("hand", self.hand.opening_command())
         self.simulator.Initialize()
-        return Execution(self, target, moving, ArmCarrier(self, target, approach, ways))
+        look_ahead = partial(self.rise, target)
+        carrier = ArmCarrier(self, target, approach, ways, look_ahead)
+        return Execution(self, target, moving, carrier)
 
     def rise(self, target: BodyIndex) -> ArmLiftClearance:
         """Looks along the way up with a target in the hand."""

@@ -33,9 +33,9 @@ from burg_drake.station.checks.body_shapes import object_shapes, surrounding_sha
 from burg_drake.station.checks.collision_world import CollisionWorld
 from burg_drake.station.checks.sinking import push_up
 from burg_drake.station.checks.travel import Travel
-from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import Station
-from burg_drake.station.world import ROBOT_MODELS, taken_name, taken_obstacle
+from burg_drake.station.world import ROBOT_MODELS, Robot, taken_name, taken_obstacle
 
 GRAVITY = 9.81
 """[m/s^2]."""
