@@ -111,9 +111,7 @@ def is_value(name: str) -> bool:
 
 
 def test_rooms_do_not_import_faces() -> None:
-    plain = {f"burg_drake.{name}" for name in FACES if (PACKAGE / f"{name}.py").is_file()}
+    plain = "|".join(name for name in FACES if (PACKAGE / f"{name}.py").is_file())
+    imports = re.compile(rf"(from|import) burg_drake(\.({plain}) | import ({plain})\b)")
     for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.ImportFrom):
-                taken = {f"{node.module}.{alias.name}" for alias in node.names}
-                assert not plain & {node.module, *taken}, path
+        assert not imports.search(path.read_text("utf-8")), path
