@@ -131,6 +131,7 @@ def test_a_worker_that_is_ended_by_others_is_replaced() -> None:
         pool.submit(jobs.square, 1).result(PATIENCE)
         (idle,) = pool.processes
         os.kill(idle, signal.SIGKILL)
+        assert ends(idle)
         future = pool.submit(jobs.slow, 3, 0.5)
         while not (set(pool.processes) - {idle}):
             time.sleep(0.01)
