@@ -29,10 +29,10 @@ from .stages.judge import (
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
-    Verdict as Verdict,
 )
 from .stages.station_judge import (
     StationJudge as StationJudge,
+    build_judge as build_judge,
 )
 from .store.run_folder import (
     Run as Run,

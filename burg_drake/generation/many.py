@@ -19,7 +19,7 @@ from burg_drake.generation.sample import (
 )
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Ingredients, SceneRecipe
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import Station, StationLike, as_station, load_station
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class SampledFolder:
 def sample_scenes(
     recipe: SceneRecipe,
     library: ObjectLibrary,
-    station: Station,
+    station: StationLike,
     folder: str | Path,
     count: int,
     *,
@@ -89,6 +89,7 @@ def sample_scenes(
     Raises:
         InvalidInputError, UnknownNameError: see `SceneFolder` and `require_possible`.
     """
+    station = as_station(station)
     require_possible(recipe, library, station)
     ingredients = ingredients_of(recipe, library, station)
     with SceneFolder(folder, ingredients) as opened:

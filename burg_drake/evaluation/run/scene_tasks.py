@@ -8,10 +8,10 @@ from pathlib import Path
 
 from burg_drake.core import SimulationError
 from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.records import JOURNAL_FILE, Journal, TableFormat
 from burg_drake.evaluation.run.preparation import finish_run, open_run, require_sound
 from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.stages import Mode
 from burg_drake.evaluation.store import (
     RUN_FILE,
     PartWriter,
@@ -19,7 +19,7 @@ from burg_drake.evaluation.store import (
     load_run,
     require_run_folder,
 )
-from burg_drake.scene.document import Scene, load_scene
+from burg_drake.scene.document import Scene, as_scene
 from burg_drake.station.document import Station
 
 
@@ -74,7 +74,7 @@ class Preparer:
         Raises:
             BurgError: it cannot be judged.
         """
-        scene = work.scene if isinstance(work.scene, Scene) else load_scene(work.scene)
+        scene = as_scene(work.scene)
         request = self.request.of_scene(scene)
         if request is None:
             return None
