@@ -73,6 +73,7 @@ from .table import (
     make_columns as make_columns,
     table_row as table_row,
     trial_columns as trial_columns,
+    verdict_columns as verdict_columns,
 )
 from .table_file import (
     is_table as is_table,
