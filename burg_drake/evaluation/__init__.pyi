@@ -32,6 +32,7 @@ from .stages.judge import (
 )
 from .stages.station_judge import (
     StationJudge as StationJudge,
+    build_judge as build_judge,
 )
 from .store.run_folder import (
     Run as Run,

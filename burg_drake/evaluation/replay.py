@@ -16,7 +16,7 @@ from burg_drake.core.grasps import (
     Verdict,
 )
 from burg_drake.evaluation.records import RecordedTrial, TrialOrigin, motion_text, software_versions
-from burg_drake.evaluation.stages import StationJudge, judge_grasp, mode_for
+from burg_drake.evaluation.stages import build_judge, judge_grasp, mode_for
 from burg_drake.motion.plans import Plan
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.trials import TrialResult
@@ -64,7 +64,7 @@ def rerun(
     Raises:
         InvalidInputError: settings that this release lacks, or an unsound scene.
     """
-    judge = StationJudge(
+    judge = build_judge(
         scene,
         station,
         engine=origin.engine,
