@@ -30,7 +30,7 @@ from burg_drake.evaluation.candidates import (
     given_candidates,
 )
 from burg_drake.evaluation.grasp_sets import by_names, set_documents
-from burg_drake.evaluation.records import Columns, input_of, numbers, verdict_columns
+from burg_drake.evaluation.records import Columns, columns_of_verdicts, input_of, numbers
 from burg_drake.evaluation.stages import (
     Decide,
     Decision,
@@ -232,7 +232,7 @@ def _with_columns(
         columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
     if any("duration" in v.margins for v in rows):
         columns["duration"] = np.array([v.margins.get("duration", np.nan) for v in rows])
-    columns |= verdict_columns(rows, POSTURE, TableShape("reach", joints=len(arm.home)))
+    columns |= columns_of_verdicts(rows, POSTURE, TableShape("reach", joints=len(arm.home)))
     columns["cpu"] = np.array([sum(v.cpu.values()) for v in rows], dtype=float)
     objects = sorted(set(candidates.grasps.object.tolist()))
     provenance = {
