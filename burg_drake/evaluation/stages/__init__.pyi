@@ -1,5 +1,6 @@
 from .counts import (
     GraspCount as GraspCount,
+    count_grasps as count_grasps,
     grasp_counts as grasp_counts,
 )
 from .judge import (
