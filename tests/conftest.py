@@ -128,11 +128,13 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place."""
-    from burg_drake.evaluation.workers.pool import Pool
+    from burg_drake.evaluation.workers.pool import JudgePool
 
     with pytest.MonkeyPatch.context() as patch:
         for user in ("executor", "single_job"):
-            patch.setattr(f"burg_drake.evaluation.workers.{user}.Pool", _pool_or_this_process(Pool))
+            patch.setattr(
+                f"burg_drake.evaluation.workers.{user}.JudgePool", _pool_or_this_process(JudgePool)
+            )
         yield
 
 
