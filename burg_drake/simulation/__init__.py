@@ -1,1 +1,4 @@
-"""Executed grasp trials: phases, success criteria and margins."""
+"""Time stepping: grasp trials with their outcome and margins, and scenes that come to rest.
+
+Read `trials` first; `settling` builds on `rest`, and `robustness` repeats trials.
+"""

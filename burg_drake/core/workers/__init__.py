@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Worker processes of this machine.
+
+Read `processes` first, upon which the others build.
+"""
 
 import lazy_loader
 
