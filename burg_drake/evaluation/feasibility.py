@@ -40,8 +40,8 @@ from burg_drake.evaluation.workers import judge_all
 from burg_drake.motion.lines import ReachSettings
 from burg_drake.motion.plans import Plan
 from burg_drake.motion.reach import Witness
-from burg_drake.scene.document import Scene, load_scene
-from burg_drake.station.document import GraspMotion, Station, load_station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import GraspMotion, Station, StationLike, as_station
 
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
@@ -51,8 +51,8 @@ MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess", LIFT_HEIGHT)
 
 
 def reach(
-    scene: Scene | str | Path,
-    station: Station | str | Path,
+    scene: SceneLike,
+    station: StationLike,
     grasps: GraspSet | Mapping[str, GraspSet],
     *,
     motion: GraspMotion | None = None,
@@ -107,8 +107,7 @@ def reach(
     """
     from burg_drake.motion.workspace import require_usable_arm
 
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
-    station = station if isinstance(station, Station) else load_station(station)
+    scene, station = as_scene(scene), as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
             f"station {station.name!r} has no arm, of which one could ask what it can reach; give"

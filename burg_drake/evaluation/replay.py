@@ -13,8 +13,8 @@ from burg_drake.evaluation.stages import (
     LIFT_HEIGHT,
     MARGINS,
     Mode,
-    StationJudge,
     Verdict,
+    build_judge,
     judge_grasp,
     mode_for,
 )
@@ -65,7 +65,7 @@ def rerun(
     Raises:
         InvalidInputError: settings that this release lacks, or an unsound scene.
     """
-    judge = StationJudge(
+    judge = build_judge(
         scene,
         station,
         engine=origin.engine,

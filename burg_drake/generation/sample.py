@@ -22,7 +22,13 @@ from burg_drake.scene.arrangement import ObjectRequest, ObjectShapes, arrange, c
 from burg_drake.scene.document import Ingredients, Scene, SceneDocument, SceneOrigin, SceneRecipe
 from burg_drake.simulation.settling import settle_scene
 from burg_drake.station.checks import SceneCheck
-from burg_drake.station.document import MODEL_NAMES, Station, boxes_in_scene, load_station
+from burg_drake.station.document import (
+    MODEL_NAMES,
+    Station,
+    StationLike,
+    as_station,
+    boxes_in_scene,
+)
 
 NO_ROOM = "an object found no place"
 REASONS = {
@@ -175,7 +181,7 @@ class SceneSampler:
 def sample_scene(
     recipe: SceneRecipe,
     library: ObjectLibrary | None = None,
-    station: Station | None = None,
+    station: StationLike | None = None,
     *,
     number: int = 0,
 ) -> SampledScene:
@@ -192,7 +198,7 @@ def sample_scene(
         BurgError: the station or an object cannot be built.
     """
     library = library or load_library(recipe.library)
-    station = station or load_station(recipe.station)
+    station = as_station(recipe.station if station is None else station)
     return SceneSampler(recipe, library, station).sample(number)
 
 

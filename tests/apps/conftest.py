@@ -61,6 +61,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "panda_tabletop",
         folder,
         grasps={"box": grasps},
+        engine="screening",
         workers=1,
         mode="hand",
         progress=False,

@@ -110,6 +110,7 @@ def test_what_was_ended_from_outside_is_tried_again_by_the_same_command(
     run.candidates.grasps.save(tmp_path / "grasps.npz")
     command = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
     command += ["--grasps", str(tmp_path / "grasps.npz"), "--workers", "1", "--quiet"]
+    command += ["--engine", "screening"]
     assert main(command) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line == (
@@ -217,8 +218,8 @@ def test_replay_compares_with_the_engine_of_the_row(
     changed = row.replace("whole_trial=False", "whole_trial=True")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 2
-    assert "engine 'standard' and engine_settings contradict" in capsys.readouterr().err
-    changed = changed.replace(",standard,", ",standard (custom),")
+    assert "engine 'screening' and engine_settings contradict" in capsys.readouterr().err
+    changed = changed.replace(",screening,", ",screening (custom),")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 1
     out = capsys.readouterr().out.splitlines()

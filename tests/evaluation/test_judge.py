@@ -155,11 +155,11 @@ def test_an_error_while_screening_is_that_of_one_grasp() -> None:
 
 def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
     """To the last bit, and on instances in any order: the trial asks about its grasp again."""
-    from burg_drake.evaluation.stages.station_judge import StationJudge
+    from burg_drake.evaluation.stages.station_judge import build_judge
     from burg_drake.simulation.trials.hand_trial import HandTrial
 
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
-    judge = StationJudge(scene, station, engine=ENGINES["standard"], mode="hand")
+    judge = build_judge(scene, station, engine=ENGINES["standard"], mode="hand")
     (screen,) = judge.screens
     sampled = list(sample_candidates(scene, station, 25, 3, SamplingSettings(blind=True)))
     grasps = [sampled[k] for k in np.random.default_rng(0).permutation(len(sampled))]

@@ -5,7 +5,6 @@ from .grasp_counts import (
 from .process import (
     BackgroundJob as BackgroundJob,
     BackgroundWorker as BackgroundWorker,
-    Cancelled as Cancelled,
 )
 from .settling import (
     Settle as Settle,

@@ -50,13 +50,13 @@ from burg_drake.evaluation.store import (
     save_campaign,
 )
 from burg_drake.evaluation.workers import Executor, Job, JobFailed
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike
 
 MakeJudge = Callable[..., Callable[[], Any]]
 
 
 def evaluate_scenes(
-    references: Sequence[Scene | str | Path],
+    references: Sequence[SceneLike],
     request: Request,
     folder: Path,
     executor: Executor,

@@ -39,4 +39,5 @@ from .screening import (
 from .station_judge import (
     StationJudge as StationJudge,
     StationJudgeFactory as StationJudgeFactory,
+    build_judge as build_judge,
 )

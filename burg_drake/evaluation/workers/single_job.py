@@ -11,7 +11,7 @@ from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.stages import Judge, Verdict
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.pool import Pool
+from burg_drake.evaluation.workers.pool import JudgePool
 
 
 def judge_all(
@@ -43,7 +43,7 @@ def judge_all(
     count = default_workers() if workers is None else workers
     if count < 1:
         raise InvalidInputError(f"workers is {count}; give 1 or more")
-    pool = Pool(count, limits or WorkerLimits())
+    pool = JudgePool(count, limits or WorkerLimits())
     with closing(pool.run([Job("", make_judge, candidates)])) as answers:
         for _, candidate, verdict in answers:
             yield candidate, verdict

@@ -31,7 +31,7 @@ from burg_drake.evaluation.store import PlanFolder, PlanFormat, Run, plans_docum
 from burg_drake.evaluation.workers import judge_all
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 from burg_drake.experiment.trials.sources import Moved, load_sources
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import StationLike, as_station
 
 INDEX_FILE = "index.csv"
 RUNS = "runs"
@@ -85,7 +85,7 @@ def export_trials(
     out: str | Path,
     *,
     format: PlanFormat = "json",
-    station: Station | str | Path | None = None,
+    station: StationLike | None = None,
     moved: Moved | None = None,
     retry_failed: bool = False,
     workers: int | None = None,
@@ -145,16 +145,13 @@ def _factory(
     folder: Path,
     out: Path,
     format: PlanFormat,
-    station: Station | str | Path | None,
+    station: StationLike | None,
 ) -> tuple[ReachJudgeFactory, Candidates]:
     """What judges the grasps of one run, and these."""
     from burg_drake.motion.workspace import require_usable_arm
 
     scene = run.scene()
-    if station is None:
-        station = run.station()
-    elif not isinstance(station, Station):
-        station = load_station(station)
+    station = run.station() if station is None else as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
             f"station {station.name!r} of {run.path} has no arm, of which one could have motions;"

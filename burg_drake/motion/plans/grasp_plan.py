@@ -11,8 +11,8 @@ from burg_drake.motion.plans.json_file import read_json, write_json
 from burg_drake.motion.plans.planned_motion import PlannedMotion
 
 if TYPE_CHECKING:
-    from burg_drake.scene.document import Scene
-    from burg_drake.station.document import Station
+    from burg_drake.scene.document import SceneLike
+    from burg_drake.station.document import StationLike
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +29,7 @@ class Plan(PlannedMotion):
 
 
 def load_plan(
-    path: str | Path, *, scene: Scene | None = None, station: Station | None = None
+    path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
 ) -> Plan:
     """Reads what `Plan.to_json` or `Plan.to_csv` has written.
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
 
     from burg_drake.motion.ik import ArmLimits
-    from burg_drake.scene.document import Scene
-    from burg_drake.station.document import Station
+    from burg_drake.scene.document import Scene, SceneLike
+    from burg_drake.station.document import Station, StationLike
 
 PHASES = ("transfer", "approach", "close", "retreat", "lift")
 """What happens one after the other; while the hand closes the arm rests, and without a retreat the
@@ -102,8 +102,8 @@ class PlannedMotion:
 
     def require_for(
         self,
-        scene: Scene | None = None,
-        station: Station | None = None,
+        scene: SceneLike | None = None,
+        station: StationLike | None = None,
         *,
         name: str = "the plan",
     ) -> None:
@@ -116,7 +116,14 @@ class PlannedMotion:
         Raises:
             InvalidInputError: it is for another one, or does not tell what it is for.
         """
-        wanted = [(kind, x) for kind, x in (("station", station), ("scene", scene)) if x]
+        from burg_drake.scene.document import as_scene  # here: a plan alone needs none of it
+        from burg_drake.station.document import as_station
+
+        wanted: list[tuple[str, Scene | Station]] = []
+        if station is not None:
+            wanted.append(("station", as_station(station)))
+        if scene is not None:
+            wanted.append(("scene", as_scene(scene)))
         if wanted and self.origin is None:
             raise InvalidInputError(
                 f"{name} does not tell which scene and arm it is for; of a CSV that is in the file"

@@ -19,7 +19,7 @@ from burg_drake.core import Array, InvalidInputError, inverse, rotation_angle, s
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.plans import Plan, Trajectory
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.execution import Execution
@@ -29,7 +29,7 @@ from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import MountedHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
 REST = 0.05
 """Time between arrival and closing, in which the arm comes to rest [s]."""
@@ -67,8 +67,8 @@ class ArmTrial(GraspTrial):
 
     def __init__(
         self,
-        scene: Scene,
-        station: Station,
+        scene: SceneLike,
+        station: StationLike,
         *,
         engine: Engine = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
@@ -76,6 +76,7 @@ class ArmTrial(GraspTrial):
         clearance: HandClearance | None = None,
         meshcat: Meshcat | None = None,
     ) -> None:
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))

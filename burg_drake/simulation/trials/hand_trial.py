@@ -18,7 +18,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.grasping.clearance import HandClearance
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.grasp_trial import GraspTrial
 from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
@@ -27,7 +27,13 @@ from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import FloatingHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, GraspMotion, Station
+from burg_drake.station.document import (
+    ENGINES,
+    Engine,
+    GraspMotion,
+    StationLike,
+    as_station,
+)
 
 
 class HandTrial(GraspTrial):
@@ -55,8 +61,8 @@ class HandTrial(GraspTrial):
 
     def __init__(
         self,
-        scene: Scene,
-        station: Station,
+        scene: SceneLike,
+        station: StationLike,
         *,
         engine: Engine = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
@@ -64,6 +70,7 @@ class HandTrial(GraspTrial):
         lock: bool = True,
         meshcat: Meshcat | None = None,
     ) -> None:
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(
             scene, station, robot="hand", engine=engine, meshcat=meshcat
         )

@@ -43,12 +43,12 @@ from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, 
 from pydrake.planning import RobotDiagramBuilder
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.control import export_driven_ports, export_ports
 from burg_drake.station.diagram.ball_contact import separate_ball_contact
 from burg_drake.station.diagram.leaning import soften_touching
 from burg_drake.station.diagram.station_diagram import StationDiagram, instance_pose
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 from burg_drake.station.world import (
     Robot,
     add_board,
@@ -67,8 +67,8 @@ if TYPE_CHECKING:
 
 
 def build_station_diagram(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     robot: Robot = "arm",
     engine: Engine = ENGINES["standard"],
@@ -110,6 +110,7 @@ def build_station_diagram(
             a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
+    scene, station = as_scene(scene), as_station(station)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if robot not in get_args(Robot):
