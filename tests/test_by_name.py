@@ -195,6 +195,14 @@ def mapped(scene: SceneLike, station: StationLike) -> Any:
     return reached, report.warnings, report.seen
 
 
+def composed(scene: SceneLike, station: StationLike, folder: Path) -> Any:
+    """A session on a scene of its own, since sessions lock their scenes' files."""
+    path = folder / "own.yaml"
+    burg.save_scene(as_scene(scene).document, path)
+    with burg.compose.ComposeSession.open(path, station) as session:
+        return session.view.status, session.station.content
+
+
 Answer = Callable[[SceneLike, StationLike, Path], Any]
 ANSWERS: dict[str, Answer] = {
     "validate_scene": lambda scene, station, folder: validate_scene(scene),
@@ -235,6 +243,14 @@ ANSWERS: dict[str, Answer] = {
     "Overlay": lambda scene, station, folder: drawn(Overlay)(scene),
     "SceneOverlay": lambda scene, station, folder: overlaid(scene),
     "map_reachability": lambda scene, station, folder: mapped(scene, station),
+    "height_map": lambda scene, station, folder: burg.scenes.height_map(scene).height.tobytes(),
+    "stillness": lambda scene, station, folder: burg.scenes.stillness(
+        scene, station, duration=0.01
+    ),
+    "FrameProcessor": lambda scene, station, folder: (
+        burg.cameras.FrameProcessor(scene, INTRINSICS).scene.content
+    ),
+    "ComposeSession": lambda scene, station, folder: composed(scene, station, folder),
     "reach_from_above": lambda scene, station, folder: reach_from_above(
         station, spacing=0.1
     ).reached.tolist(),
