@@ -1,5 +1,6 @@
 """Runs and campaigns: their documents and rows, judging on other machines, robustness of grasps."""
 
+from burg_drake.core.grasps import Verdict as Verdict
 from burg_drake.core.terminal import (
     Progress as Progress,
 )
@@ -42,7 +43,6 @@ from burg_drake.evaluation.stages import (
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
-    Verdict as Verdict,
 )
 from burg_drake.evaluation.store import (
     StoredRows as StoredRows,

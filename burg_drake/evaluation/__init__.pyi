@@ -21,7 +21,6 @@ from .stages.judge import (
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
-    Verdict as Verdict,
 )
 from .stages.station_judge import (
     StationJudge as StationJudge,

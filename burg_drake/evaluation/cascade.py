@@ -17,6 +17,7 @@ from typing import overload
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Mode
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG, given_candidates
@@ -38,7 +39,7 @@ from burg_drake.evaluation.run import (
     require_judged,
     require_sound as _require_sound,
 )
-from burg_drake.evaluation.stages import Mode, StationJudgeFactory, mode_for
+from burg_drake.evaluation.stages import StationJudgeFactory, mode_for
 from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,

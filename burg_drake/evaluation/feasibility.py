@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
-from burg_drake.core.grasps import GraspSet, Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, GraspSet, Outcome, Stage, Verdict
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.evaluation.candidates import (
@@ -24,10 +24,8 @@ from burg_drake.evaluation.candidates import (
 from burg_drake.evaluation.grasp_sets import by_names, set_documents
 from burg_drake.evaluation.records import Columns, input_of, numbers
 from burg_drake.evaluation.stages import (
-    LIFT_HEIGHT,
     Decide,
     Decision,
-    Verdict,
     arm_reach,
     arm_screen,
     arm_settings,

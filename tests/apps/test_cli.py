@@ -22,9 +22,9 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.runs import evaluate
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.grasps import MODES
 from burg_drake.core.paths.resources import builtin_names
 from burg_drake.evaluation.candidates.sampling import DEFAULT_APPROACH_ANGLE_DEG
-from burg_drake.evaluation.stages.mode import MODES
 from burg_drake.station.document.engine import ENGINES
 
 GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"], ["trials"])

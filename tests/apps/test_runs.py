@@ -15,10 +15,10 @@ from burg_drake.apps.cli import main
 from burg_drake.apps.options.retries import how_to_retry
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.records.journal import Journal
-from burg_drake.evaluation.stages.judge import Verdict
 from burg_drake.evaluation.store.run_folder import Run, load_run, save_run
 
 Capture = pytest.CaptureFixture[str]

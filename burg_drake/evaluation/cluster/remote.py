@@ -16,9 +16,9 @@ from typing import Any
 from distributed import WorkerPlugin, get_worker
 
 from burg_drake.core import BurgError, SimulationError
+from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.bundles import JudgeRecipe, unpack
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.workers import Job, JobFailed, JudgePool, WorkerLimits
 
 IDLE = 60.0

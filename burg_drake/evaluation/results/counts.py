@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import wilson_interval
-from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.evaluation.records import CPU_COLUMNS, PUSHED, Columns
+from burg_drake.core.grasps import CPU_COLUMNS, PUSHED, Mode, Outcome, Stage
+from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.results.shortened_lifts import ShortLifts
-from burg_drake.evaluation.stages import Mode
 
 ARM_STAGES = (Stage.REACHABLE.value, Stage.PLANNED.value)
 """Counts of the funnel that a run without the arm does not have."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, Outcome, Stage
 from burg_drake.evaluation.records import motion_in
 from burg_drake.evaluation.results.campaign_summary import summarize_campaign
 from burg_drake.evaluation.results.counts import (
@@ -21,7 +21,6 @@ from burg_drake.evaluation.results.counts import (
 )
 from burg_drake.evaluation.results.notes import run_notes
 from burg_drake.evaluation.results.shortened_lifts import short_lifts
-from burg_drake.evaluation.stages import LIFT_HEIGHT
 from burg_drake.evaluation.store import Campaign, Run, member_codes
 
 OUTCOMES, ALL_STAGES = tuple(Outcome), tuple(Stage)

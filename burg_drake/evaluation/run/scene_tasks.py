@@ -8,10 +8,10 @@ from pathlib import Path
 
 from burg_drake.core import SimulationError
 from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.records import JOURNAL_FILE, Journal, TableFormat
 from burg_drake.evaluation.run.preparation import finish_run, open_run, require_sound
 from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.stages import Mode
 from burg_drake.evaluation.store import (
     RUN_FILE,
     PartWriter,

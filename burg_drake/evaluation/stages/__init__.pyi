@@ -4,16 +4,11 @@ from .counts import (
     grasp_counts as grasp_counts,
 )
 from .judge import (
-    ARM_MARGINS as ARM_MARGINS,
-    ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
-    LIFT_HEIGHT as LIFT_HEIGHT,
-    MARGINS as MARGINS,
     Decide as Decide,
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
     ScreenAnswers as ScreenAnswers,
-    Verdict as Verdict,
     judge_grasp as judge_grasp,
     one_line as one_line,
     screen_grasps as screen_grasps,
@@ -21,8 +16,6 @@ from .judge import (
     trial_verdict as trial_verdict,
 )
 from .mode import (
-    MODES as MODES,
-    Mode as Mode,
     mode_for as mode_for,
 )
 from .scene_acceptance import (

@@ -6,10 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, Mode, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages.judge import LIFT_HEIGHT, Decide, Decision, Screen, trial_decision
-from burg_drake.evaluation.stages.mode import Mode
+from burg_drake.evaluation.stages.judge import Decide, Decision, Screen, trial_decision
 from burg_drake.evaluation.stages.screening import arm_reach, arm_screen, hand_alone, hand_screen
 from burg_drake.motion.plans import Plan
 from burg_drake.motion.reach import Witness

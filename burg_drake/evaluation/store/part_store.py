@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.evaluation.records import JOURNAL_FILE, MOVED, PUSHED, read_journal
+from burg_drake.core.grasps import MOVED, PUSHED
+from burg_drake.evaluation.records import JOURNAL_FILE, read_journal
 from burg_drake.evaluation.store.part_file import (
     CANDIDATE,
     Part,

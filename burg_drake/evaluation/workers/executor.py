@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.pool import JudgePool

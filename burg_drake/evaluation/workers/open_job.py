@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import Session
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import ScreenAnswers, Verdict
+from burg_drake.evaluation.stages import ScreenAnswers
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.worker import Grasp, build_judge

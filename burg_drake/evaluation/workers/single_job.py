@@ -6,9 +6,10 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Judge, Verdict
+from burg_drake.evaluation.stages import Judge
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.pool import JudgePool

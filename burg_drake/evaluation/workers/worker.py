@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from burg_drake.core import BurgError, SimulationError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import report_progress
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import (
-    Judge,
-    ScreenAnswers,
-    Verdict,
-    judge_grasp,
-    one_line,
-    screen_grasps,
-)
+from burg_drake.evaluation.stages import Judge, ScreenAnswers, judge_grasp, one_line, screen_grasps
 
 Grasp = tuple[Candidate, ScreenAnswers]
 """A grasp with the answers of the screens that have been asked."""

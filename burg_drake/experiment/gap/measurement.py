@@ -24,7 +24,7 @@ import numpy as np
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import MODES, GraspSet, Mode
 from burg_drake.core.paths import portable_reference
 from burg_drake.core.terminal import Listener
 from burg_drake.evaluation import evaluate
@@ -41,7 +41,7 @@ from burg_drake.evaluation.records import (
     run_hash,
     software_versions,
 )
-from burg_drake.evaluation.stages import MODES, Mode, arm_settings, mode_for
+from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.evaluation.store import (
     RUN_FILE,
     Run,

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from burg_drake.core import content_hash
-from burg_drake.evaluation.stages import Mode, StationJudge, StationJudgeFactory, build_judge
+from burg_drake.core.grasps import Mode
+from burg_drake.evaluation.stages import StationJudge, StationJudgeFactory, build_judge
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, Station
 

@@ -19,14 +19,14 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write, remove_unfinished, writable_folder
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation import ReachJudgeFactory
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records import input_of, motion_in, numbers
-from burg_drake.evaluation.stages import Verdict, arm_settings
+from burg_drake.evaluation.stages import arm_settings
 from burg_drake.evaluation.store import PlanFolder, PlanFormat, Run, plans_document
 from burg_drake.evaluation.workers import judge_all
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials

@@ -6,7 +6,6 @@ from .execution import (
 )
 from .hand_trial import HandTrial as HandTrial
 from .result import (
-    Margins as Margins,
     TrialResult as TrialResult,
 )
 from .trial_settings import (

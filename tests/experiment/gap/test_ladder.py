@@ -16,10 +16,11 @@ import pytest
 from burg_drake.apps.cli import main
 from burg_drake.apps.comparison import gap as gap_verb
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
 from burg_drake.evaluation.records.run_document import run_hash
 from burg_drake.evaluation.replay import differences
-from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
+from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.stages.station_judge import build_judge
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.evaluation.workers.executor import Job
