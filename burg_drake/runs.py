@@ -35,6 +35,7 @@ from burg_drake.evaluation.results import (
 )
 from burg_drake.evaluation.robustness import (
     GraspRobustness as GraspRobustness,
+    ProbeAnswer as ProbeAnswer,
     Robustness as Robustness,
     RobustnessSettings as RobustnessSettings,
     assess_robustness as assess_robustness,

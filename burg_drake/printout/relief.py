@@ -48,8 +48,7 @@ def height_map(scene: SceneLike, resolution: float = RESOLUTION) -> HeightMap:
     """The height map of a scene, without markers.
 
     Args:
-        scene: loaded, or as `load_scene` takes it; free and fixed objects are drawn; of those that
-            reach beyond the board, what is over it.
+        scene: free and fixed objects; of those that reach beyond the board, what is over it.
         resolution: side of a pixel [m].
 
     Raises:

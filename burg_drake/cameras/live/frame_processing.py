@@ -72,7 +72,7 @@ class FrameProcessor:
     """Looks at frames of one camera over the board of one scene.
 
     Args:
-        scene: what is to be shown, loaded or as `load_scene` takes it.
+        scene: what is to be shown.
         intrinsics: of the camera.
         print_scale: size of the printed board against the document's, along x and y.
         style: of the overlay, as far as the view's settings leave it open.
