@@ -56,7 +56,7 @@ PHYSICS = tuple(
         *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
         *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
         *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),
-        *("visualization", "test_document_code.py", "test_packaging.py"),
+        *("visualization", "test_document_code.py", "test_packaging.py", "test_typed_use.py"),
     )
 )
 """Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
@@ -128,11 +128,13 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place."""
-    from burg_drake.evaluation.workers.pool import Pool
+    from burg_drake.evaluation.workers import JudgePool
 
     with pytest.MonkeyPatch.context() as patch:
         for user in ("executor", "single_job"):
-            patch.setattr(f"burg_drake.evaluation.workers.{user}.Pool", _pool_or_this_process(Pool))
+            patch.setattr(
+                f"burg_drake.evaluation.workers.{user}.JudgePool", _pool_or_this_process(JudgePool)
+            )
         yield
 
 

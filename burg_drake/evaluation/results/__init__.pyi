@@ -23,6 +23,7 @@ from .shortened_lifts import short_lifts as short_lifts
 from .status import (
     Status as Status,
     Watch as Watch,
+    read_status as read_status,
 )
 from .summary import summarize as summarize
 from .summary_tables import summary_view as summary_view

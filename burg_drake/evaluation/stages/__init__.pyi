@@ -1,5 +1,6 @@
 from .counts import (
     GraspCount as GraspCount,
+    count_grasps as count_grasps,
     grasp_counts as grasp_counts,
 )
 from .judge import (
@@ -14,9 +15,7 @@ from .judge import (
     trial_decision as trial_decision,
     trial_verdict as trial_verdict,
 )
-from .mode import (
-    mode_for as mode_for,
-)
+from .mode import mode_for as mode_for
 from .scene_acceptance import (
     clear_grasp_counts as clear_grasp_counts,
     within_reach as within_reach,

@@ -1,3 +1,4 @@
+from .arm_control import ArmControl as ArmControl
 from .board_visibility import (
     frustum as frustum,
     seen_share as seen_share,
