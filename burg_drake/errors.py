@@ -9,5 +9,5 @@ from burg_drake.core import (
     MissingDependencyError as MissingDependencyError,
     SimulationError as SimulationError,
     UnknownNameError as UnknownNameError,
-    WorkerEnded as WorkerEnded,
+    WorkerDied as WorkerDied,
 )

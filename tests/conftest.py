@@ -128,7 +128,7 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place."""
-    from burg_drake.evaluation.workers.pool import JudgePool
+    from burg_drake.evaluation.workers import JudgePool
 
     with pytest.MonkeyPatch.context() as patch:
         for user in ("executor", "single_job"):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
+from burg_drake.cameras.live import FrameProcessor
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.overlay import Overlay
 from burg_drake.cameras.placement import check_placement
@@ -22,6 +23,7 @@ from burg_drake.cameras.projection import visible_from
 from burg_drake.cameras.sources import open_source
 from burg_drake.cameras.systems.board_loop import build_board_loop
 from burg_drake.cameras.systems.scene_overlay import SceneOverlay
+from burg_drake.compose import ComposeSession
 from burg_drake.core import BurgError
 from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.grasp_sets import read_grasps, scored_set
@@ -44,6 +46,7 @@ from burg_drake.motion.workspace import (
 )
 from burg_drake.objects.library import load_library
 from burg_drake.printout import print_board
+from burg_drake.printout.relief import height_map
 from burg_drake.scene.document import (
     Scene,
     SceneLike,
@@ -52,6 +55,7 @@ from burg_drake.scene.document import (
     load_scene,
     validate_scene,
 )
+from burg_drake.simulation.rest.still_check import stillness
 from burg_drake.simulation.settling import settle_scene
 from burg_drake.simulation.trials import ArmTrial, HandTrial
 from burg_drake.station.checks import SceneCheck, check_scene
@@ -184,6 +188,11 @@ def reached(scene: SceneLike, station: StationLike) -> Any:
     return found.outcome, found.clearance
 
 
+def composed(station: StationLike, folder: Path) -> Any:
+    with ComposeSession.open("tabletop_six", station, folder=folder) as session:
+        return session.station.content, session.view.issues
+
+
 def located(station: StationLike) -> Any:
     return locate_camera(station, [SEEN], INTRINSICS).X_WC.tolist()
 
@@ -201,6 +210,12 @@ ANSWERS: dict[str, Answer] = {
     "check_scene": lambda scene, station, folder: check_scene(scene, station),
     "SceneCheck": lambda scene, station, folder: checked(scene, station),
     "print_board": lambda scene, station, folder: print_board(scene).tiling,
+    "height_map": lambda scene, station, folder: height_map(scene, 0.005).height.tobytes(),
+    "stillness": lambda scene, station, folder: stillness(scene, station, duration=0.01),
+    "FrameProcessor": lambda scene, station, folder: (
+        FrameProcessor(scene, INTRINSICS).scene.content
+    ),
+    "ComposeSession": lambda scene, station, folder: composed(station, folder),
     "build_station_diagram": lambda scene, station, folder: contents(
         build_station_diagram(scene, station)
     ),

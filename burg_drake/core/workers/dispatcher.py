@@ -153,7 +153,9 @@ class Dispatcher:
             for task in tasks:
                 task.future.set_exception(error)
             return
-        worker.give(tasks, tuple(call for _, call in calls))
+        if not worker.give(tasks, tuple(call for _, call in calls)):
+            worker.kill()
+            worker.own.appendleft(worker.forget())
 
     def _hear(self, worker: Worker) -> None:
         assert worker.connection is not None

@@ -76,6 +76,7 @@ class Worker:
         suspect: a task that ended the process before this one, to be tried again alone.
         own: work for this worker alone.
         reason: why the process is about to end, in its words.
+        is_fresh: whether the process was given nothing yet.
     """
 
     number: int
@@ -89,6 +90,7 @@ class Worker:
     suspect: PendingTask | None = None
     own: deque[Batch] = field(default_factory=deque)
     reason: str = ""
+    is_fresh: bool = True
 
     @property
     def busy(self) -> bool:
@@ -109,8 +111,13 @@ class Worker:
         if self.process is None:
             self.process, self.connection = start_worker(MODULE, self.own_group)
 
-    def give(self, batch: Batch, calls: tuple[Call, ...]) -> None:
-        """Sends it tasks; it has to be started and idle."""
+    def give(self, batch: Batch, calls: tuple[Call, ...]) -> bool:
+        """Sends it tasks; it has to be started and idle.
+
+        Returns:
+            False if the process has died while it was idle: the tasks are not to blame.
+        """
+        assert self.connection is not None
         session, opening = batch[0].task.session, None
         if session is not None:
             if session.key in self.sessions:
@@ -118,7 +125,13 @@ class Worker:
             else:
                 self.opening, opening = session, self._opening(session)
         self.tasks = batch
-        self.send(Calls(calls, opening))
+        try:
+            self.connection.send(Calls(calls, opening))
+        except OSError:
+            return self.is_fresh  # if it is, its pipe's end tells the pool
+        finally:
+            self.is_fresh = False
+        return True
 
     def _opening(self, session: Session) -> OpenSession:
         drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - self.kept)]
@@ -160,7 +173,7 @@ class Worker:
         self.connection.close()
         self.process = self.connection = self.opening = None
         self.sessions.clear()
-        self.reason = ""
+        self.reason, self.is_fresh = "", True
         tasks, self.tasks = self.tasks, deque()
         return tasks
 
