@@ -79,7 +79,7 @@ def require_table(path: Path) -> None:
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
-    Beside a CSV file what its columns are goes to a file, see `core.csv_web`.
+    Beside a CSV file what its columns are goes to a file, see `core.grasps.csv_metadata_file`.
 
     Args:
         path: the file.

@@ -15,9 +15,7 @@ from .judge import (
     trial_decision as trial_decision,
     trial_verdict as trial_verdict,
 )
-from .mode import (
-    mode_for as mode_for,
-)
+from .mode import mode_for as mode_for
 from .scene_acceptance import (
     clear_grasp_counts as clear_grasp_counts,
     within_reach as within_reach,
