@@ -33,7 +33,7 @@ from burg_drake.core import quaternion_from_rotation
 from burg_drake.core.grasps import (
     COST,
     DECIDED,
-    GIVEN,
+    GIVEN as GIVEN,
     MEASURED,
     POSTURE,
     VERDICT_FIELDS,
