@@ -119,8 +119,10 @@ from .station.checks.scene_issues import (
     check_scene as check_scene,
 )
 from .station.diagram.builder import (
-    StationDiagram as StationDiagram,
     build_station_diagram as build_station_diagram,
+)
+from .station.diagram.station_diagram import (
+    StationDiagram as StationDiagram,
 )
 from .station.document.engine import (
     ENGINES as ENGINES,
