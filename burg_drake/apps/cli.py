@@ -29,6 +29,12 @@ from burg_drake.core import BurgError, shown
 INPUT_ERROR = 2
 INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
+OPTIONS_OF = {
+    "X_SF": ("camera_pose",),
+    "objects": ("grasps_object", "rename"),
+    "moved": ("run",),
+}
+"""What the parsed arguments call those of the library that have another name there."""
 LONGEST_WORD = 300
 """Of a message, paths included; what is longer was not written by people."""
 
@@ -97,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BurgError as error:
         if os.environ.get(DEBUG_VARIABLE):
             raise
-        return _end(f"error: {error}", INPUT_ERROR)
+        return _end(f"error: {error}{_options(error, arguments)}", INPUT_ERROR)
     except MemoryError as error:
         if os.environ.get(DEBUG_VARIABLE):
             raise
@@ -128,6 +134,13 @@ def _run(arguments: argparse.Namespace) -> int:
                 raise behind from None
             behind = behind.__cause__ or behind.__context__
         raise
+
+
+def _options(error: BurgError, arguments: argparse.Namespace) -> str:
+    """The verb's options of the arguments that an error is about, in brackets."""
+    names = (OPTIONS_OF.get(name, (name,)) for name in error.arguments)
+    flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
+    return f" ({', '.join(flags)})" if flags else ""
 
 
 def _end(message: str, code: int) -> int:

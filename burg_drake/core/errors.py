@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import reprlib
 from collections.abc import Iterable, Sequence
+from typing import Self
 
 MANY = 24
 FEW = 9
@@ -19,7 +20,19 @@ SHOWN = 60
 
 
 class BurgError(Exception):
-    """Base of all errors that burg_drake raises on purpose; the message is one clear line."""
+    """Base of all errors that burg_drake raises on purpose; the message is one clear line.
+
+    Attributes:
+        arguments: names of the arguments that it takes another value of, where the caller may know
+            them by other names: the command line adds its options.
+    """
+
+    arguments: tuple[str, ...] = ()
+
+    def about(self, *arguments: str) -> Self:
+        """The same error, which another value of these arguments mends."""
+        self.arguments = arguments
+        return self
 
 
 class InvalidInputError(BurgError, ValueError):

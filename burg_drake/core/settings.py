@@ -64,6 +64,11 @@ class Setting:
     high: float | None = None
     noun: str = "number"
 
+    def option(self, field: str) -> str:
+        """The long option of a field that has this to say, such as `--lift-mm`."""
+        unit = "" if self.unit is None else f"_{self.unit.name}"
+        return f"--{(self.name or field + unit).replace('_', '-')}"
+
 
 def setting(default: Any = MISSING, help: str = "", **more: Any) -> Any:
     """A field of a settings dataclass, as `dataclasses.field`.

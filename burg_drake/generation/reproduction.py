@@ -52,8 +52,8 @@ def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
     if differences and not force:
         raise InvalidInputError(
             f"{scene.path} was made with other things ({'; '.join(differences)}), and may come out"
-            " another way; --force tries"
-        )
+            " another way; it has to be forced"
+        ).about("force")
     sampler = SceneSampler(origin.recipe, scene.library, station)
     sampled = sampler.sample(origin.number, scene.path.parent)
     if not sampled.accepted:

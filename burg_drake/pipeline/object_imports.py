@@ -50,7 +50,7 @@ def burg_sources(
     """
     names = burg_names(library)
     given = _by_identifier(masses or {}, names, "a mass")
-    left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "--skip")
+    left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "skip")
     objects = [o for o in library.objects if o.identifier not in left_out]
     sources = []
     for item in objects:

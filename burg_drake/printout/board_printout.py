@@ -171,8 +171,8 @@ def _spread(
 
     margin = next((m for m in MARGINS if m < settings.margin and on_one(margin=m)), None)
     page = next((name for name in PAPERS if on_one(page=name)), None)
-    ways = [f"--margin-mm {1e3 * margin:g}"] if margin is not None else []
-    ways += [f"--page {page}"] if page else []
+    ways = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
+    ways += [f"page {page}"] if page else []
     remedy = f"; {' or '.join(ways)} would do with one" if ways else ""
     return [
         f"the board is no larger than the page, but takes {pages} because of the margins, rulers"

@@ -110,7 +110,7 @@ def _remedy(
     for name in PAPERS:
         if any(_tiling(size, layout, needed, p) for p in orientations(name, margin)):
             return f"{name} would do"
-    return "print it on larger paper (--page WxH), or give smaller markers"
+    return "print it on larger paper, of WxH mm, or give smaller markers"
 
 
 def _tiling(

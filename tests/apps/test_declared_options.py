@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import math
+import re
 from dataclasses import dataclass, fields
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+import burg_drake
+from burg_drake.apps.cli import main
 from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.declared import add_options, settings_from
 from burg_drake.core.settings import DEGREES, KEY, MILLIMETRES, PERCENT, THOUSANDTHS, setting
@@ -96,3 +102,33 @@ def test_defaults_survive_the_way_through_their_units(settings: type) -> None:
 
 def test_units_that_files_tell_apart() -> None:
     assert MILLIMETRES.to_si(9.0) == 0.009000000000000001 and THOUSANDTHS.to_si(9.0) == 0.009
+
+
+INTERFACES = ("apps", "ros")
+COMMANDS = ("burg-drake", "evaluate --grasps", "local-directory")
+"""In texts that are to be typed, of our programs and those of others."""
+
+
+def test_errors_of_the_library_do_not_name_options() -> None:
+    """The command line adds them to an error that says which argument it is about."""
+    root = Path(burg_drake.__file__).parent
+    for path in root.rglob("*.py"):
+        if path.relative_to(root).parts[0] in INTERFACES:
+            continue
+        for raised in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if not isinstance(raised, ast.Raise):
+                continue
+            parts = [p.value for p in ast.walk(raised) if isinstance(p, ast.Constant)]
+            text = " ".join(part for part in parts if isinstance(part, str))
+            typed = any(command in text for command in COMMANDS)
+            assert typed or not re.search(r"(^|[ (])--[a-z]", text), path
+
+
+def test_the_command_line_adds_the_option_of_an_argument(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    poses = tmp_path / "network.npy"
+    np.save(poses, np.eye(4)[None])
+    words = ["reach", "tabletop_six", "--grasps", str(poses), "--grasps-frame", "camera"]
+    assert main(words) == 2
+    assert capsys.readouterr().err.endswith("give the camera's pose in the scene (--camera-pose)\n")

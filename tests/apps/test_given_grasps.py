@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 import h5py
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
+from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.runs import campaign, evaluate
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
@@ -71,7 +71,7 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
         file["grasps/transforms"] = X_OG @ make_pose(p_AB=(0.0, 0.0, -0.1034))
         file["grasps/qualities/flex/object_in_gripper"] = np.array([0, 1])
     assert main(["evaluate", "tabletop_six", "--grasps", str(path)]) == 2
-    assert "say which one it is (--grasps-object 3f2a=NAME)" in capsys.readouterr().err
+    assert "say which one it is, 3f2a=NAME" in capsys.readouterr().err
     millimetres = tmp_path / "millimetres.h5"
     with h5py.File(path) as file, h5py.File(millimetres, "w") as other:
         X_OB = file["grasps/transforms"][()]
@@ -103,7 +103,7 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
 def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
     path = tmp_path / "grasps.npz"
     GraspSet.create(X_OG, object="box").save(path)
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     evaluate.add_to(parser.add_subparsers())
     station = load_station("panda_tabletop")
     scene = load_scene("tabletop_six")

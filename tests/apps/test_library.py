@@ -85,7 +85,7 @@ def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
     assert build(tmp_path / "block.stl", "-o", tmp_path / "library") == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "try --unit mm (scale=0.001 makes it 60 mm)" in line
+    assert "try unit mm (scale=0.001 makes it 60 mm)" in line
     assert not (tmp_path / "library").exists()
 
 

@@ -153,7 +153,11 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
     assert replay(row_file) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"row 1 needs the scene with content {content}" in line
-    assert "/nowhere/stack.yaml does not exist" in line and "give --scene FILE" in line
+    assert (
+        "/nowhere/stack.yaml does not exist" in line
+        and "give its file" in line
+        and "(--scene" in line
+    )
     assert replay(row_file, "--scene", str(run.path / "scene.yaml")) == 0
     assert "as recorded" in capsys.readouterr().out
 

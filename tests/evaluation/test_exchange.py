@@ -82,12 +82,14 @@ def test_the_same_frame_needs_no_scene(grasps: GraspSet, file: Path) -> None:
 
 
 def test_what_is_missing_is_named(scene: Scene, file: Path, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"in the frame of their object.*a scene.*--scene"):
+    with pytest.raises(
+        InvalidInputError, match=r"in the frame of their object.*a scene.*the scene"
+    ):
         read_in_frame(file, "world")
-    with pytest.raises(InvalidInputError, match=r"wanted in a camera.*--camera-pose"):
+    with pytest.raises(InvalidInputError, match=r"wanted in a camera.*its pose"):
         read_in_frame(file, "camera", scene=scene)
     write_grasp_file(GraspSet.load(file), tmp_path / "a.csv")
-    with pytest.raises(InvalidInputError, match=r"in a scene.*a camera.*--camera-pose"):
+    with pytest.raises(InvalidInputError, match=r"in a scene.*a camera.*pose"):
         read_in_frame(tmp_path / "a.csv", "camera")
     with pytest.raises(UnknownNameError, match=r"object 'cuve'; did you mean 'cube'"):
         read_in_frame(file, "object", objects={"cuve": "dice"})

@@ -54,9 +54,9 @@ def test_a_lost_scene_is_asked_for_by_its_content(run: Run, scene: Scene, tmp_pa
         find_inputs(origin, "a.csv, row 1", tmp_path)
     message = str(caught.value)
     assert message.startswith(f"a.csv, row 1 needs the scene with content {content[:12]}")
-    assert f"but {scene.path} does not exist; give --scene" in message
-    assert f"give --scene FILE (a copy is scene.yaml in the folder of run {origin.run})" in message
-    assert "--force" not in message  # there is nothing to replay on
+    assert f"but {scene.path} does not exist; give its file" in message
+    assert f"give its file (a copy is scene.yaml in the folder of run {origin.run})" in message
+    assert "by force" not in message  # there is nothing to replay on
     assert find_inputs(origin, "row 1", tmp_path, scene=str(moved)).scene.content == content
 
 
@@ -65,15 +65,15 @@ def test_a_lost_station_is_said_with_the_scene(run: Run, scene: Scene, tmp_path:
     with pytest.raises(InvalidInputError) as caught:
         find_inputs(origin_of(run.document), "row 1", tmp_path, station="gone.yaml")
     first, second = str(caught.value).split("; and ")
-    assert first.startswith("row 1 needs the scene") and "--scene FILE" in first
-    assert second.startswith("the station with content") and "--station FILE" in second
+    assert first.startswith("row 1 needs the scene") and "give its file" in first
+    assert second.startswith("the station with content") and "give its file" in second
     assert "but gone.yaml does not exist; give" in second
 
 
 def test_a_changed_scene_is_taken_by_force_only(run: Run, scene: Scene, tmp_path: Path) -> None:
     spoil(scene.path)
     origin = origin_of(run.document)
-    with pytest.raises(InvalidInputError, match=f"or --force to replay on {scene.path}"):
+    with pytest.raises(InvalidInputError, match=f"or replay on {scene.path} by force"):
         find_inputs(origin, "row 1", tmp_path)
     found = find_inputs(origin, "row 1", tmp_path, force=True)
     assert found.scene.content != scene.content

@@ -119,7 +119,7 @@ def test_what_is_not_the_same_is_refused(
         run_all(scenes[:2], station, out)
     with pytest.raises(InvalidInputError, match=r"\(seed is 0 there, 1 here\)"):
         run_all(scenes, station, out, seed=1)
-    with pytest.raises(InvalidInputError, match="holds all of this run, and --shard 1/2 is given"):
+    with pytest.raises(InvalidInputError, match="holds all of this run, and shard 1/2 is given"):
         run_all(scenes, station, out, shard="1/2")
     with pytest.raises(InvalidInputError, match=r"holds no run .* is in it"):
         run_all(scenes, station, tmp_path)

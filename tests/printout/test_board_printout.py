@@ -211,7 +211,7 @@ def test_a_board_that_only_margins_spread_over_pages() -> None:
     assert len(printout.tiling.tiles) > 1
     (said,) = printout.warnings
     assert said.startswith("the board is no larger than the page, but takes 2 because of the mar")
-    margin, page = re.findall(r"--margin-mm (\S+) or --page (\S+) would do", said)[0]
+    margin, page = re.findall(r"a margin of (\S+) mm or page (\S+) would do", said)[0]
     for changes in ({"margin": float(margin) * 1e-3}, {"page": page}):
         again = print_board(scene, dataclasses.replace(bare, **changes))
         assert len(again.tiling.tiles) == 1 and again.warnings == ()

@@ -91,7 +91,7 @@ def test_mistakes() -> None:
         tile_board(A2, large, corners(large), orientations("A4", 5e-3))
     size = (2.0, 2.0)
     huge = marker_layout(size, Markers(side=1.8))
-    with pytest.raises(InvalidInputError, match=r"larger paper .--page WxH., or give smaller"):
+    with pytest.raises(InvalidInputError, match=r"larger paper, of WxH mm, or give smaller"):
         tile_board(size, huge, corners(huge), orientations("A4", 5e-3))
     size = (4.4, 3.2)
     wide = marker_layout(size, Markers(spacing=0.2))

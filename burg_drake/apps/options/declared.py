@@ -18,15 +18,9 @@ from burg_drake.core import Setting, declared, shown
 Settings = TypeVar("Settings")
 
 
-def option_name(name: str, declaration: Setting) -> str:
-    """The long option of a field, such as `--lift-mm`."""
-    unit = "" if declaration.unit is None else f"_{declaration.unit.name}"
-    return f"--{(declaration.name or name + unit).replace('_', '-')}"
-
-
 def destination(settings: type, name: str) -> str:
     """What the parsed arguments call a field."""
-    return option_name(name, declared(settings)[name][1])[2:].replace("-", "_")
+    return declared(settings)[name][1].option(name)[2:].replace("-", "_")
 
 
 def add_options(
@@ -54,7 +48,7 @@ def add_options(
             if default is not None and "(default" not in declaration.help:
                 text = f"{default:g}" if isinstance(default, float) else default
                 options["help"] = f"{declaration.help} (default: {text})"
-        option = option_name(name, declaration)
+        option = declaration.option(name)
         parser.add_argument(*declaration.flags, option, **options)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.options.declared import add_options, given_fields, option_name
+from burg_drake.apps.options.declared import add_options, given_fields
 from burg_drake.core import FieldError, InvalidInputError
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def motion_option(field: str) -> str:
     from burg_drake.core import declared
     from burg_drake.station.document import GraspMotion
 
-    return option_name(field, declared(GraspMotion)[field][1])
+    return declared(GraspMotion)[field][1].option(field)
 
 
 def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:

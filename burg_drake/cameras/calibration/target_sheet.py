@@ -53,7 +53,7 @@ def write_target(
     if paper is None:
         raise InvalidInputError(
             "a target of {} x {} squares of {:g} mm is {:.0f} x {:.0f} mm large and does not fit on"
-            " page {}, which has room for {:.0f} x {:.0f} mm; take a larger --page or smaller"
+            " page {}, which has room for {:.0f} x {:.0f} mm; take a larger page or smaller"
             " squares".format(
                 *target.squares,
                 1e3 * target.square,

@@ -204,7 +204,7 @@ def _of_opencv(data: Tree, name: str) -> Intrinsics:
             f"{name}: fisheye_model and avg_reprojection_error have to be numbers"
         ) from error
     if is_fisheye:
-        raise InvalidInputError(f"{name}: the fisheye model is not supported; use --model rational")
+        raise InvalidInputError(f"{name}: the fisheye model is not supported; the rational one is")
     key = ROS_DISTORTION[0]
     coefficients = _numbers(data, (key,), name) if key in data else []
     if not any(coefficients[5:]):

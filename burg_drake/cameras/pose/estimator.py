@@ -279,8 +279,8 @@ def _differ(one: RefinedPose, other: RefinedPose) -> bool:
 def _scale_warning(scale: float) -> str:
     """What is wrong with a print of another size: distances by it are false by as much."""
     return (
-        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give what its"
-        " rulers measure with --measured-mm"
+        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or say what its"
+        " rulers measure"
     )
 
 
@@ -288,8 +288,8 @@ def _warnings(error: float, stretch: float) -> str:
     """What is doubtful about a pose; empty if all is well."""
     if stretch:
         return (
-            f"the board is printed {1.0 + stretch:.3f} times as long along y as along x: measure it"
-            " and print with --measured-mm, or check the intrinsics"
+            f"the board is printed {1.0 + stretch:.3f} times as long along y as along x: measure"
+            " its rulers and print it anew with what they measure, or check the intrinsics"
         )
     if error > DOUBTFUL_RESIDUAL:
         return (

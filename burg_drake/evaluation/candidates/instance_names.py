@@ -49,8 +49,8 @@ class InstanceNames:
         if "" in self.given and len(foreign) > 1:
             raise InvalidInputError(
                 f"{self.path} has grasps of {len(foreign)} objects ({listing(names)}); say which"
-                " is which (--grasps-object THEIRS=OURS)"
-            )
+                " is which, THEIRS=OURS"
+            ).about("objects")
 
     def of_object(self, foreign: str) -> list[str]:
         """The free instances that grasps of an object of the file are for.
@@ -64,17 +64,17 @@ class InstanceNames:
             return self.called(meant)
         known = {instance.object for instance in self.scene.instances.values()}
         if not foreign:
-            how = "--grasps-object" if self.is_file else "GraspSet.create(..., object=NAME)"
+            how = "" if self.is_file else " (GraspSet.create(..., object=NAME))"
             raise InvalidInputError(
-                f"{self.path} does not say which object its grasps are of; name it"
-                f" ({how}); scene {self.scene.name!r} has {listing(sorted(known))}"
-            )
+                f"{self.path} does not say which object its grasps are of; name"
+                f" it{how}; scene {self.scene.name!r} has {listing(sorted(known))}"
+            ).about("objects")
         if foreign not in known:
-            how = f"say which one it is (--grasps-object {foreign}=NAME); " if self.is_file else ""
+            how = f"say which one it is, {foreign}=NAME; " if self.is_file else ""
             raise UnknownNameError(
                 f"{self.path} has grasps of object {foreign!r}, which is not in scene"
                 f" {self.scene.name!r}; {how}{nearest(foreign, known)}"
-            )
+            ).about("objects")
         return self.called(foreign)
 
     def called(self, name: str) -> list[str]:

@@ -100,8 +100,7 @@ def read_grasps(
     if frame == "camera" and X_SF is None:
         raise InvalidInputError(
             f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
-            " (--camera-pose)"
-        )
+        ).about("X_SF")
     X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
     owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
     placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
@@ -146,16 +145,15 @@ def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
     """The grasps of one scene of the file."""
     if SCENE_ID not in grasps.columns:
         if scene_id is not None:
-            raise NoSceneIdsError(f"{path} has no scene ids; leave out --scene-id")
+            raise NoSceneIdsError(f"{path} has no scene ids to choose by").about("scene_id")
         return grasps
     ids = grasps.columns[SCENE_ID].astype(str)
     known = sorted(set(ids.tolist()))
     if scene_id is None:
         if len(known) > 1:
             raise InvalidInputError(
-                f"{path} has grasps of {len(known)} scenes; choose one of them (--scene-id):"
-                f" {listing(known)}"
-            )
+                f"{path} has grasps of {len(known)} scenes; choose one of them: {listing(known)}"
+            ).about("scene_id")
         return grasps
     if scene_id not in known:
         raise UnknownNameError(f"{path} has no scene {scene_id!r}; {nearest(scene_id, known)}")
@@ -213,8 +211,8 @@ def _owners(
         raise InvalidInputError(
             f"none of the {missed} grasps of {names.path} has an object of scene"
             f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
-            " of the camera or workspace (--camera-pose)?"
-        )
+            " of the camera or workspace?"
+        ).about("X_SF")
     return owner.astype(str), (
         f"{missed} of {len(X_SG)} grasps have no object between their fingers; they are given to"
         " the one with the nearest surface.",
@@ -229,14 +227,14 @@ def _told(
     if not object_ids:
         return told
     if OBJECT_ID not in grasps.columns:
-        raise InvalidInputError(f"{names.path} has no object ids; leave out --object-ids")
+        raise InvalidInputError(f"{names.path} has no object ids to name").about("object_ids")
     ids = grasps.columns[OBJECT_ID]
     unknown = sorted(set(ids.tolist()) - {*object_ids, NO_OBJECT})
     if unknown:
         raise InvalidInputError(
-            f"{names.path} has grasps of object id {unknown[0]}, which --object-ids does not name;"
-            f" it has {', '.join(f'{number}={name}' for number, name in object_ids.items())}"
-        )
+            f"{names.path} has grasps of object id {unknown[0]}, for which no instance is named;"
+            f" named are {', '.join(f'{number}={name}' for number, name in object_ids.items())}"
+        ).about("object_ids")
     for number, name in object_ids.items():
         instance, *others = names.called(name)
         if others:

@@ -58,17 +58,17 @@ def read_in_frame(
         if X_SF is None:
             raise InvalidInputError(
                 f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
-                f" {IN_WORDS[wanted]}; give the camera's pose in the scene (--camera-pose)"
-            )
+                f" {IN_WORDS[wanted]}; give the camera's pose in the scene"
+            ).about("X_SF")
         grasps = _moved(imported.grasps, X_SF if given == "camera" else inverse(X_SF))
         return ImportedGrasps(grasps, wanted, imported.notes)
     if scene is None:
         raise InvalidInputError(
             f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
-            f" {IN_WORDS[wanted]}; give the scene in which the objects stand (--scene)"
-        )
+            f" {IN_WORDS[wanted]}; give the scene in which the objects stand"
+        ).about("scene")
     if wanted == "camera" and X_SF is None:
-        raise InvalidInputError("grasps are wanted in a camera; give its pose (--camera-pose)")
+        raise InvalidInputError("grasps are wanted in a camera; give its pose").about("X_SF")
     placed = read_grasps(
         scene,
         path,

@@ -36,5 +36,4 @@ def require_near(
             raise InvalidInputError(
                 f"{source}: the nearest grasp of object {name!r} is {nearest:.3g} m away from it;"
                 " lengths have to be metres, and if the grasps are of another object, say which"
-                + (" (--grasps-object)" if is_file else "")
-            )
+            ).about("objects")

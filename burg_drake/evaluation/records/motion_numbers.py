@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
+from burg_drake.core import declared
 from burg_drake.station.document import GraspMotion
 
 DIRECTION = "lift_direction"
 NUMBERED = tuple(f"{DIRECTION}_{k}" for k in (1, 2, 3))
 """Its numbers in a record."""
-OPTIONS = {
-    "standoff": "--standoff-mm",
-    "retreat": "--retreat-mm",
-    "lift_height": "--lift-mm",
-    "least_lift": "--least-lift-mm",
-    DIRECTION: "--lift-direction",
-}
-"""Of `burg-drake reach` and `evaluate`, by field."""
 
 
 def gathered(values: Mapping[str, object]) -> dict[str, object]:
@@ -65,7 +58,8 @@ def motion_text(motion: GraspMotion) -> str:
 def motion_options(motion: GraspMotion, usual: GraspMotion) -> list[str]:
     """Words of a command line that ask for a motion where a station's usual one is another."""
     words: list[str] = []
-    for name, option in OPTIONS.items():
+    for name, (_, declaration) in declared(GraspMotion).items():
+        option = declaration.option(name)
         value = getattr(motion, name)
         if value == getattr(usual, name):
             continue

@@ -258,7 +258,7 @@ def require_same_shard(folder: Path, there: str, here: str) -> None:
     """
     if there != here:
         held = f"shard {there} of this run" if there else "all of this run"
-        asked = f"--shard {here}" if here else "no --shard"
+        asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
             f"{folder} holds {held}, and {asked} is given; choose another -o, and burg-drake merge"
             " unites shards"

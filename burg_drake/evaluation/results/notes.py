@@ -89,13 +89,13 @@ def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
     """Another motion of the hand that may avoid an outcome; "" if there is none."""
     ways = []
     if outcome in NO_LIFT and motion.least >= motion.lift_height:
-        ways.append("a shorter lift (--least-lift-mm)")
+        ways.append("a shorter lift (least_lift)")
     elif outcome in NO_LIFT and motion.least > 0.0:
-        ways.append("a smaller --least-lift-mm")
+        ways.append("a smaller least_lift")
     if outcome in NO_LIFT and not motion.retreat:
-        ways.append("a retreat first (--retreat-mm)")
+        ways.append("a retreat first")
     if outcome in NO_RETREAT:
-        ways.append("a shorter retreat (--retreat-mm)")
+        ways.append("a shorter retreat")
     return " or ".join(ways)
 
 

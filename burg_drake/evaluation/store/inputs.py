@@ -69,7 +69,11 @@ def find_inputs(
     second = search.find("station", origin.station_content, stations)
     missing = [found for found in (first, second) if isinstance(found, str)]
     if isinstance(first, str) or isinstance(second, str):
-        raise InvalidInputError(f"{where} needs {'; and '.join(missing)}")
+        found = {"scene": first, "station": second}
+        kinds = [kind for kind, missed in found.items() if isinstance(missed, str)]
+        raise InvalidInputError(f"{where} needs {'; and '.join(missing)}").about(
+            *kinds, *(["force"] if any("by force" in text for text in missing) else [])
+        )
     return Inputs(first[0], second[0], tuple(note for _, note in (first, second) if note))
 
 
@@ -108,8 +112,8 @@ class _InputSearch:
             return other, f"the {kind} is not the one of the trial (content {content}): {found}"
         meant = "objects and their library count" if kind == "scene" else "robot models count"
         copy = f"a copy is {kind}.yaml in the folder of run {self.origin.run}"
-        go_on = f", or --force to replay on {other.path}" if other is not None else ""
+        go_on = f", or replay on {other.path} by force" if other is not None else ""
         return (
-            f"the {kind} with content {content} ({meant}), but {found}; give --{kind} FILE"
+            f"the {kind} with content {content} ({meant}), but {found}; give its file"
             f" ({copy}){go_on}"
         )

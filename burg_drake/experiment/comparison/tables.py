@@ -105,7 +105,7 @@ def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTab
             number(a.recall, percent=True),
         )
     if len(groups) > MOST_ROWS:
-        table.caption = f"the first {MOST_ROWS} of {len(groups)}; --json has all"
+        table.caption = f"the first {MOST_ROWS} of {len(groups)}; the JSON has all"
     return table
 
 
@@ -122,7 +122,7 @@ def stopped_table(judged: Judgement, name: str = "") -> TextTable:
             interval(row.successes, percent=True) or "-",
         )
     if len(judged.stopped) > MOST_ROWS:
-        table.caption = f"the first {MOST_ROWS} of {len(judged.stopped)}; --json has all"
+        table.caption = f"the first {MOST_ROWS} of {len(judged.stopped)}; the JSON has all"
     return table
 
 

@@ -195,9 +195,8 @@ class TrialBook:
                 told = f" {quoted(str(present))}" if isinstance(present, str) else ""
                 raise InvalidInputError(
                     f"{self.path}: trial {trial.number} has {name}{told} already; say that this"
-                    " corrects it (--correct), or that the trial was carried out once more"
-                    " (--again)"
-                )
+                    " corrects it, or that the trial was carried out once more"
+                ).about("correct", "again")
 
     def _change(
         self, number: int | Literal["next"], change: Callable[[RealTrial], RealTrial], how: How

@@ -155,8 +155,8 @@ def _factory(
     if station.document.arm is None:
         raise InvalidInputError(
             f"station {station.name!r} of {run.path} has no arm, of which one could have motions;"
-            " give another one by --station"
-        )
+            " give another one"
+        ).about("station")
     require_usable_arm(scene, station)
     stems: dict[str, str] = {}
     for trial in trials:

@@ -113,8 +113,8 @@ def _load(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
     if not folder.is_dir():
         raise InvalidInputError(
             f"{path}: run {key!r} is not in {folder}; write its folder into runs.{key}.path, or"
-            f" give --run {key}=FOLDER"
-        )
+            f" say in which folder it is now"
+        ).about("moved")
     there = load_runs(folder)
     for run in there:
         if run.document.hash == source.hash:
@@ -122,9 +122,9 @@ def _load(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
     what = f"run {there[0].document.hash}" if len(there) == 1 else f"{len(there)} other runs"
     raise InvalidInputError(
         f"{path}: run {key!r} is {source.hash}, of scene {source.scene.name!r}, but {folder} holds"
-        f" {what}, of scene {there[0].document.scene.name!r}; give --run {key}=FOLDER with the one"
+        f" {what}, of scene {there[0].document.scene.name!r}; give the one"
         " that the trials were planned with, or plan them anew"
-    )
+    ).about("moved")
 
 
 def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:

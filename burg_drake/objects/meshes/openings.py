@@ -86,7 +86,7 @@ def _thicken(
     result.mesh, said = united(trimesh.util.concatenate(parts))
     result.sentences += [
         f"made the open surface ({opening}) a wall {1e3 * thickness:.3g} mm thick; wall_thickness"
-        " (--wall-thickness) sets it, openings='close' (--openings close) caps it instead",
+        " sets it, openings='close' caps it instead",
         *said,
     ]
     return True
@@ -104,7 +104,7 @@ def _close(result: Repaired, count: int, opening: str) -> bool:
     result.mesh = capped
     result.sentences.append(
         f"closed {count} openings with flat caps ({opening}); openings='wall'"
-        " (--openings wall) makes a wall of the surface instead"
+        " makes a wall of the surface instead"
     )
     return True
 

@@ -212,7 +212,7 @@ def _check_hull(surface: trimesh.Trimesh, name: str) -> None:
     # the few points farthest out tell most often, and at once
     if _hull_volume(_extremes(points)) <= limit and _hull_volume(points) <= limit:
         size = " x ".join(f"{1000 * e:.3g}" for e in extent)
-        cure = "wall_thickness (--wall-thickness) makes a wall of it"
+        cure = "wall_thickness makes a wall of it"
         if is_closed(surface):
             cure = "give one of its two sides as an open surface, with wall_thickness"
         raise MeshError(f"{name}: the mesh is flat ({size} mm); an object needs a volume: {cure}")

@@ -65,8 +65,8 @@ def _hint(extent: float) -> str:
         fits = fits or {u: s for u, s in UNITS.items() if low <= s * extent <= high}
     if not fits:
         scale = 10.0 ** (-1.0 - np.ceil(np.log10(extent)))  # 10 to 100 mm
-        return f"try scale={scale:g} (--scale {scale:g})"
+        return f"try scale={scale:g}"
     return "try " + " or ".join(
-        f"--unit {unit} (scale={scale:g} makes it {length(scale * extent)})"
+        f"unit {unit} (scale={scale:g} makes it {length(scale * extent)})"
         for unit, scale in fits.items()
     )
