@@ -6,11 +6,10 @@ import argparse
 import signal
 from typing import Any, NoReturn
 
-from burg_drake.apps.options import add_scene, add_verb, measured_mm
+from burg_drake.apps.options import add_measured_board, add_scene, add_verb, print_scale
 
 # Kept in step with ros.link, which imports too much for a help text; a test compares them.
 PARENTS = ("camera", "board", "none")
-RULER = 100.0
 DEFAULT_IMAGE = "/camera/image_raw"
 DEFAULT_NODE = "burg_board"
 DEFAULT_FRAME = "board"
@@ -47,13 +46,7 @@ def add_to(verbs: Any) -> None:
         action="store_true",
         help="the images are rectified (image_rect): no lens distortion",
     )
-    parser.add_argument(
-        "--measured-mm",
-        metavar="X[,Y]",
-        type=measured_mm,
-        default=(RULER, RULER),
-        help="what the printed board's rulers of 100 mm measure, along x and along y",
-    )
+    add_measured_board(parser)
     parser.add_argument(
         "--frame",
         metavar="NAME",
@@ -99,12 +92,11 @@ def run(arguments: argparse.Namespace) -> int:
     intrinsics = load_intrinsics(arguments.intrinsics) if arguments.intrinsics else None
     scene = load_scene(arguments.scene)
     scene.require_markers()
-    x, y = arguments.measured_mm
     node = BoardNode(
         scene,
         intrinsics=intrinsics,
         rectified=arguments.rectified,
-        print_scale=(x / RULER, y / RULER),
+        print_scale=print_scale(arguments),
     )
     signal.signal(signal.SIGTERM, _interrupt)
     link = connect(version, names, with_camera_info=intrinsics is None)

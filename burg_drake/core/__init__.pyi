@@ -57,6 +57,7 @@ from .statistics import (
     clustered_interval as clustered_interval,
     wilson_interval as wilson_interval,
 )
+from .versions import software_versions as software_versions
 from .web_access import (
     HEADERS as HEADERS,
     LOCALHOST as LOCALHOST,

@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from burg_drake.core import (
+    software_versions,
+)
 from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
@@ -15,7 +18,11 @@ from burg_drake.core.grasps import (
     Stage,
     Verdict,
 )
-from burg_drake.evaluation.records import RecordedTrial, TrialOrigin, motion_text, software_versions
+from burg_drake.evaluation.records import (
+    RecordedTrial,
+    TrialOrigin,
+    motion_text,
+)
 from burg_drake.evaluation.stages import build_judge, judge_grasp, mode_for
 from burg_drake.motion.plans import Plan
 from burg_drake.scene.document import Scene

@@ -13,8 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core import content_hash, rng_from
-from burg_drake.evaluation.records import HASH_DIGITS, software_versions
+from burg_drake.core import (
+    content_hash,
+    rng_from,
+    software_versions,
+)
+from burg_drake.evaluation.records import (
+    HASH_DIGITS,
+)
 from burg_drake.generation.heap import pile
 from burg_drake.generation.rules import broken_rule, require_rules
 from burg_drake.objects.library import ObjectLibrary, load_library

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import subprocess
@@ -15,6 +14,7 @@ import pytest
 
 from burg_drake.apps.ar import verb
 from burg_drake.apps.cli import main
+from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.terminal.interrupts import terminated_as_interrupted
 from burg_drake.cameras.live.actions import ViewActions
 from burg_drake.cameras.live.event_log import EventLog
@@ -196,7 +196,7 @@ def test_the_end_waits_for_a_placement_check(tmp_path: Path) -> None:
     live = LiveSession(session, Camera(photo()), events=EventLog())
     actions = ViewActions(live, tmp_path)
     live.on_frame(lambda picture: actions.start_check())
-    parser = argparse.ArgumentParser()
+    parser = Parser()
     verb.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["ar", "two", "--no-browser", "--frames", "1"])
     assert verb._run(arguments, live, actions) == 0

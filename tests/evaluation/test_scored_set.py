@@ -10,8 +10,10 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.versions import (
+    software_versions,
+)
 from burg_drake.evaluation.grasp_sets.scored import SCENE_COLUMNS, scored_set
-from burg_drake.evaluation.records.run_document import software_versions
 from burg_drake.geometry.surface import Surface
 from burg_drake.grasping.clearance.verdict import CLEARANCE_VERSION
 from burg_drake.grasping.quality.jaws import PANDA_JAWS

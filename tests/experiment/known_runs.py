@@ -13,6 +13,9 @@ from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasps import Mode, Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.versions import (
+    software_versions,
+)
 from burg_drake.evaluation.candidates.candidates import Candidates
 from burg_drake.evaluation.records.journal import Journal
 from burg_drake.evaluation.records.run_document import (
@@ -21,7 +24,6 @@ from burg_drake.evaluation.records.run_document import (
     RunDocument,
     input_of,
     run_hash,
-    software_versions,
 )
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, create_run, load_run
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene

@@ -9,13 +9,14 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    add_measured_board,
     add_scene,
     add_verb,
-    measured_mm,
     number,
     port,
     positive,
     positive_int,
+    print_scale,
 )
 from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
 from burg_drake.core import InvalidInputError
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 SIMULATED = "sim:"
 IDLE_AFTER = 3.0
 """The camera is not looked at when no browser has asked for a picture for so long [s]."""
-RULER_MM = 100.0
 """Length of the rulers on printouts."""
 
 
@@ -61,13 +61,7 @@ def add_to(verbs: Any) -> None:
         " Simulated cameras know theirs",
     )
     parser.add_argument("--fps", type=positive, metavar="N", help="images a second of the camera")
-    parser.add_argument(
-        "--measured-mm",
-        type=measured_mm,
-        metavar="X[,Y]",
-        default=(RULER_MM, RULER_MM),
-        help="what the printed board's rulers of 100 mm measure, along x and along y",
-    )
+    add_measured_board(parser)
     _add_view(parser)
     _add_results(parser)
 
@@ -218,11 +212,9 @@ def _session(
         style = replace(style, angle_tolerance=math.radians(arguments.tolerance_deg))
     if arguments.opacity is not None:
         settings = replace(settings, opacity=arguments.opacity)
-    x_mm, y_mm = arguments.measured_mm
-    print_scale = (x_mm / RULER_MM, y_mm / RULER_MM)
     always = _is_scripted(arguments) or arguments.check or arguments.snapshot
     live = LiveSession(
-        FrameProcessor(scene, intrinsics, print_scale=print_scale, style=style),
+        FrameProcessor(scene, intrinsics, print_scale=print_scale(arguments), style=style),
         source,
         events=EventLog(_print_event),
         settings=settings,

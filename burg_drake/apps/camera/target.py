@@ -6,7 +6,7 @@ import argparse
 import re
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_verb, measured_mm, positive
+from burg_drake.apps.options import add_measured_board, add_verb, positive
 
 if TYPE_CHECKING:
     from burg_drake.cameras.calibration import CharucoTarget
@@ -26,12 +26,9 @@ def add_to(group: Any) -> None:
     target.add_argument(
         "--page", default="A4", help="A4, A3, letter, ... or WxH in mm (default: %(default)s)"
     )
-    target.add_argument(
-        "--measured-mm",
-        metavar="X[,Y]",
-        type=measured_mm,
-        default=(100.0, 100.0),
-        help="what the rulers of 100 mm of an earlier print measured, for a printer that scales",
+    add_measured_board(
+        target,
+        "what the rulers of 100 mm of an earlier print measured, for a printer that scales",
     )
     add_board(target)
 

@@ -15,6 +15,8 @@ DEFAULT_STATION = "panda_tabletop"
 SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
 
 
+RULER_MM = 100.0
+"""Length of the printed rulers."""
 MOST = 10_000_000
 """What is counted: grasps, trials, rows."""
 MOST_WORKERS = 1024
@@ -129,21 +131,29 @@ def add_scene(parser: Parser) -> None:
     )
 
 
-def add_measured_board(parser: Any) -> None:
-    """The option --measured-mm of verbs that look at a board that was printed already."""
+def add_measured_board(
+    parser: Any,
+    help: str = "what the printed board's rulers of 100 mm measure, along x and along y",
+) -> None:
+    """The option --measured-mm, of verbs that look at a board that was printed already, or print.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+    """
     parser.add_argument(
         "--measured-mm",
         metavar="X[,Y]",
         type=measured_mm,
-        default=(100.0, 100.0),
-        help="what the printed board's rulers of 100 mm measure, along x and along y",
+        default=(RULER_MM, RULER_MM),
+        help=help,
     )
 
 
 def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
     """Size of the print against the document along x and y, by --measured-mm."""
     x, y = arguments.measured_mm
-    return x / 100.0, y / 100.0
+    return x / RULER_MM, y / RULER_MM
 
 
 def add_station(parser: Parser) -> None:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.options import add_scene, add_verb, measured_mm, not_negative
+from burg_drake.apps.options import add_measured_board, add_scene, add_verb, not_negative
 
 
 def add_to(verbs: Any) -> None:
@@ -41,13 +41,10 @@ def add_to(verbs: Any) -> None:
         default=5.0,
         help="what the printer leaves white on all sides (default: %(default)g)",
     )
-    parser.add_argument(
-        "--measured-mm",
-        metavar="X[,Y]",
-        type=measured_mm,
-        default=(100.0, 100.0),
-        help="length of the printed rulers of 100 mm along x and y of the page; all is drawn larger"
-        " by what is missing",
+    add_measured_board(
+        parser,
+        "length of the printed rulers of 100 mm along x and y of the page; all is drawn larger by"
+        " what is missing",
     )
     parser.add_argument("--no-height-map", action="store_true", help="print the markers alone")
     parser.add_argument(

@@ -26,7 +26,7 @@ from burg_drake.cameras.live.recording_files import (
 )
 from burg_drake.cameras.live.recording_table import COLUMNS, table_row
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.placement import CheckedScene, software_versions
+from burg_drake.cameras.placement import CheckedScene, camera_versions
 from burg_drake.cameras.pose import BoardEstimate
 from burg_drake.cameras.sources import quiet
 from burg_drake.core import BurgError, InvalidInputError
@@ -64,7 +64,7 @@ class RecordingDocument:
     poses: str
     frames_per_second: float
     intrinsics: Intrinsics
-    versions: dict[str, str] = field(default_factory=software_versions)
+    versions: dict[str, str] = field(default_factory=camera_versions)
 
 
 class Recording:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.placement import CheckedScene, PlacementCheck, software_versions
+from burg_drake.cameras.placement import CheckedScene, PlacementCheck, camera_versions
 from burg_drake.cameras.pose import BoardEstimate
 from burg_drake.core import Array, DocumentError, InvalidInputError
 from burg_drake.core.documents import Pose, load_document, save_document
@@ -215,7 +215,7 @@ def describe_snapshot(
         board=seen_board(estimate),
         X_SC_drawn=drawn,
         placement=placement,
-        versions=software_versions(),
+        versions=camera_versions(),
     )
 
 

@@ -3,8 +3,8 @@ from .document import (
     CheckedScene as CheckedScene,
     Placement as Placement,
     PlacementCheck as PlacementCheck,
+    camera_versions as camera_versions,
     image_of_file as image_of_file,
     load_placement as load_placement,
     save_placement as save_placement,
-    software_versions as software_versions,
 )

@@ -28,7 +28,7 @@ from burg_drake.cameras.placement.document import (
     CheckedScene,
     Placement,
     PlacementCheck,
-    software_versions,
+    camera_versions,
 )
 from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.cameras.pose import BoardEstimate, BoardPose
@@ -86,7 +86,7 @@ def check_placement(
         camera=_camera(estimate),
         reason=reason,
         instances=instances,
-        versions=software_versions(),
+        versions=camera_versions(),
     )
 
 

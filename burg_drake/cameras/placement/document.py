@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
 from dataclasses import dataclass, field, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
-from burg_drake import __version__
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import BurgError
+from burg_drake.core import BurgError, software_versions
 from burg_drake.core.documents import Pose, load_document, save_document
 from burg_drake.core.files import IMAGE_SIZE, read_bytes
 from burg_drake.core.paths import resolve
 
 Status = Literal["measured", "uncertain", "not_seen"]
 Method = Literal["silhouette", "depth"]
+
+PACKAGES = {"opencv": "opencv-python-headless", "numpy": "numpy", "scipy": "scipy"}
+"""As they are called in files, and installed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,19 +184,6 @@ def image_of_file(path: str | Path) -> CheckedImage:
     return CheckedImage(file=path.name, content=hashlib.sha256(data).hexdigest())
 
 
-def software_versions() -> dict[str, str]:
+def camera_versions() -> dict[str, str]:
     """Versions of what decides about a placement check."""
-    return {
-        "burg_drake": __version__,
-        "opencv": _installed("opencv-python-headless"),
-        "numpy": _installed("numpy"),
-        "scipy": _installed("scipy"),
-        "python": platform.python_version(),
-    }
-
-
-def _installed(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:  # OpenCV may come from another package, or from the system
-        return "unknown"
+    return software_versions(PACKAGES, with_platform=False)

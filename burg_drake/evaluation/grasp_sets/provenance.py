@@ -6,7 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from burg_drake.evaluation.records import software_versions
+from burg_drake.core import (
+    software_versions,
+)
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Hand, Station

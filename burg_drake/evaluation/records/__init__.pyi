@@ -58,7 +58,6 @@ from .run_document import (
     origin_of as origin_of,
     require_same_run as require_same_run,
     run_hash as run_hash,
-    software_versions as software_versions,
     what_is_asked as what_is_asked,
 )
 from .shard import (

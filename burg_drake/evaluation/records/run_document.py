@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import platform
 from dataclasses import dataclass, field, is_dataclass
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal, Protocol
 
-from burg_drake import __version__
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import data_root
@@ -144,20 +141,6 @@ def begun_now(workers: int, before: int) -> WorkSession:
     """A stretch of work that begins now, when so many grasps have a verdict."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
     return WorkSession(started=started, workers=workers, before=before)
-
-
-def software_versions() -> dict[str, str]:
-    """Versions of what decides about results, and of what may."""
-    return {
-        "burg_drake": __version__,
-        "drake": _installed("drake"),
-        "numpy": _installed("numpy"),
-        "scipy": _installed("scipy"),
-        "trimesh": _installed("trimesh"),
-        "embreex": _installed("embreex"),
-        "python": platform.python_version(),
-        "platform": platform.platform(),
-    }
 
 
 class RunQuestion(Protocol):
@@ -297,10 +280,3 @@ def numbers(settings: object) -> dict[str, float]:
         elif value is not None:
             found[name] = float(value)
     return found
-
-
-def _installed(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:  # a Drake that was built from source has no metadata
-        return "unknown"

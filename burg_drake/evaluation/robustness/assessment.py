@@ -12,7 +12,10 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import (
+    InvalidInputError,
+    software_versions,
+)
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
@@ -23,7 +26,6 @@ from burg_drake.evaluation.records import (
     origin_of,
     read_journal,
     require_table,
-    software_versions,
     write_table,
 )
 from burg_drake.evaluation.robustness.probe_judge import ProbeJudgeFactory

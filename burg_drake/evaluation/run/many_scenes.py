@@ -16,7 +16,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from burg_drake.core import BurgError
+from burg_drake.core import (
+    BurgError,
+    software_versions,
+)
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
@@ -29,7 +32,6 @@ from burg_drake.evaluation.records import (
     campaign_hash,
     input_of,
     require_same_campaign,
-    software_versions,
 )
 from burg_drake.evaluation.report import renew_report
 from burg_drake.evaluation.run.completeness import require_scenes_judged

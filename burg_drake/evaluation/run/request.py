@@ -10,7 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core import content_hash
+from burg_drake.core import (
+    content_hash,
+    software_versions,
+)
 from burg_drake.core.grasps import GraspSet, Mode
 from burg_drake.core.paths import PACKAGE_URI, portable_reference
 from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
@@ -23,7 +26,6 @@ from burg_drake.evaluation.records import (
     as_shard,
     input_of,
     numbers,
-    software_versions,
 )
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.stages import arm_settings, mode_for

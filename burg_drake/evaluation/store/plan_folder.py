@@ -13,7 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.core import InvalidInputError, content_hash
+from burg_drake.core import (
+    InvalidInputError,
+    content_hash,
+    software_versions,
+)
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Outcome, Verdict
@@ -27,7 +31,6 @@ from burg_drake.evaluation.records import (
     motion_in,
     motion_text,
     read_journal,
-    software_versions,
     without_motion,
 )
 

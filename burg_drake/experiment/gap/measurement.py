@@ -21,7 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, content_hash
+from burg_drake.core import (
+    InvalidInputError,
+    content_hash,
+    software_versions,
+)
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import MODES, GraspSet, Mode
@@ -39,7 +43,6 @@ from burg_drake.evaluation.records import (
     read_journal,
     require_same_run,
     run_hash,
-    software_versions,
 )
 from burg_drake.evaluation.run import EvaluationSettings, Given
 from burg_drake.evaluation.stages import arm_settings, mode_for

@@ -15,7 +15,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.core import content_hash
+from burg_drake.core import (
+    content_hash,
+    software_versions,
+)
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
@@ -25,7 +28,6 @@ from burg_drake.evaluation.records import (
     Journal,
     origin_of,
     read_journal,
-    software_versions,
 )
 from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.store import Run

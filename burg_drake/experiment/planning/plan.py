@@ -14,9 +14,14 @@ from typing import get_args
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, content_hash, nearest, quoted
+from burg_drake.core import (
+    InvalidInputError,
+    content_hash,
+    nearest,
+    quoted,
+    software_versions,
+)
 from burg_drake.core.grasps import Outcome
-from burg_drake.evaluation.records import software_versions
 from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.planning.eligible import (
     EligibleGrasps,

@@ -7,9 +7,6 @@ first browser that brings it gets a cookie in its place, and the token is used u
 
 from __future__ import annotations
 
-import hmac
-import secrets
-import threading
 from collections.abc import Callable
 from http import HTTPStatus
 from urllib.parse import parse_qs
@@ -17,10 +14,9 @@ from urllib.parse import parse_qs
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from burg_drake.core import HEADERS, RequestError, require_own_host
+from burg_drake.core import HEADERS, BrowserToken, RequestError, require_own_host
 from burg_drake.ui.server.html_page import POLICY, first_page
 
-TOKEN_BYTES = 24
 MOST_CONNECTIONS = 32
 """Of browsers, each of which costs memory for what has yet to be sent to it."""
 ONCE = ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade")
@@ -45,16 +41,12 @@ class Admission:
         self.host = host
         self.page = first_page(title)
         self.on_admitted: Callable[[str], None] = lambda address: None
-        self._lock = threading.Lock()
-        self._token = secrets.token_urlsafe(TOKEN_BYTES) if by_token else None
-        self._secret = secrets.token_urlsafe(TOKEN_BYTES)
-        self._cookie = f"burg_drake_{port}"
+        self._token = BrowserToken(f"burg_drake_{port}") if by_token else None
 
     @property
     def token(self) -> str | None:
         """What the next browser has to bring; None if none is asked for."""
-        with self._lock:
-            return self._token
+        return None if self._token is None else self._token.token
 
     def process_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answers a request, as websockets asks for it.
@@ -93,34 +85,23 @@ class Admission:
             )
 
     def _page(self, connection: ServerConnection, request: Request, query: str) -> Response:
-        cookie = None
-        if not self._has_cookie(request):
+        is_new = self._token is not None and not self._has_cookie(request)
+        if is_new:
             self._use_token(parse_qs(query).get("token", [""])[-1], connection)
-            cookie = f"{self._cookie}={self._secret}; Path=/; HttpOnly; SameSite=Strict"
         response = self._response(connection, HTTPStatus.OK, self.page, "text/html")
-        if cookie is not None:
-            response.headers["Set-Cookie"] = cookie
+        if is_new and self._token is not None:
+            response.headers["Set-Cookie"] = self._token.set_cookie
         return response
 
     def _use_token(self, given: str, connection: ServerConnection) -> None:
-        with self._lock:
-            if self._token is None or not hmac.compare_digest(given.encode(), self._token.encode()):
-                raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
-            self._token = secrets.token_urlsafe(TOKEN_BYTES)
+        if self._token is None or not self._token.use(given):
+            raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
         peer = connection.remote_address
         self.on_admitted(str(peer[0]) if peer else "")
 
     def _has_cookie(self, request: Request) -> bool:
         """Whether this browser was admitted; without a token all are."""
-        if self._token is None:
-            return True
-        secret = self._secret.encode()
-        cookies = request.headers.get("Cookie", "").split(";")
-        given = (cookie.strip().partition("=") for cookie in cookies)
-        return any(
-            name == self._cookie and hmac.compare_digest(value.encode(), secret)
-            for name, _, value in given
-        )
+        return self._token is None or self._token.admits(request.headers.get("Cookie", ""))
 
     def _response(
         self, connection: ServerConnection, code: HTTPStatus, body: str, kind: str = "text/plain"
