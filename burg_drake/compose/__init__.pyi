@@ -1,6 +1,4 @@
-from .background.settling import (
-    SettlingProposal as SettlingProposal,
-)
+from .background.settling import SettlingProposal as SettlingProposal
 from .commands.arranging import (
     Align as Align,
     Distribute as Distribute,
@@ -28,22 +26,12 @@ from .commands.placing import (
     Rename as Rename,
     SetFixed as SetFixed,
 )
-from .commands.random_configuration import (
-    RandomConfiguration as RandomConfiguration,
-)
-from .editing.drag import (
-    Drag as Drag,
-)
-from .editing.view import (
-    SessionView as SessionView,
-)
-from .session import (
-    ComposeSession as ComposeSession,
-)
+from .commands.random_configuration import RandomConfiguration as RandomConfiguration
+from .editing.drag import Drag as Drag
+from .editing.view import SessionView as SessionView
+from .session import ComposeSession as ComposeSession
 from .storage.scene_file import (
     FileChanged as FileChanged,
     UnsavedChanges as UnsavedChanges,
 )
-from .storage.scene_lock import (
-    SceneInUse as SceneInUse,
-)
+from .storage.scene_lock import SceneInUse as SceneInUse

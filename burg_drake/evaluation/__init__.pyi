@@ -1,14 +1,10 @@
-from .cascade import (
-    evaluate as evaluate,
-)
+from .cascade import evaluate as evaluate
 from .feasibility import (
     ReachJudgeFactory as ReachJudgeFactory,
     reach as reach,
     reach_columns as reach_columns,
 )
-from .records.table_file import (
-    read_table as read_table,
-)
+from .records.table_file import read_table as read_table
 from .replay import (
     arm_figures as arm_figures,
     as_result as as_result,
@@ -19,21 +15,15 @@ from .replay import (
     rerun as rerun,
 )
 from .report import write_report as write_report
-from .results.summary import (
-    summarize as summarize,
-)
-from .results.summary_tables import (
-    summary_view as summary_view,
-)
+from .results.summary import summarize as summarize
+from .results.summary_tables import summary_view as summary_view
 from .stages.judge import (
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
     Verdict as Verdict,
 )
-from .stages.station_judge import (
-    StationJudge as StationJudge,
-)
+from .stages.station_judge import StationJudge as StationJudge
 from .store.run_folder import (
     Run as Run,
     load_run as load_run,

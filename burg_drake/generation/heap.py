@@ -145,7 +145,7 @@ class _Ground:
         herd = BoardEdgeGuard(
             built, self.shapes, margin=EDGE, share=1.0
         )  # what gets slower is stopped
-        relaxed = relax(built, moving, RELAXING_TIME, before_window=herd.drive)
+        relaxed = relax(built, moving, RELAXING_TIME, before_window=herd.push_back)
         return _with_lost(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 
     def _misplaced(self, scene: Scene) -> set[str]:

@@ -172,7 +172,7 @@ def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert ways.sum() > 0.2
     assert ways.max() < 0.005
-    assert ways.max() > 0.005 / round(trial.look / trial.diagram.engine.time_step)
+    assert ways.max() > 0.005 / round(trial.check_period / trial.diagram.engine.time_step)
 
 
 # --- statics ------------------------------------------------------------------------------------
@@ -353,7 +353,7 @@ def test_what_the_hand_touches_at_the_grasp_and_after(crowd: ArmTrial) -> None:
     ):
         for pair in ((one, other), (other, one)):
             touches = RobotContactWatch(crowd.diagram, crowd.hand.links, free["box"])
-            assert touches.look([BodyContact(*pair, np.zeros(3))], arrived) == ""
+            assert touches.update([BodyContact(*pair, np.zeros(3))], arrived) == ""
             assert touches.first == touched
 
 

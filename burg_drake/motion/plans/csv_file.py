@@ -121,7 +121,7 @@ def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> Plan:
         raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is no finite number")
     q, v, a = np.hsplit(values, 3)
     if data is None:
-        data = _told_by_rows(rows, t, spans)
+        data = _described_by_rows(rows, t, spans)
     plan = assembled(read_data(data, joints), t, spans, (q, v, a))
     _require_widths(plan, rows)
     return plan
@@ -153,7 +153,7 @@ def _read_spans(rows: Rows) -> dict[str, tuple[int, int]]:
     return spans
 
 
-def _told_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
+def _described_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
     """What a table alone tells of its plan."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:

@@ -98,12 +98,12 @@ def _plan(document: dict[str, Any]) -> Plan:
         rows = _rows(motion["points"], len(joints))
         stamps = [point["time_from_start"] for point in motion["points"]]
         t = np.array([stamp["sec"] + stamp["nanosec"] / NANO for stamp in stamps], dtype=float)
-    told = read_data(document, joints)
+    description = read_data(document, joints)
     with part(document, "phases") as phases:
         spans: Spans = {name: (first, last) for name, (first, last) in phases.items()}
         if spans.keys() - set(PHASES):
             raise KeyError(spans)
-        return assembled(told, t, spans, rows)
+        return assembled(description, t, spans, rows)
 
 
 def _rows(points: list[dict[str, Any]], n: int) -> list[Array]:

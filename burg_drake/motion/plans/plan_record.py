@@ -134,11 +134,11 @@ def read_data(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescr
     return PlanDescription(rate, opening, width, close_time, origin)
 
 
-def assembled(told: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]) -> Plan:
+def assembled(description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]) -> Plan:
     """A plan of its samples.
 
     Args:
-        told: what else is known of it.
+        description: what else is known of it.
         t: (T,) times of the samples [s].
         spans: where the phases are.
         rows: positions, velocities and accelerations, (T, n) each.
@@ -147,12 +147,12 @@ def assembled(told: PlanDescription, t: Array, spans: Spans, rows: Sequence[Arra
         InvalidInputError: times, phases or positions do not belong together, or are beyond the
             limits.
     """
-    exact = np.arange(len(t)) / told.rate
+    exact = np.arange(len(t)) / description.rate
     apart = ~(np.abs(exact - t) * NANO <= STAMP_TOLERANCE)
     if apart.any():
         k = apart.argmax()
         raise InvalidInputError(
-            f"point {k} is at {t[k]:.9g} s; of {told.rate:g} samples a second it is that at"
+            f"point {k} is at {t[k]:.9g} s; of {description.rate:g} samples a second it is that at"
             f" {exact[k]:.9g} s"
         )
     _require_spans(spans, len(t))
@@ -162,14 +162,14 @@ def assembled(told: PlanDescription, t: Array, spans: Spans, rows: Sequence[Arra
     }
     plan = Plan(
         **{name: trajectory for name, trajectory in parts.items() if name != "close"},
-        close_time=told.close_time,
-        opening=told.opening,
-        width=told.width,
-        origin=told.origin,
+        close_time=description.close_time,
+        opening=description.opening,
+        width=description.width,
+        origin=description.origin,
     )
     _require_rest(parts, plan)
-    if told.origin is not None:
-        _require_within(plan.whole, told.origin)
+    if description.origin is not None:
+        _require_within(plan.whole, description.origin)
     return plan
 
 

@@ -37,7 +37,7 @@ class Motion(Protocol):
     def at(self, time: Array) -> tuple[Array, Array, Array, Array]:
         """Position, velocity, acceleration and jerk, each (T, n), at times (T,) [s]."""
 
-    def stretched(self, factor: float) -> Motion:
+    def time_scaled(self, factor: float) -> Motion:
         """The same way in `factor` times the time."""
 
 
@@ -66,7 +66,7 @@ class Trajectory:
         """
         count = max(1, int(np.ceil(motion.duration * rate - 1e-6)))
         t = np.arange(count + 1) / rate
-        motion = motion.stretched(t[-1] / motion.duration)
+        motion = motion.time_scaled(t[-1] / motion.duration)
         q, v, a = (on_grid(x) for x in motion.at(t)[:3])
         q[0], q[-1] = start, end
         v[[0, -1]] = a[[0, -1]] = 0.0

@@ -122,7 +122,7 @@ def reach_from_above(
             found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
             return np.array([one.outcome is None for one in found]).reshape(-1, yaws)
 
-        return {"reached": asked_where_needed(len(y), len(x), yaws, ask)}
+        return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
 
     asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
     return ReachLayer(x, y, height, yaw, kept("reach-layer", asked, make)["reached"], cell)
@@ -152,7 +152,7 @@ def require_arm(station: Station) -> None:
         )
 
 
-def asked_where_needed(
+def answers_by_refinement(
     rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
     """(Y, X, K) answers, of which `ask` is asked those that do not follow from their neighbours.

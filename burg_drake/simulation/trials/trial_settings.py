@@ -69,9 +69,9 @@ class TrialSettings:
         """Of the hand on its straight ways with the target [m/s^2]."""
         return 4.0 * USUAL_LIFT / self.lift_time**2
 
-    def time_of(self, way: float) -> float:
+    def time_of(self, length: float) -> float:
         """Duration of a straight way with the target [s], by its length [m]."""
-        return self.lift_time * math.sqrt(way / USUAL_LIFT)
+        return self.lift_time * math.sqrt(length / USUAL_LIFT)
 
     @property
     def steady_polls(self) -> int:

@@ -35,7 +35,7 @@ from burg_drake.station.checks.sinking import push_up
 from burg_drake.station.checks.travel import Travel
 from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
 from burg_drake.station.document import Station
-from burg_drake.station.world import ROBOT_MODELS, taken_name, taken_obstacle
+from burg_drake.station.world import ROBOT_MODELS, name_taken_error, obstacle_name_error
 
 GRAVITY = 9.81
 """[m/s^2]."""
@@ -157,7 +157,7 @@ class SceneCheck:
         self._place(scene)
         if self._travel is None:
             self._travel = Travel(self._world)
-        return self._travel.way(chosen, self._X_WS[:3, :3] @ direction / length, limit)
+        return self._travel.free_distance(chosen, self._X_WS[:3, :3] @ direction / length, limit)
 
     def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
         """Instances, what they overlap, and how deep [m], in the order of the document."""
@@ -216,9 +216,9 @@ class SceneCheck:
     def _require_free_names(self, scene: Scene) -> None:
         for name in (*scene.instances, *scene.background):
             if name in self._station.document.background:
-                raise taken_obstacle(self._station, name)
+                raise obstacle_name_error(self._station, name)
             if name in ROBOT_MODELS or self._around.plant.HasModelInstanceNamed(name):
-                raise taken_name(scene, name)
+                raise name_taken_error(scene, name)
 
     def _table_issue(self, name: str) -> SceneIssue | None:
         """Whether the centre of mass is beside the table, so that the object cannot stay."""

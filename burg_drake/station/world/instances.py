@@ -33,7 +33,7 @@ def add_instance(
     """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-        raise taken_name(scene, name)
+        raise name_taken_error(scene, name)
     path = scene.library.path(scene.entry(name).sdf)
     try:
         with held_remarks() as remarks:
@@ -56,7 +56,7 @@ def add_instance(
     return body
 
 
-def taken_name(scene: Scene, name: str) -> InvalidInputError:
+def name_taken_error(scene: Scene, name: str) -> InvalidInputError:
     """The error of an instance whose name is one of the station's."""
     return InvalidInputError(
         f"{scene.path}: instance name {name!r} is taken by the station; choose another"
@@ -79,7 +79,7 @@ def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
         raise ValueError("its inertia is not what library.yaml says")
 
 
-def add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
+def add_vertical_joint(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
     """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
     model = body.model_instance()
     place = plant.AddFrame(FixedOffsetFrame(PLACE, plant.world_frame(), X_WO, model))

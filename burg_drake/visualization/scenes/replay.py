@@ -72,7 +72,7 @@ def record_trial(
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
     offset = camera_offset(X_WG, np.reshape(others, (-1, 3)))
-    steps = [way.length * way.direction_W for way in trial.ways(X_WG, lift)]
+    steps = [way.length * way.direction_W for way in trial.lift_paths(X_WG, lift)]
     on_way = [hand + p_W for p_W in np.cumsum(steps, axis=0)]
     aim_at(meshcat, np.vstack([scene_points(scene, station), hand, *on_way]), -offset)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
