@@ -37,7 +37,7 @@ from .cameras.projection.visibility import (
     visible_from as visible_from,
 )
 from .cameras.rectification.stream import (
-    board_looks as board_looks,
+    board_views as board_views,
 )
 from .cameras.rectification.top_view import (
     BoardPicture as BoardPicture,

@@ -14,7 +14,7 @@ import numpy as np
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet, Outcome, Stage
 from burg_drake.core.paths import require_name
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import (
     INSTANCE,
     Candidate,
@@ -139,8 +139,8 @@ def reach(
         left = [candidate for candidate in candidates if candidate.id not in verdicts]
         outcomes = Counter(v.outcome for v in verdicts.values())
         done, total = len(candidates) - len(left), len(candidates)
-        event = Progress(STARTING, done, total, outcomes=outcomes, good=YES)
-        pace = Pace(reporter.show, event, "judging")
+        event = Progress(STARTING, done, total, outcomes=outcomes, counted_outcome=YES)
+        pace = ProgressMeter(reporter.show, event, "judging")
         for candidate, verdict in opened.enter_context(
             closing(judge_all(left, factory, workers=workers))
         ):

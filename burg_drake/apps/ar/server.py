@@ -37,9 +37,9 @@ from burg_drake.core import (
     BurgError,
     InvalidInputError,
     RequestError,
+    address_in_use_error,
     page_url,
-    require_own_host,
-    taken,
+    require_local_host,
 )
 
 FIRST_PORT, PORTS = 7100, 50
@@ -101,7 +101,9 @@ class ViewServer(ThreadingHTTPServer):
                         f"the view cannot be served on {host}: {error.strerror or error}"
                     ) from error
         else:
-            raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
+            raise InvalidInputError(
+                address_in_use_error(host, ports, any_of_them=port is None)
+            ) from failure
 
     @property
     def url(self) -> str:
@@ -154,7 +156,7 @@ class ViewHandler(BaseHTTPRequestHandler):
 
     def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
         try:
-            require_own_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
+            require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
             path, query = address(self.path)
             if path not in routes:
                 raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path}")

@@ -113,7 +113,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.document import GraspMotion
-    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.checks import require_valid_scene
     from burg_drake.station.document import load_station
 
     require_file(arguments)
@@ -129,7 +129,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         arguments.after_interrupt = "; the same command goes on from here"
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    require_sound_scene(scene, station)
+    require_valid_scene(scene, station)
     motion = chosen_motion(arguments, station)
     grasps = _grasps(arguments, scene, station)
     if isinstance(output, Output):
@@ -200,7 +200,7 @@ def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> dict[str, GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import ProgressMeter, Progress, Reporter
     from burg_drake.evaluation.candidates import sample_scene
     from burg_drake.evaluation.candidates import chosen_instances
     from burg_drake.evaluation.candidates import SamplingSettings
@@ -210,7 +210,7 @@ def sampled_grasps(
     sampled = {}
     total = len(chosen_instances(scene, arguments.only))
     with Reporter(not arguments.quiet) as reporter:
-        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
+        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
         for name, grasps in sample_scene(scene, station, count, seed, settings, arguments.only):
             sampled[name] = grasps
             pace.step(note=name)

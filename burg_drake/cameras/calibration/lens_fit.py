@@ -53,8 +53,8 @@ class LensFit:
         """Bayesian information criterion, or Akaike's, which is more generous to large models: the
         lowest of several models is best supported."""
         n = sum(r.size for r in self.residuals)
-        price = np.log(n) if bayesian else 2.0
-        return float(n * np.log(self.squares / n) + price * len(self.covariance))
+        penalty = np.log(n) if bayesian else 2.0
+        return float(n * np.log(self.squares / n) + penalty * len(self.covariance))
 
 
 def fit_lens(

@@ -16,7 +16,7 @@ PERIOD = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class BoardLook:
+class BoardView:
     """What one look at the board gave.
 
     Attributes:
@@ -28,13 +28,13 @@ class BoardLook:
     reason: str
 
 
-def board_looks(
+def board_views(
     source: FrameSource,
     rectifier: BoardRectifier,
     *,
     period: float = PERIOD,
     stop: threading.Event | None = None,
-) -> Iterator[BoardLook]:
+) -> Iterator[BoardView]:
     """Looks at the board, again and again.
 
     Args:
@@ -56,8 +56,8 @@ def board_looks(
             if frame is None:
                 return
             picture = rectifier.picture(frame.image)
-            yield BoardLook(picture, picture.note)
+            yield BoardView(picture, picture.note)
         except (CameraLost, InvalidInputError) as error:
-            yield BoardLook(None, str(error))
+            yield BoardView(None, str(error))
         if source.live:
             stop.wait(max(0.0, period - (time.monotonic() - started)))

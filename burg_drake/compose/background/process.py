@@ -71,7 +71,7 @@ class BackgroundJob(Generic[T]):
         self.task = task
         self._worker, self._on_change = worker, on_change
         self._result: list[T] = []
-        self._told = threading.Event()
+        self._notify = threading.Event()
 
     @property
     def result(self) -> T:
@@ -94,7 +94,7 @@ class BackgroundJob(Generic[T]):
             TimeoutError: it is not there by then.
             BurgError: it cannot be done, or was cancelled.
         """
-        if not self._told.wait(timeout):
+        if not self._notify.wait(timeout):
             raise TimeoutError(f"nothing after {timeout:g} s")
         return self.result
 
@@ -115,7 +115,7 @@ class BackgroundJob(Generic[T]):
             self._result.append(result)
         self.done = True
         self._on_change(self)
-        self._told.set()
+        self._notify.set()
 
 
 class Cancelled(BurgError):
@@ -146,7 +146,7 @@ class BackgroundWorker:
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def ask(
+    def submit(
         self,
         task: BackgroundTask[T],
         on_change: Callable[[BackgroundJob[T]], None] = lambda job: None,
@@ -168,7 +168,7 @@ class BackgroundWorker:
                 self._thread.start()
             self._changed.notify()
         if older is not None:
-            _call_off(older)
+            _cancel_job(older)
         return job
 
     def cancel(self, job: BackgroundJob[Any]) -> None:
@@ -182,7 +182,7 @@ class BackgroundWorker:
             elif job is self._running and self._process is not None:
                 self._process.kill()
                 return  # its thread sees that, and finishes the job
-        _call_off(job)
+        _cancel_job(job)
 
     def close(self) -> None:
         """Ends the process."""
@@ -210,14 +210,14 @@ class BackgroundWorker:
             if closed or job is None:
                 self._end()
                 if job is not None:
-                    _call_off(job)
+                    _cancel_job(job)
                 return
-            result = self._do(job)
+            result = self._run_job(job)
             with self._changed:
                 self._running = None
             job.finish(result)
 
-    def _do(self, job: BackgroundJob[Any]) -> Any:
+    def _run_job(self, job: BackgroundJob[Any]) -> Any:
         """The result of a job, or why there is none."""
         try:
             if self._connection is None:
@@ -261,7 +261,7 @@ class BackgroundWorker:
             process.wait()
 
 
-def _call_off(job: BackgroundJob[Any]) -> None:
+def _cancel_job(job: BackgroundJob[Any]) -> None:
     job.cancelled = True
     job.finish(_cancelled())
 

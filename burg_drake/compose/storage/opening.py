@@ -10,7 +10,7 @@ from pathlib import Path
 
 from burg_drake.compose.commands import board_size
 from burg_drake.compose.document import History, State
-from burg_drake.compose.storage.journal import LibraryGone, Recovered, journal_path, recover
+from burg_drake.compose.storage.journal import LibraryMissing, Recovered, journal_path, recover
 from burg_drake.compose.storage.scene_file import fingerprint
 from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.storage.scene_storage import Storage
@@ -134,7 +134,7 @@ def _unsaved(
                 )
             if found.origin == origin and found.saved is None:
                 return _recovered(place, None, found, lock, notices)
-        except LibraryGone as error:
+        except LibraryMissing as error:
             notices += (str(error),)
         except BaseException:
             lock.release()

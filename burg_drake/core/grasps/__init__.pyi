@@ -1,5 +1,5 @@
 from .columns import (
-    GIVEN as GIVEN,
+    INPUT_PREFIX as INPUT_PREFIX,
     PLAIN as PLAIN,
     TEXT as TEXT,
     Column as Column,

@@ -238,7 +238,7 @@ def parts_of(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [p for p in parts if isinstance(p, Mapping)] if isinstance(parts, (list, tuple)) else []
 
 
-def require_sound(grasps: GraspSet) -> None:
+def require_valid(grasps: GraspSet) -> None:
     """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
 
     Grasps that are there several times, with the same identifier, object, pose and width, are fine.

@@ -28,10 +28,10 @@ from burg_drake.core.files import (
     is_hdf5,
     open_hdf5,
     open_npz,
-    reading,
+    reporting_read_errors,
 )
 from burg_drake.core.grasps.columns import describe
-from burg_drake.core.grasps.grasp_set import FIXED_COLUMNS, GraspSet, require_sound
+from burg_drake.core.grasps.grasp_set import FIXED_COLUMNS, GraspSet, require_valid
 from burg_drake.core.paths import with_resolved_references, with_shareable_references
 
 FORMAT = "burg_drake.grasps"
@@ -62,13 +62,13 @@ def save_grasps(grasps: GraspSet, path: str | Path) -> None:
 def load_grasps(path: str | Path) -> GraspSet:
     """See `GraspSet.load`."""
     path = Path(path)
-    with reading(path, "a grasp set written by burg_drake"):
+    with reporting_read_errors(path, "a grasp set written by burg_drake"):
         header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
         if not isinstance(header["provenance"], dict):
             raise ValueError("its provenance is no mapping")
         provenance = with_resolved_references(header["provenance"], path.absolute().parent)
         grasps = GraspSet(**fixed, provenance=provenance, columns=columns)
-        require_sound(grasps)
+        require_valid(grasps)
         return grasps
 
 

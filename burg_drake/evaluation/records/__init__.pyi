@@ -68,7 +68,7 @@ from .shard import (
 )
 from .table import (
     CPU_COLUMNS as CPU_COLUMNS,
-    GIVEN as GIVEN,
+    INPUT_PREFIX as INPUT_PREFIX,
     TEXT as TEXT,
     Columns as Columns,
     make_columns as make_columns,

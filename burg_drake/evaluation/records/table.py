@@ -48,7 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import quaternion_from_rotation
-from burg_drake.core.grasps import GIVEN, Stage
+from burg_drake.core.grasps import INPUT_PREFIX, Stage
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records.origin import ORIGIN_TEXT, TrialOrigin, engine_label
 from burg_drake.evaluation.records.trial import MOVED, PUSHED, RecordedTrial, pose_text
@@ -103,7 +103,7 @@ def make_columns(
         for i in judged
     ]
     columns = trial_columns(trials, origin, instances=instances, joints=joints)
-    return columns | {GIVEN + name: _plain(v[judged]) for name, v in grasps.columns.items()}
+    return columns | {INPUT_PREFIX + name: _plain(v[judged]) for name, v in grasps.columns.items()}
 
 
 def trial_columns(

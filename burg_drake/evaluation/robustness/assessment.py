@@ -15,7 +15,7 @@ from pathlib import Path
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import (
@@ -176,7 +176,7 @@ def _answer(
     begin = Progress(
         STARTING, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
-    pace = Pace(reporter.show, begin, "testing", work=work)
+    pace = ProgressMeter(reporter.show, begin, "testing", work=work)
     with closing(judge_all(todo, factory, workers=workers)) as answered:
         for asked, verdict in answered:
             assert isinstance(asked, Probe)

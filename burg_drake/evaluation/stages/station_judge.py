@@ -88,7 +88,7 @@ class StationJudge:
         """What says how far the hand can lift, where the arm is not asked and it may be less."""
         from burg_drake.evaluation.stages.lift_room import LiftRoom
 
-        if mode == "hand" and motion.least < motion.lift_height:
+        if mode == "hand" and motion.shortest < motion.lift_height:
             return LiftRoom(scene, station, motion)
         return None
 

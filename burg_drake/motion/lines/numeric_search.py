@@ -181,7 +181,7 @@ class _NumericBatch:
         """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
         search = self._search
         places = list(zip(grasp.tolist(), k.tolist(), strict=True))
-        flip = np.array([self._of[g].way[j] for g, j in places], dtype=np.intp)
+        flip = np.array([self._of[g].flip[j] for g, j in places], dtype=np.intp)
         q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
         q = q.reshape(len(k), len(search.home))
         found = search.follower.follow(self._X_AG[grasp, flip], q)

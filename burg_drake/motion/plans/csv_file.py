@@ -17,7 +17,7 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, quoted
 from burg_drake.core.documents import load_json
-from burg_drake.core.files import DAMAGED, GRASP_FILE, atomic_write_all, read_rows, row_texts
+from burg_drake.core.files import GRASP_FILE, READ_ERRORS, atomic_write_all, format_rows, read_rows
 from burg_drake.core.grasps import TEXT, Column, csv_metadata, metadata_path
 from burg_drake.motion.plans.plan_record import (
     assembled,
@@ -55,8 +55,8 @@ def write_csv(plan: Plan, path: str | Path) -> None:
     joints = joint_names(plan)
     meanings = _meanings(joints)
     lines = [",".join(map(_cell, meanings))]
-    times = row_texts(whole.t[:, None])
-    rows = row_texts(np.hstack([whole.q, whole.v, whole.a]))
+    times = format_rows(whole.t[:, None])
+    rows = format_rows(np.hstack([whole.q, whole.v, whole.a]))
     for phase, (first, last) in spans_of(plan).items():
         start, end = first if first == 0 else first + 1, f",{_width(plan, phase)}"
         lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
@@ -94,7 +94,7 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
     try:
         (data,) = document["notes"]
         titles = [column["titles"] for column in document["tableSchema"]["columns"]]
-    except DAMAGED as error:
+    except READ_ERRORS as error:
         raise InvalidInputError(f"{path} has no notes on a plan; write it again") from error
     if titles != list(header):
         raise InvalidInputError(f"{path} is of a table with other columns; write it again")

@@ -15,7 +15,7 @@ import numpy as np
 
 from burg_drake.core import Array, DocumentError, InvalidInputError
 from burg_drake.core.documents import load_json
-from burg_drake.core.files import GRASP_FILE, atomic_write, row_texts
+from burg_drake.core.files import GRASP_FILE, atomic_write, format_rows
 from burg_drake.motion.plans.csv_file import read_csv
 from burg_drake.motion.plans.plan_record import (
     NANO,
@@ -46,7 +46,7 @@ def write_json(plan: Plan, path: str | Path) -> None:
     require_writable(plan)
     whole = plan.whole
     stamps = np.rint(whole.t * NANO).astype(int).tolist()
-    rows = zip(stamps, *(row_texts(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
+    rows = zip(stamps, *(format_rows(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
     points = ", ".join(
         f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
         f' "time_from_start": {{"sec": {time // NANO}, "nanosec": {time % NANO}}}}}'

@@ -13,7 +13,7 @@ import numpy as np
 
 import burg_drake
 from burg_drake.core import Array, BurgError, InvalidInputError, check_pose, quoted
-from burg_drake.core.files import DAMAGED, without_warnings
+from burg_drake.core.files import READ_ERRORS, without_warnings
 from burg_drake.motion.ik import ArmLimits
 from burg_drake.motion.plans.trajectory import PHASES, Plan, PlanOrigin, Trajectory
 
@@ -107,7 +107,7 @@ def part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
         yield document[name]
     except BurgError:
         raise
-    except DAMAGED as error:
+    except READ_ERRORS as error:
         raise InvalidInputError(f"{name!r} is not as it was written") from error
 
 

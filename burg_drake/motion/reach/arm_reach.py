@@ -163,9 +163,9 @@ class ArmReach:
             return ~paths[some].lifted(before[some], height).blocked
 
         whole = judge(motion.lift_height, np.arange(len(X)))
-        if motion.least >= motion.lift_height:
+        if motion.shortest >= motion.lift_height:
             return whole
-        tried = lift_heights(motion.least, motion.lift_height)
+        tried = lift_heights(motion.shortest, motion.lift_height)
         return raise_lifts(whole, tried, judge, hand_is_free)
 
     def _lifted(self, paths: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, content_hash, kept, rng_from
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.ik import ArmLinks
 from burg_drake.station.diagram import StationDiagram
 
@@ -56,7 +56,7 @@ def postures_over_objects(
         return {"q": q[_aimed_at(links, frame, X_FG, objects, q)]}
 
     asked = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
-    return np.asarray(kept("postures", content_hash(*asked), make)["q"])
+    return np.asarray(cached("postures", content_hash(*asked), make)["q"])
 
 
 def _aimed_at(

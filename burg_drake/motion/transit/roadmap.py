@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from burg_drake.core import Array, Arrays, content_hash, kept, rng_from
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.collision import EdgeChecker
 from burg_drake.motion.transit.focus import random_postures
 
@@ -67,7 +67,7 @@ class Roadmap:
         self._edges = edges
         near = np.empty((0, len(home))) if focus is None else focus
         asked = (edges.content, home, lower, upper, near, seed, nodes)
-        arrays = kept(
+        arrays = cached(
             "roadmap",
             content_hash(*asked),
             lambda: _laid_out(edges, home, lower, upper, near, seed, nodes),

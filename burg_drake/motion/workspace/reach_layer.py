@@ -18,8 +18,8 @@ from burg_drake.core import (
     Array,
     Arrays,
     InvalidInputError,
+    cached,
     content_hash,
-    kept,
     rot_z,
     rotation_from_rpy,
 )
@@ -125,7 +125,7 @@ def reach_from_above(
         return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
 
     asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
-    return ReachLayer(x, y, height, yaw, kept("reach-layer", asked, make)["reached"], cell)
+    return ReachLayer(x, y, height, yaw, cached("reach-layer", asked, make)["reached"], cell)
 
 
 @lru_cache(maxsize=2)

@@ -24,7 +24,7 @@ from burg_drake.motion.workspace.reachability import (
 )
 from burg_drake.objects.library import load_library
 from burg_drake.scene.document import Board, Scene, SceneDocument, placed_vertices
-from burg_drake.station.checks import require_sound_scene
+from burg_drake.station.checks import require_valid_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import Station, seen_share
 from burg_drake.station.world import HandFigures, check_hand
@@ -89,7 +89,7 @@ def inspect_station(
     """
     hand = check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     if scene is not None:
-        require_sound_scene(scene, station)
+        require_valid_scene(scene, station)
     scene = scene or empty_scene()
     seen = {
         name: seen_share(camera, station, scene.board)

@@ -108,7 +108,7 @@ class LiftCarrier:
 
     def travelled(self) -> float:
         """Position of the joint [m]."""
-        return self._trial.hand.gone(self._plant_context)
+        return self._trial.hand.travelled(self._plant_context)
 
     def carries_full_load(self, check: int) -> bool:
         """The hand accelerates in the first half of a segment and brakes in the second. Straight

@@ -111,7 +111,7 @@ class SceneCheck:
         for a, b, depth in self._overlaps(scene):
             if b == "table" and a in buried:
                 continue
-            message = _overlap(a, b, depth, self._parts, self._station.path)
+            message = _overlap_issue(a, b, depth, self._parts, self._station.path)
             issues.append(
                 SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
             )
@@ -172,13 +172,13 @@ class SceneCheck:
             for _, _, a, b, depth in sorted(found)
             if depth > (SINK_TOLERANCE if b in yielding else TOUCH_TOLERANCE)
             and a in scene.instances
-            and not (b == "table" and depth < DEEPEST and self._is_borne(a, scene))
+            and not (b == "table" and depth < DEEPEST and self._is_supported(a, scene))
         ]
 
     def _may_sink(self, issue: SceneIssue, scene: Scene) -> bool:
-        return issue.amount < DEEPEST and self._is_borne(issue.instance, scene)
+        return issue.amount < DEEPEST and self._is_supported(issue.instance, scene)
 
-    def _is_borne(self, name: str, scene: Scene) -> bool:
+    def _is_supported(self, name: str, scene: Scene) -> bool:
         """Whether what an instance is below the table's top is no more than what it sinks in by
         under its own weight and that of what may lie on it: all free objects at most."""
         weight = GRAVITY * sum(scene.entry(n).mass_properties.mass for n in scene.instances)
@@ -199,14 +199,14 @@ class SceneCheck:
         self._placed = {
             name: known[name]
             if name in known and known[name].instance == instance
-            else self._look_at(scene, name, instance)
+            else self._placed_instance(scene, name, instance)
             for name, instance in instances.items()
         }
         self._world.place(
             {name: (one.instance.object, one.X_WO) for name, one in self._placed.items()}
         )
 
-    def _look_at(self, scene: Scene, name: str, instance: Instance) -> _PlacedInstance:
+    def _placed_instance(self, scene: Scene, name: str, instance: Instance) -> _PlacedInstance:
         X_SO = check_pose(instance.X_SO.matrix(), f"{scene.path}: X_SO of {name!r}")
         if instance.object not in self._surfaces:
             self._surfaces[instance.object] = surface_vertices(self._library, instance.object)
@@ -262,7 +262,9 @@ def _robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
     }
 
 
-def _overlap(a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path) -> str:
+def _overlap_issue(
+    a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path
+) -> str:
     """One line about two bodies that overlap; a is an instance."""
     by = f"by {depth * 1e3:.1f} mm"
     if b not in parts:

@@ -6,7 +6,7 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.scene.document import Scene, SceneIssue
 from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.sound_scene import require_sound_scene as require_sound_scene
+from burg_drake.station.checks.valid_scene import require_valid_scene as require_valid_scene
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.document import Station
 from burg_drake.station.world import mesh_by_pieces

@@ -69,8 +69,8 @@ class ArmDriver(LeafSystem):
         worst = int(np.abs(jump).argmax())
         if abs(jump[worst]) > JUMP:
             raise InvalidInputError(
-                f"the plan wants {self._joints[worst]} {abs(jump[worst]):.2g} rad from where it is now;"
-                " bring the arm to where the plan begins, or set plan.start_time"
+                f"the plan wants {self._joints[worst]} {abs(jump[worst]):.2g} rad from where it"
+                " is now; bring the arm to where the plan begins, or set plan.start_time"
             )
 
     def _calc(self, context: Context, output: BasicVector) -> None:

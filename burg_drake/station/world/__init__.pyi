@@ -32,7 +32,7 @@ from .mesh_pieces import (
 )
 from .model_file import (
     add_models as add_models,
-    held_remarks as held_remarks,
+    buffered_remarks as buffered_remarks,
     set_packages as set_packages,
 )
 from .robot import (

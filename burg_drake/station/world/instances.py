@@ -15,7 +15,7 @@ from burg_drake.core.paths import Packages
 from burg_drake.objects.library import LINK, MassProperties
 from burg_drake.scene.document import Scene
 from burg_drake.station.world.mesh_pieces import is_mesh, sdf_by_pieces
-from burg_drake.station.world.model_file import add_models, held_remarks
+from burg_drake.station.world.model_file import add_models, buffered_remarks
 from burg_drake.station.world.robot import ROBOT_MODELS
 from burg_drake.station.world.rolling import add_rolling, is_ball
 
@@ -36,7 +36,7 @@ def add_instance(
         raise name_taken_error(scene, name)
     path = scene.library.path(scene.entry(name).sdf)
     try:
-        with held_remarks() as remarks:
+        with buffered_remarks() as remarks:
             if by_pieces and is_mesh(scene, name):
                 (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
             else:

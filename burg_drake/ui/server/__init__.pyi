@@ -1,5 +1,5 @@
 from .door import (
-    Door as Door,
+    PageServer as PageServer,
     require_viser as require_viser,
     serve as serve,
 )

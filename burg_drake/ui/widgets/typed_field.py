@@ -46,7 +46,7 @@ class TypedField:
             self._typed += 1
             self._crossed |= time.monotonic() - self._set_at < CROSSING
             number, value = self._typed, event.target.value
-            actions.ask(
+            actions.submit(
                 lambda: self._take(number, value),
                 event.client,
                 key=f"typed {id(self)}",

@@ -39,9 +39,9 @@ from burg_drake.core import (
     BurgError,
     InvalidInputError,
     RequestError,
+    address_in_use_error,
     page_url,
-    require_own_host,
-    taken,
+    require_local_host,
 )
 from burg_drake.experiment.pages import (
     EntryConflict,
@@ -127,7 +127,9 @@ class LabServer(ThreadingHTTPServer):
                         f"the page cannot be served on {host}: {error.strerror or error}"
                     ) from error
         else:
-            raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
+            raise InvalidInputError(
+                address_in_use_error(host, ports, any_of_them=port is None)
+            ) from failure
         bound, number = self.server_address[:2]
         local = ipaddress.ip_address(str(bound)).is_loopback
         self.token = None if local else BrowserToken(f"burg_drake_{number}", secret)
@@ -181,7 +183,7 @@ class LabHandler(BaseHTTPRequestHandler):
     def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
         try:
             path, query = address(self.path)
-            require_own_host(self._header, served=self.server.host, is_page=path == "/")
+            require_local_host(self._header, served=self.server.host, is_page=path == "/")
             self._require_browser(path, query)
             if self.command == "GET" and path.startswith("/picture/"):
                 self._send_picture(path.removeprefix("/picture/").removesuffix(".jpg"))
