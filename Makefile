@@ -8,11 +8,11 @@ DEMO := runs/demo$(if $(filter-out 100,$(N)),_$(N))
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint rules format types examples clean distclean
+.PHONY: help setup demo test test-fast lint rules format types examples clean distclean
 .DELETE_ON_ERROR:
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' Makefile
 	@echo "  variables: PYTHON=python3.12 (interpreter of the set-up), N=100 (grasps per object of the demo)"
 
 setup: $(STAMP)  ## create .venv with everything in it; system libraries too, where allowed
@@ -30,6 +30,9 @@ demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
 
 test: $(STAMP)  ## build the wheel, install it, test the installed wheel (ARGS=... go to pytest)
 	@tools/setup/test_wheel.sh $(VENV) $(ARGS)
+
+test-fast: $(STAMP)  ## test the checkout, without physics, in a minute (ARGS=... go to pytest)
+	$(BIN)/python -m pytest -m "not physics" $(ARGS)
 
 lint: rules format types  ## ruff and mypy
 

@@ -22,7 +22,7 @@ from mixed_grasps import SLIPPERY, sampled_set
 import burg_drake as burg
 from burg_drake.core.frames import Array
 from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.trajectory import Plan
+from burg_drake.motion.plans.grasp_plan import Plan
 from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.arm_trial import ArmTrial

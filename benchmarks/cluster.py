@@ -138,10 +138,10 @@ def finish(process: subprocess.Popen[bytes]) -> int:
 def children(pid: int) -> list[int]:
     """Processes that a process has started and that are alive, the first ones first."""
     try:
-        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+        texts = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
     except OSError:
         return []
-    return sorted(int(child) for child in text.split())
+    return sorted(int(child) for text in texts for child in text.split())
 
 
 def compare(one: Path, other: Path) -> None:

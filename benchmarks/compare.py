@@ -29,7 +29,7 @@ import numpy as np
 
 from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
-from burg_drake.experiment.comparison.comparison import compare
+from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.judge_assessment import judgement
 from burg_drake.experiment.comparison.of_runs import pairs_of_runs
 from burg_drake.experiment.pairing.matching import match_rows

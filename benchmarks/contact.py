@@ -202,12 +202,12 @@ def grasps_of(library: ObjectLibrary, name: str, pose: int, count: int) -> Array
     """Antipodal grasps (N, 4, 4) from above."""
     entry = library.entry(name)
     down = tuple((-entry.X_SO(pose)[2, :3]).tolist())
-    return burg.sample_antipodal(
+    return burg.grasps.sample_antipodal(
         library.surface(name),
         count,
         rng_from("contact", name, pose),
         friction=entry.friction,
-        approach_cone=burg.ApproachCone(down, CONE),
+        approach_cone=burg.grasps.ApproachCone(down, CONE),
     ).X_OG
 
 

@@ -132,10 +132,10 @@ def clear_grasps(trial: burg.HandTrial, resting: Resting, count: int) -> list[Ar
     """At most so many grasps (4, 4) for which the open hand is clear."""
     scene, station = trial.diagram.scene, trial.diagram.station
     X_WO = trial.diagram.X_WO("target")
-    cone = burg.ApproachCone(tuple(np.round(-X_WO[2, :3], 9)), CONE)
+    cone = burg.grasps.ApproachCone(tuple(np.round(-X_WO[2, :3], 9)), CONE)
     clear: list[Array] = []
     for batch in range(BATCHES):
-        grasps = burg.sample_antipodal(
+        grasps = burg.grasps.sample_antipodal(
             scene.library.surface(resting.object),
             BATCH,
             rng_from("engines", resting.id, batch),

@@ -97,10 +97,10 @@ def _wait(process: subprocess.Popen[bytes]) -> int:
 
 def _children(pid: int) -> list[int]:
     try:
-        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+        texts = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
     except OSError:
         return []
-    return sorted(int(child) for child in text.split())
+    return sorted(int(child) for text in texts for child in text.split())
 
 
 def _compare(verb: str, place: Path) -> None:

@@ -21,6 +21,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from burg_drake.core.grasps import MARGINS, Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import Candidates
@@ -31,7 +32,6 @@ from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.run.many_scenes import _document
 from burg_drake.evaluation.run.request import Request
 from burg_drake.evaluation.run.scene_list import read_scenes
-from burg_drake.evaluation.stages.judge import MARGINS, Verdict
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign, save_campaign
 from burg_drake.evaluation.store.part_writer import PartWriter
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, create_run

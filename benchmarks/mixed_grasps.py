@@ -42,13 +42,13 @@ def sampled_set(scene: Scene, station: Station, name: str, count: int) -> burg.G
     """Antipodal grasps on an instance, in its frame, from above; clear or not."""
     X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
     down_O = np.round(-X_WO[2, :3], 9)
-    return burg.sample_antipodal(
+    return burg.grasps.sample_antipodal(
         scene.library.surface(scene.instance(name).object),
         count,
         rng_from("mixed grasps", name),
         friction=scene.entry(name).friction,
         opening=station.hand.opening,
-        approach_cone=burg.ApproachCone(tuple(down_O), CONE),
+        approach_cone=burg.grasps.ApproachCone(tuple(down_O), CONE),
     )
 
 

@@ -19,8 +19,8 @@ from burg_drake.core.frames import Array
 from burg_drake.motion.reach.witness import Witness
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.mesh_replacement import mesh_by_pieces
 from burg_drake.station.document.station_document import Station
-from burg_drake.station.world.mesh_pieces import mesh_by_pieces
 
 DEEPER = 1e-3
 """What the target touches at rest counts where it gets deeper by more than that [m]."""

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from burg_drake.core.grasps import CPU_COLUMNS
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.table import CPU_COLUMNS
 from burg_drake.evaluation.store.loading import read_results
 
 

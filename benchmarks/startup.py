@@ -149,7 +149,7 @@ def sample(scene_name: str, station_name: str, count: int, grasps: Path, one: Pa
     """Writes grasps that the open hand is clear at, and the first of them as a file of grasps."""
     from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
     from burg_drake.scene.document.scene import load_scene
-    from burg_drake.station.diagram.builder import instance_pose
+    from burg_drake.station.diagram.station_diagram import instance_pose
     from burg_drake.station.document.station_document import load_station
 
     scene, station = load_scene(scene_name), load_station(station_name)

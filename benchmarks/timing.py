@@ -26,7 +26,8 @@ from burg_drake.core.paths.resources import data_root
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.ik.numeric import ArmKinematics
 from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.trajectory import Plan, Trajectory
+from burg_drake.motion.plans.grasp_plan import Plan
+from burg_drake.motion.plans.trajectory import Trajectory
 from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.motion.timing.grasp_timing import time_motion
 from burg_drake.motion.timing.line_path import line_error

@@ -8,17 +8,16 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.objects.meshes.surface import unit_scale
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
+import burg_drake as burg
 
 with tempfile.TemporaryDirectory() as folder:
     # A mesh as it comes from CAD: a tube, in millimetres, as .stl.
     mesh_file = Path(folder) / "tube.stl"
     trimesh.creation.annulus(r_min=20, r_max=25, height=80).export(mesh_file)
 
-    report = build_library(
-        [ObjectSource.from_file(mesh_file, scale=unit_scale("mm"), mass=0.12, friction=0.4)],
+    millimetre = burg.objects.unit_scale("mm")
+    report = burg.build_library(
+        [burg.ObjectSource.from_file(mesh_file, scale=millimetre, mass=0.12, friction=0.4)],
         Path(folder) / "my_library",
     )
     for name, message in report.failed.items():

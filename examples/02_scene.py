@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from burg_drake import build_station_diagram, load_scene, load_station
-from burg_drake.station.checks.scene_issues import check_scene
+import burg_drake as burg
 
-scene = load_scene("tabletop_six")
-station = load_station("panda_tabletop")
+scene = burg.load_scene("tabletop_six")
+station = burg.load_station("panda_tabletop")
 print(f"{scene.name}: {', '.join(scene.instances)} on {station.name}")
-for issue in check_scene(scene, station):  # bounds of the board, ground, overlaps
+for issue in burg.check_scene(scene, station):  # bounds of the board, ground, overlaps
     print(issue.message)
 
-built = build_station_diagram(scene, station, robot="none")
+built = burg.build_station_diagram(scene, station, robot="none")
 simulator = Simulator(built.diagram)
 simulator.AdvanceTo(0.5)
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from burg_drake import HandTrial, load_scene, load_station, sample_antipodal
-from burg_drake.core.content import rng_from
+import burg_drake as burg
 
-scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
 mesh = scene.library.surface("box")
-grasps = sample_antipodal(
-    mesh, 500, rng_from("example"), opening=station.hand.opening, object="box"
+grasps = burg.grasps.sample_antipodal(
+    mesh, 500, burg.frames.rng_from("example"), opening=station.hand.opening, object="box"
 )
 
-trial = HandTrial(scene, station)  # one diagram for all trials of the scene
+trial = burg.HandTrial(scene, station)  # one diagram for all trials of the scene
 X_WG = trial.diagram.X_WO("box") @ grasps.X_OG
 clear = [i for i, X in enumerate(X_WG) if trial.clearance.check("box", X).outcome is None]
 print(f"the open hand is clear at {len(clear)} of {len(grasps)} sampled grasps")

@@ -5,14 +5,13 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from burg_drake import evaluate
-from burg_drake.evaluation.store.run_folder import load_run
+import burg_drake as burg
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run"
-    evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=5, progress=False)
+    burg.evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=5, progress=False)
 
-    run = load_run(path)  # as one would at any later time, on any machine
+    run = burg.load_run(path)  # as one would at any later time, on any machine
     print(f"{len(run.verdicts)} grasps, judged with Drake {run.document.versions['drake']}")
     for outcome in sorted(set(run.results["outcome"])):
         print(f"{(run.results['outcome'] == outcome).sum():4d} {outcome}")

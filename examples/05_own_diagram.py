@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
 
-from burg_drake import build_station_diagram, load_scene, load_station
+import burg_drake as burg
 
 
 class Wave(LeafSystem):
@@ -30,9 +30,9 @@ class Wave(LeafSystem):
         output.SetFromVector([0.0, 0.0, -0.02, -0.02])
 
 
-station = load_station("panda_tabletop")
+station = burg.load_station("panda_tabletop")
 home = np.array(station.document.arm.home)
-built = build_station_diagram(load_scene("tabletop_six"), station, robot="arm")
+built = burg.build_station_diagram(burg.load_scene("tabletop_six"), station, robot="arm")
 
 builder = DiagramBuilder()
 builder.AddSystem(built.diagram)

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 
-from burg_drake import Plan, load_scene, load_station, plan, reach, sample_grasps
+import burg_drake as burg
 
-scene, station = load_scene("tabletop_six"), load_station("panda_bin")
-grasps = sample_grasps(scene, station, 8, only=["bowl", "banana"])
+scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_bin")
+grasps = burg.sample_grasps(scene, station, 8, only=["bowl", "banana"])
 
-judged = reach(scene, station, grasps)
+judged = burg.reach(scene, station, grasps)
 for outcome, count in Counter(judged.column("outcome").tolist()).most_common():
     blockers = set(judged.column("blocker")[judged.column("outcome") == outcome].tolist()) - {""}
     print(f"{count:4d} {outcome}", *sorted(blockers))
 
 good = judged.select(judged.column("outcome") == "reachable")
-found = plan(
+found = burg.plan(
     scene, station, str(good.column("instance")[0]), good.X_OG[0], width=float(good.width[0])
 )
-assert isinstance(found, Plan)
+assert isinstance(found, burg.Plan)
 for name, phase in found.phases.items():
     velocity, _, _ = phase.peaks()
     print(f"{name:9s} {phase.duration:5.2f} s, fastest joint {velocity.max():.2f} rad/s")

@@ -9,16 +9,14 @@ import numpy as np
 from PIL import Image
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from burg_drake import load_scene, load_station
-from burg_drake.cameras.systems.board_loop import build_board_loop
-from burg_drake.printout.board_printout import print_board
+import burg_drake as burg
 
-scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
-printout = print_board(scene)
+scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
+printout = burg.print_board(scene)
 print(f"{len(scene.board.layout.ids)} markers on {len(printout.tiling.tiles)} pages of A4")
 
 # simulated camera -> pose of the camera over the board -> overlay, in one Drake diagram
-loop = build_board_loop(scene, station, camera="board")
+loop = burg.cameras.build_board_loop(scene, station, camera="board")
 context = loop.diagram.CreateDefaultContext()
 views = {
     "as in the station": loop.X_SC(context),

@@ -20,13 +20,13 @@ with tempfile.TemporaryDirectory() as folder:
             scene, station, out, grasps=grasps, engine=engine, mode="hand", progress=False
         )
 
-    sheet = burg.plan_trials(simulated, per_object=4, out=path / "trials.yaml")
+    sheet = burg.trials.plan_trials(simulated, per_object=4, out=path / "trials.yaml")
     print(f"{len(sheet.trials)} trials, the first one of {sheet.trials[0].grasp}")
-    book, robot = burg.TrialBook(path / "trials.yaml"), burg.load_run(tried)
+    book, robot = burg.trials.TrialBook(path / "trials.yaml"), burg.load_run(tried)
     for trial in sheet.trials:
         book.record(trial.number, outcome=robot.row(trial.grasp)["outcome"], operator="engine")
 
-    found = burg.compare(simulated, path / "trials.yaml").judgement
+    found = burg.trials.compare(simulated, path / "trials.yaml").judgement
     for name in ("accuracy", "precision", "recall"):
         figure = getattr(found.selected, name)
         if figure.value is None:

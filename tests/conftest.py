@@ -1,5 +1,8 @@
 """What all tests share: one thread a process, a cache, Ctrl-C, and the generators under `tools/`.
 
+Worker processes import Drake and build their station again, which takes longer than most of what
+the tests ask of them. Tests that are not about processes ask for `judged_here`.
+
 The tests run against a checkout (editable install) and against an installed wheel alike
 (`make test`). `tools/` is in no wheel, and putting the root of the checkout on `sys.path` would
 shadow the wheel; therefore the package `tools`, and nothing else, is announced by hand.
@@ -8,13 +11,19 @@ shadow the wheel; therefore the package `tools`, and nothing else, is announced 
 from __future__ import annotations
 
 import atexit
+import gc
+import hashlib
 import os
 import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
+
+import pytest
 
 # pytest-xdist fills the cores with processes; read by OpenMP and OpenBLAS when they are loaded.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -38,3 +47,131 @@ def _announce_tools(folder: Path) -> None:
 
 
 _announce_tools(Path(__file__).resolve().parents[1] / "tools")
+
+
+PHYSICS = tuple(
+    Path(__file__).parent / name
+    for name in (
+        *("apps", "cameras", "compose", "evaluation", "experiment/gap", "experiment/pages"),
+        *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
+        *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
+        *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),
+        *("visualization", "test_document_code.py", "test_packaging.py", "test_typed_use.py"),
+    )
+)
+"""Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
+WITHOUT_PHYSICS = "not physics"
+
+
+def _is_physics(path: Path) -> bool:
+    return any(path == physics or physics in path.parents for physics in PHYSICS)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "physics: Drake, renderers, programs; see PHYSICS")
+    if gone := [str(path) for path in PHYSICS if not path.exists()]:
+        raise pytest.UsageError(f"{__file__}: PHYSICS names {', '.join(gone)}; name it as it is")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """What is not going to run is not imported either."""
+    left_out = config.option.markexpr == WITHOUT_PHYSICS and _is_physics(collection_path)
+    return True if left_out else None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if _is_physics(item.path):
+            item.add_marker(pytest.mark.physics)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, Any, Any]:
+    """Collecting makes millions of objects, nearly all of which stay: looking through them again
+    and again for garbage takes a third of the time, and later some of that of every test."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
+
+
+@pytest.fixture(scope="session")
+def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """How far pieces are from the mesh that they stand for is most of the work of building an
+    object, and tests build the same few ones: all workers of a run share what was measured."""
+    from burg_drake.objects.collision import fit
+
+    folder = tmp_path_factory.getbasetemp()
+    known = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "distances"
+    known.mkdir(exist_ok=True)
+    measure = fit._farthest
+
+    def farthest(points: Any, surface: Any) -> float:
+        digest = hashlib.blake2b(digest_size=16)
+        for array in (points, surface.vertices, surface.faces):
+            digest.update(repr((array.shape, array.dtype)).encode() + array.tobytes())
+        path = known / digest.hexdigest()
+        if not path.exists():
+            made = path.with_name(f"{path.name}.{os.getpid()}")
+            made.write_text(repr(measure(points, surface)))
+            made.replace(path)
+        return float(path.read_text())
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "_farthest", farthest)
+        yield
+
+
+@pytest.fixture(scope="module")
+def judged_here() -> Iterator[None]:
+    """What asks for one worker gets this process in its place."""
+    from burg_drake.evaluation.workers import JudgePool
+
+    with pytest.MonkeyPatch.context() as patch:
+        for user in ("executor", "single_job"):
+            patch.setattr(
+                f"burg_drake.evaluation.workers.{user}.JudgePool", _pool_or_this_process(JudgePool)
+            )
+        yield
+
+
+def _pool_or_this_process(pool: type) -> Any:
+    from burg_drake.core import BurgError
+    from burg_drake.evaluation.stages.judge import ScreenAnswers, judge_grasp, screen_grasps
+    from burg_drake.evaluation.workers import JobFailed
+
+    class ThisProcess:
+        """Judges the grasps of one job after the other, in their order, without limits of time."""
+
+        def run(self, jobs: Any, on_failure: Any = None) -> Iterator[tuple[Any, Any, Any]]:
+            for job in jobs:
+                if job is None or not job.candidates:
+                    continue
+                try:
+                    judge = job.make_judge()
+                except BurgError as error:
+                    if on_failure is None:
+                        raise
+                    on_failure(JobFailed(job, error))
+                    continue
+                grasps = [(candidate, ScreenAnswers()) for candidate in job.candidates]
+                for screen in judge.screens:
+                    passed = [grasp for grasp in grasps if grasp[1].outcome is None]
+                    answers: dict[str, ScreenAnswers] = {}
+                    for k in range(0, len(passed), screen.batch):
+                        batch = passed[k : k + screen.batch]
+                        for (candidate, _), answer in zip(
+                            batch, screen_grasps(judge, batch), strict=True
+                        ):
+                            answers[candidate.id] = answer
+                    grasps = [(c, answers.get(c.id, answer)) for c, answer in grasps]
+                for candidate, answer in grasps:
+                    yield job, candidate, judge_grasp(judge, candidate, screened=answer)
+
+        def dismiss(self) -> None:
+            pass
+
+    return lambda count, limits: ThisProcess() if count == 1 else pool(count, limits)

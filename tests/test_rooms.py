@@ -1,60 +1,241 @@
-"""Imports between the packages only point one way."""
+"""The order of the house: imports between and within rooms point one way and go through faces.
+
+What a rule finds is shown on small packages that break it.
+"""
 
 from __future__ import annotations
 
-import ast
+import re
 from pathlib import Path
 
 import pytest
 
 import burg_drake
+from tests.imports import Import, Package
+from tests.rules import (
+    beside_faces,
+    crowded,
+    defined_twice,
+    eager,
+    imports_drake,
+    loaded_with,
+    orders,
+    unplaced,
+    upward,
+    wrong_faces,
+)
 
-PACKAGE = Path(burg_drake.__file__).parent
-# A room may import itself and the rooms before it.
-ROOMS = [
+HOUSE = Package(Path(burg_drake.__file__).parent)
+ARCHITECTURE = Path(__file__).parents[1] / "ARCHITECTURE.md"
+ROOMS = {
+    "core": "files documents paths grasps terminal workers",
+    "geometry": "",
+    "formats": "common grasps collections",
+    "objects": "library meshes physics collision",
+    "scene": "document arrangement",
+    "printout": "",
+    "station": "document world control diagram checks",
+    "export": "",
+    "cameras": "optics sources calibration pose rectification projection placement overlay systems"
+    " live",
+    "ros": "",
+    "grasping": "similarity sampling quality comparison clearance",
+    "motion": "ik proximity collision sweep lines transit reach plans timing workspace",
+    "simulation": "rest settling trials robustness",
+    "pipeline": "",
+    "visualization": "style meshcat pictures grasps gallery scenes",
+    "evaluation": "candidates stages workers cluster records store results grasp_sets robustness"
+    " report run merge",
+    "generation": "",
+    "experiment": "trials planning statistics pairing comparison gap pages",
+    "compose": "document commands storage background editing",
+    "ui": "server widgets view pointing panels",
+    "apps": "terminal options web library scene camera ar grasps runs comparison trials",
+}
+"""Rooms, each with its sub-rooms. A room or sub-room imports those before it and itself."""
+WITHIN = {"evaluation.report": "elements sections"}
+"""Sub-rooms of sub-rooms, where there are several."""
+WITHOUT_DRAKE = [
     "core",
     "geometry",
     "formats",
     "objects",
     "scene",
     "printout",
-    "station",
     "export",
-    "cameras",
-    "ros",
-    "grasping",
-    "motion",
-    "simulation",
-    "pipeline",
-    "visualization",
-    "evaluation",
-    "generation",
-    "experiment",
     "compose",
-    "ui",
-    "apps",
+    "ros",
 ]
+"""Rooms that never import pydrake."""
+LIGHT = {"numpy", "rich", "lazy_loader"}
+"""What the command line may load before it knows what is asked."""
 
 
-def imported_rooms(path: Path) -> set[str]:
-    modules = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            modules |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            modules |= {f"{node.module}.{alias.name}" for alias in node.names}
-    parts = [module.split(".") for module in modules]
-    return {name[1] for name in parts if name[0] == "burg_drake" and len(name) > 1} & set(ROOMS)
+# --- the house ------------------------------------------------------------------------------------
 
 
-def test_every_package_is_a_room() -> None:
-    packages = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
-    assert packages <= set(ROOMS)
+def test_every_package_has_its_place() -> None:
+    assert unplaced(HOUSE, orders(ROOMS, WITHIN)) == []
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_imports_point_to_the_rooms_before(room: str) -> None:
-    allowed = set(ROOMS[: ROOMS.index(room) + 1])
-    for path in (PACKAGE / room).rglob("*.py"):
-        assert imported_rooms(path) <= allowed, path
+def test_imports_point_to_what_comes_before() -> None:
+    assert upward(HOUSE, orders(ROOMS, WITHIN)) == []
+
+
+def test_no_modules_need_each_other() -> None:
+    assert HOUSE.circles() == []
+
+
+def test_imports_from_elsewhere_go_through_faces() -> None:
+    assert beside_faces(HOUSE) == []
+
+
+def test_faces_show_what_there_is() -> None:
+    assert wrong_faces(HOUSE) == []
+
+
+def test_one_name_means_one_thing() -> None:
+    assert defined_twice(HOUSE) == []
+
+
+def test_folders_are_not_crowded() -> None:
+    assert crowded(HOUSE) == []
+
+
+def test_what_need_not_be_there_is_imported_where_it_is_needed() -> None:
+    assert eager(HOUSE) == []
+
+
+def test_rooms_without_drake() -> None:
+    assert imports_drake(HOUSE, WITHOUT_DRAKE) == []
+
+
+def test_the_command_line_begins_light() -> None:
+    assert loaded_with(HOUSE, f"{HOUSE.name}.apps.cli") <= LIGHT
+
+
+@pytest.mark.skipif(not ARCHITECTURE.exists(), reason="tests of an installed package")
+def test_the_table_of_rooms_is_complete_and_in_order() -> None:
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|", ARCHITECTURE.read_text("utf-8"), re.MULTILINE)
+    assert {room: " ".join(re.findall(r"`(\w+)`", subs)) for room, subs in rows} == ROOMS
+    assert [room for room, _ in rows] == list(ROOMS)
+
+
+# --- what the rules find --------------------------------------------------------------------------
+
+
+def built(tmp_path: Path, **files: str) -> Package:
+    """A package `house` of modules with a text, `a_in_low` for low/a.py."""
+    for name, text in files.items():
+        path = tmp_path.joinpath("house", *name.split("_in_")[::-1]).with_suffix(".py")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    for folder in [tmp_path / "house", *(tmp_path / "house").rglob("*/")]:
+        (folder / "__init__.py").touch()
+    return Package(tmp_path / "house")
+
+
+def face(package: Package, room: str, text: str) -> Package:
+    """The same with a stub of a room."""
+    (package.folder / room / "__init__.pyi").write_text(text)
+    return Package(package.folder)
+
+
+ORDER = orders({"low": "cellar hall", "high": ""}, {})
+
+
+def test_a_room_without_a_place_is_found(tmp_path: Path) -> None:
+    house = built(tmp_path, a_in_low="", b_in_high="", c_in_attic="", d_in_cellar_in_low="")
+    assert unplaced(house, ORDER) == ["house: ['attic']", "house.low: ['hall']"]
+
+
+def test_a_room_that_imports_a_later_one_is_found(tmp_path: Path) -> None:
+    house = built(tmp_path, a_in_low="def f():\n    from house.high import g", b_in_high="g = 1")
+    house = face(house, "high", "from .b import g as g")
+    assert upward(house, ORDER) == ["house.low.a:2 imports g from house.high"]
+
+
+def test_a_sub_room_that_imports_a_later_one_is_found(tmp_path: Path) -> None:
+    text = "from house.low.hall.b import g"
+    house = built(tmp_path, a_in_cellar_in_low=text, b_in_hall_in_low="g = 1")
+    assert upward(house, ORDER) == ["house.low.cellar.a:1 imports g from house.low.hall.b"]
+
+
+def test_a_module_above_and_below_its_sub_rooms_is_found(tmp_path: Path) -> None:
+    house = built(
+        tmp_path,
+        a_in_cellar_in_low="from house.low.stairs import f",
+        stairs_in_low="from house.low.hall.b import g as f",
+        b_in_hall_in_low="g = 1",
+    )
+    assert upward(house, ORDER) == ["house.low.cellar.a:1 imports f from house.low.stairs"]
+
+
+@pytest.mark.parametrize("back", ["from house.low.a import f", "def h():\n    import house.low.a"])
+def test_modules_that_need_each_other_are_found(tmp_path: Path, back: str) -> None:
+    house = built(
+        tmp_path, a_in_low="from house.low.b import g", b_in_low="from house.low.c import g"
+    )
+    assert house.circles() == []
+    house = built(tmp_path, c_in_low=f"{back}\ng = 1")
+    assert house.circles() == [["house.low.a", "house.low.b", "house.low.c"]]
+
+
+def test_a_circle_through_a_face_is_found(tmp_path: Path) -> None:
+    house = built(
+        tmp_path, a_in_low="from house.high import g", b_in_high="from house.low import f"
+    )
+    face(house, "low", "from .a import f as f")
+    assert face(house, "high", "from .b import g as g").circles() == [
+        ["house.high.b", "house.low.a"]
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["from house.low.a import f", "from house.low import g", "from house.low import a",
+     "import house.low.a"],
+)  # fmt: skip
+def test_an_import_past_a_face_is_found(tmp_path: Path, text: str) -> None:
+    house = built(tmp_path, a_in_low="f = g = 1", b_in_high=f"from house.low import f\n{text}")
+    found = beside_faces(face(house, "low", "from .a import f as f"))
+    assert len(found) == 1 and found[0].startswith("house.high.b:2 imports")
+
+
+def test_a_face_that_shows_what_there_is_not_is_found(tmp_path: Path) -> None:
+    house = built(tmp_path, a_in_low="f = 1", g_in_low="g = 1")
+    text = "from .a import f as f, h as h\nfrom .g import g as g"
+    assert wrong_faces(face(house, "low", text)) == [
+        "house.low shows h, which house.low.a does not have",
+        "house.low shows g, which is the name of a module",
+    ]
+
+
+def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:
+    house = built(tmp_path, a_in_low="class Ball: ...", b_in_high="class Ball: ...")
+    assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+def test_a_crowded_folder_is_found(tmp_path: Path) -> None:
+    house = built(tmp_path, **{f"m{k}_in_low": "" for k in range(16)})
+    assert crowded(house) == ["house.low has 16 modules"]
+
+
+def test_eager_imports_are_found(tmp_path: Path) -> None:
+    house = built(
+        tmp_path,
+        a_in_low="if True:\n    import pandas\ndef f():\n    import pyarrow",
+        b_in_ui="import viser",
+        c_in_apps="from house.low import g\nimport json",
+        d_in_low="from pydrake.math import X as g",
+    )
+    assert eager(house) == ["house.low.a imports pandas at its top"]
+    assert imports_drake(house, ["low"]) == ["house.low.d:1 imports pydrake"]
+    house = face(house, "low", "from .d import g as g")
+    assert loaded_with(house, "house.apps.c") == {"pydrake"}
+    (house.folder / "low" / "__init__.py").write_text("from house.low.a import f")
+    assert eager(Package(house.folder))[0] == "the face house.low imports house"
+
+
+def test_an_import_says_where_it_is() -> None:
+    assert str(Import("a.b", "c", "d", 3)) == "a.b:3 imports d from c"

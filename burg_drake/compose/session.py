@@ -28,7 +28,7 @@ from burg_drake.core import BurgError, InvalidInputError, UnknownNameError, near
 from burg_drake.core.paths import builtin_names, portable_reference
 from burg_drake.objects.library import LIBRARY_FILE, load_library
 from burg_drake.scene.document import load_scene
-from burg_drake.station.document import Station
+from burg_drake.station.document import StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.printout import Printout, PrintSettings
@@ -46,19 +46,21 @@ class ComposeSession(BackgroundEditor):
         folder: scenes are saved to and loaded from here, and nowhere else.
     """
 
-    def __init__(self, opened: Opened, station: Station, folder: Path, address: str = "") -> None:
+    def __init__(
+        self, opened: Opened, station: StationLike, folder: Path, address: str = ""
+    ) -> None:
         self.folder = folder
         self._address = address
         self._watch: LibraryWatch | None = None
         self._seen: str | None = opened.storage.known
-        super().__init__(opened, station)
+        super().__init__(opened, as_station(station))
         self.refresh()
 
     @classmethod
     def open(
         cls,
         reference: str | Path,
-        station: Station,
+        station: StationLike,
         *,
         folder: str | Path | None = None,
         address: str = "",

@@ -61,8 +61,21 @@ class SimulationError(BurgError, RuntimeError):
     """Drake could not step or evaluate a diagram that should have been sound."""
 
 
-class WorkerEnded(SimulationError):
-    """A worker process was ended from outside, through no fault of its work."""
+class WorkerDied(SimulationError):
+    """A worker process ended while it was at a task, or built what the task needs.
+
+    Attributes:
+        from_outside: whether it was ended from outside, through no fault of its task: by the
+            system as memory ran out, by a batch system, by a user.
+    """
+
+    def __init__(self, message: str, from_outside: bool = False) -> None:
+        super().__init__(message)
+        self.from_outside = from_outside
+
+
+class TaskCancelled(BurgError):
+    """Nobody waits for the result of a task any more."""
 
 
 class ClusterError(BurgError, RuntimeError):

@@ -21,9 +21,11 @@ from .stages.judge import (
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
-    Verdict as Verdict,
 )
-from .stages.station_judge import StationJudge as StationJudge
+from .stages.station_judge import (
+    StationJudge as StationJudge,
+    build_judge as build_judge,
+)
 from .store.run_folder import (
     Run as Run,
     load_run as load_run,

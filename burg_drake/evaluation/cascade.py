@@ -17,6 +17,7 @@ from typing import overload
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Mode
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG, given_candidates
@@ -38,7 +39,7 @@ from burg_drake.evaluation.run import (
     require_judged,
     require_sound as _require_sound,
 )
-from burg_drake.evaluation.stages import Mode, StationJudgeFactory, mode_for
+from burg_drake.evaluation.stages import StationJudgeFactory, mode_for
 from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,
@@ -49,23 +50,21 @@ from burg_drake.evaluation.store import (
     save_run,
 )
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
-from burg_drake.scene.document import Scene, load_scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 from burg_drake.station.document import (
     ENGINES,
     Engine,
     GraspMotion,
-    Station,
+    StationLike,
+    as_station,
     engine_preset,
-    load_station,
 )
-
-SceneReference = Scene | str | Path
 
 
 @overload
 def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts, too
-    scene: SceneReference,
-    station: Station | str | Path,
+    scene: SceneLike,
+    station: StationLike,
     out: str | Path,
     *,
     grasps_per_object: int = ...,
@@ -89,8 +88,8 @@ def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts
 
 @overload
 def evaluate(
-    scene: Sequence[SceneReference],
-    station: Station | str | Path,
+    scene: Sequence[SceneLike],
+    station: StationLike,
     out: str | Path,
     *,
     grasps_per_object: int = ...,
@@ -113,8 +112,8 @@ def evaluate(
 
 
 def evaluate(
-    scene: SceneReference | Sequence[SceneReference],
-    station: Station | str | Path,
+    scene: SceneLike | Sequence[SceneLike],
+    station: StationLike,
     out: str | Path,
     *,
     grasps_per_object: int = 100,
@@ -191,7 +190,7 @@ def evaluate(
     """
     if grasps is None and grasps_per_object < 1:
         raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
-    station = station if isinstance(station, Station) else load_station(station)
+    station = as_station(station)
     if executor is None:
         executor = LocalExecutor(default_workers() if workers is None else workers)
     elif workers is not None:
@@ -223,13 +222,13 @@ def evaluate(
 
 
 def _evaluate_one(
-    scene: SceneReference,
+    scene: SceneLike,
     request: Request,
     folder: Path,
     executor: Executor,
     progress: bool | Listener,
 ) -> Run:
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
+    scene = as_scene(scene)
     station, mode = request.station, request.mode
     request.asked(scene)
     given = request.given(scene)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
-from burg_drake.core.grasps import GraspSet, Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, GraspSet, Outcome, Stage, Verdict
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import (
@@ -24,10 +24,8 @@ from burg_drake.evaluation.candidates import (
 from burg_drake.evaluation.grasp_sets import by_names, set_documents
 from burg_drake.evaluation.records import Columns, input_of, numbers
 from burg_drake.evaluation.stages import (
-    LIFT_HEIGHT,
     Decide,
     Decision,
-    Verdict,
     arm_reach,
     arm_screen,
     arm_settings,
@@ -40,8 +38,8 @@ from burg_drake.evaluation.workers import judge_all
 from burg_drake.motion.lines import ReachSettings
 from burg_drake.motion.plans import Plan
 from burg_drake.motion.reach import Witness
-from burg_drake.scene.document import Scene, load_scene
-from burg_drake.station.document import GraspMotion, Station, load_station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import GraspMotion, Station, StationLike, as_station
 
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
@@ -51,8 +49,8 @@ MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess", LIFT_HEIGHT)
 
 
 def reach(
-    scene: Scene | str | Path,
-    station: Station | str | Path,
+    scene: SceneLike,
+    station: StationLike,
     grasps: GraspSet | Mapping[str, GraspSet],
     *,
     motion: GraspMotion | None = None,
@@ -78,12 +76,12 @@ def reach(
         exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
             screening, several times faster.
         plans: folder that gets the timed motion of each grasp that the arm can execute, as
-            `INSTANCE-GRASP.json`, see `motion.plan_file`: a new or empty one, or that of an
+            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
             interrupted call, which the same call goes on with. What is finished is kept, and
             grasps are tried again whose worker process was ended from outside or whose plan is
             missing.
         plan_format: `csv` for tables, with what their columns are beside them; see
-            `motion.plan_csv`. `load_plan` reads both.
+            `plans.csv_file`. `load_plan` reads both.
         retry_failed: try all grasps again that an earlier call with these `plans` could not judge.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
@@ -107,8 +105,7 @@ def reach(
     """
     from burg_drake.motion.workspace import require_usable_arm
 
-    scene = scene if isinstance(scene, Scene) else load_scene(scene)
-    station = station if isinstance(station, Station) else load_station(station)
+    scene, station = as_scene(scene), as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
             f"station {station.name!r} has no arm, of which one could ask what it can reach; give"

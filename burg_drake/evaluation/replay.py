@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from burg_drake.core.grasps import Stage
-from burg_drake.evaluation.records import RecordedTrial, TrialOrigin, motion_text, software_versions
-from burg_drake.evaluation.stages import (
+from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
-    MARGINS,
+    VERDICT_FIELDS,
+    Margins,
     Mode,
-    StationJudge,
+    Stage,
     Verdict,
-    judge_grasp,
-    mode_for,
 )
+from burg_drake.evaluation.records import RecordedTrial, TrialOrigin, motion_text, software_versions
+from burg_drake.evaluation.stages import build_judge, judge_grasp, mode_for
 from burg_drake.motion.plans import Plan
 from burg_drake.scene.document import Scene
-from burg_drake.simulation.trials import Margins, TrialResult
+from burg_drake.simulation.trials import TrialResult
 from burg_drake.station.document import GraspMotion, Station
 
 ROUNDING = 1e-14
@@ -65,7 +64,7 @@ def rerun(
     Raises:
         InvalidInputError: settings that this release lacks, or an unsound scene.
     """
-    judge = StationJudge(
+    judge = build_judge(
         scene,
         station,
         engine=origin.engine,
@@ -91,7 +90,7 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     if math.isnan(recorded.margins.get(LIFT_HEIGHT, math.nan)):  # likewise, or of a trial alone
         here.pop(LIFT_HEIGHT, None)
     # The arm may have passed a grasp on, and is not asked again.
-    for name in (*ARM_SCREEN_MARGINS, LIFT_HEIGHT):
+    for name in ARM_SCREEN_MARGINS:
         if name not in here:
             there.pop(name, None)
     found = []
@@ -121,13 +120,15 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
 
 
 def _results(verdict: Verdict) -> dict[str, float | str]:
-    margins = {name: verdict.margins[name] for name in MARGINS if name in verdict.margins}
-    if margins.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
-        del margins["end_time"]
-    moved = {f"moved {name}": value for name, value in verdict.displacements.items()}
-    pushed = {f"pushed {name}": value for name, value in verdict.pushed.items()}
-    texts = {"blocker": verdict.blocker, "touched": verdict.touched}
-    return {"outcome": verdict.outcome.value, **texts, **margins, **moved, **pushed}
+    """What is compared, by the name that people read: texts first."""
+    found = {
+        name: value
+        for one in VERDICT_FIELDS
+        for name, value in one.compared(getattr(verdict, one.name)).items()
+    }
+    if found.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
+        del found["end_time"]
+    return dict(sorted(found.items(), key=lambda one: not isinstance(one[1], str)))
 
 
 def _bits(value: float | str) -> str:
@@ -160,15 +161,8 @@ def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
 
 def as_result(verdict: Verdict) -> TrialResult:
     """A verdict as a trial returns it."""
-    return TrialResult(
-        outcome=verdict.outcome,
-        margins=Margins(**{k: v for k, v in verdict.margins.items() if k in _OF_TRIALS}),
-        blocker=verdict.blocker,
-        reason=verdict.reason,
-        displacements=verdict.displacements,
-        pushed=verdict.pushed,
-        touched=verdict.touched,
-    )
+    margins = Margins(**{k: v for k, v in verdict.margins.items() if k in _OF_TRIALS})
+    return TrialResult(outcome=verdict.outcome, **verdict.of_trial() | {"margins": margins})
 
 
-_OF_TRIALS = {field.name for field in fields(Margins)}
+_OF_TRIALS = Margins().of_trial().keys()

@@ -1,1 +1,8 @@
-from .scene_export import export_scene as export_scene
+from .layout import (
+    Layout as Layout,
+    PlacedObject as PlacedObject,
+)
+from .scene_export import (
+    Exported as Exported,
+    export_scene as export_scene,
+)

@@ -17,8 +17,8 @@ from burg_drake.export.folder import (
     write_record,
 )
 from burg_drake.export.layout import Layout, lay_out
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import StationLike, as_station
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Exported:
 
 
 def export_scene(
-    scene: Scene, folder: str | Path, to: str, station: Station | None = None
+    scene: SceneLike, folder: str | Path, to: str, station: StationLike | None = None
 ) -> Exported:
     """Writes a scene for another program: a folder that can be moved or zipped as it is.
 
@@ -84,6 +84,8 @@ def export_scene(
         MeshError: a mesh of the library is damaged.
         MissingDependencyError: `usd` without the package usd-core.
     """
+    scene = as_scene(scene)
+    station = None if station is None else as_station(station)
     if to not in FORMATS:
         raise UnknownNameError(f"format {to!r} does not exist; {nearest(to, FORMATS)}")
     chosen = FORMATS[to]

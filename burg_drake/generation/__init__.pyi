@@ -1,3 +1,4 @@
+from .folder import SceneRow as SceneRow
 from .many import (
     SampledFolder as SampledFolder,
     sample_scenes as sample_scenes,

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError, SimulationError
-from burg_drake.core.workers import serve, work_through
+from burg_drake.core.workers import map_unordered
 from burg_drake.evaluation.stages import one_line
 from burg_drake.generation.folder import SceneFolder, SceneRow
 from burg_drake.generation.sample import (
@@ -19,7 +19,7 @@ from burg_drake.generation.sample import (
 )
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import SamplingProvenance, SceneRecipe
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import Station, StationLike, as_station, load_station
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class SampledFolder:
 def sample_scenes(
     recipe: SceneRecipe,
     library: ObjectLibrary,
-    station: Station,
+    station: StationLike,
     folder: str | Path,
     count: int,
     *,
@@ -89,6 +89,7 @@ def sample_scenes(
     Raises:
         InvalidInputError, UnknownNameError: see `SceneFolder` and `require_possible`.
     """
+    station = as_station(station)
     require_possible(recipe, library, station)
     ingredients = provenance_of(recipe, library, station)
     with SceneFolder(folder, ingredients) as opened:
@@ -99,7 +100,7 @@ def sample_scenes(
         new: list[int] = []
         failed: dict[int, str] = {}
         try:
-            for work, outcome in work_through(todo, workers, __name__, attempt):
+            for work, outcome in map_unordered(sample_scene, todo, workers):
                 if isinstance(outcome, BaseException):
                     failed[work.number] = one_line(outcome)
                     continue
@@ -113,19 +114,17 @@ def sample_scenes(
     return SampledFolder(rows, tuple(sorted(new)), failed)
 
 
-def attempt(work: SceneTask) -> SampledScene | BaseException:
-    """Samples one scene; what cannot be simulated is one failure."""
+def sample_scene(work: SceneTask) -> SampledScene:
+    """Samples one scene.
+
+    Raises:
+        SimulationError: Drake ended by a failed condition.
+        Exception: what cannot be simulated is one failure.
+    """
     try:
         return _sampler(work.kitchen).sample(work.number, work.kitchen.folder)
-    except Exception as error:
-        return error
     except SystemExit as error:  # DRAKE_DEMAND ends this way
-        return SimulationError(f"Drake gave up: {error}")
-
-
-def main(handle: int) -> None:
-    """Runs a worker; `handle` is the file descriptor of its end of the pipe."""
-    serve(handle, attempt)
+        raise SimulationError(f"Drake gave up: {error}") from error
 
 
 def _kitchen(

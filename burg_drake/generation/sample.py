@@ -28,7 +28,13 @@ from burg_drake.scene.document import (
 )
 from burg_drake.simulation.settling import settle_scene
 from burg_drake.station.checks import SceneCheck
-from burg_drake.station.document import MODEL_NAMES, Station, boxes_in_scene, load_station
+from burg_drake.station.document import (
+    MODEL_NAMES,
+    Station,
+    StationLike,
+    as_station,
+    boxes_in_scene,
+)
 
 NO_ROOM = "an object found no place"
 REASONS = {
@@ -181,7 +187,7 @@ class SceneSampler:
 def sample_scene(
     recipe: SceneRecipe,
     library: ObjectLibrary | None = None,
-    station: Station | None = None,
+    station: StationLike | None = None,
     *,
     number: int = 0,
 ) -> SampledScene:
@@ -198,7 +204,7 @@ def sample_scene(
         BurgError: the station or an object cannot be built.
     """
     library = library or load_library(recipe.library)
-    station = station or load_station(recipe.station)
+    station = as_station(recipe.station if station is None else station)
     return SceneSampler(recipe, library, station).sample(number)
 
 

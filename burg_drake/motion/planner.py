@@ -14,8 +14,8 @@ from burg_drake.motion.lines import ReachSettings
 from burg_drake.motion.plans import Plan, PlanOrigin
 from burg_drake.motion.reach import ArmReach, Reach, Witness
 from burg_drake.motion.timing import IsFree, PathChecks, TimingSettings, time_motion
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import StationLike, as_station
 
 GRIP_TIME = 0.2
 """Time to build up the force, after the fingers had time to close [s]."""
@@ -140,8 +140,8 @@ class Planner:
 
 
 def plan(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     instance: str,
     X_OG: ArrayLike,
     *,
@@ -168,5 +168,6 @@ def plan(
             something collides, or a joint has no limit of velocity.
         UnknownNameError: the scene has no such instance.
     """
+    scene, station = as_scene(scene), as_station(station)
     planner = Planner(ArmReach(scene, station, settings=reach), settings=timing)
     return planner.plan(instance, X_OG, width)

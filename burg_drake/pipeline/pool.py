@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from burg_drake.core import SimulationError
-from burg_drake.core.workers import serve, work_through
+from burg_drake.core.workers import map_unordered
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.stages import Built, build_object
@@ -32,25 +32,22 @@ class BuildTask:
     confirm: bool
 
 
-Outcome = Built | BaseException
+def build_all(
+    work: Sequence[BuildTask], workers: int
+) -> Iterator[tuple[BuildTask, Built | BaseException]]:
+    """Builds objects, each with what came of it; see `core.workers.map_unordered`."""
+    return map_unordered(build, work, workers)
 
 
-def build_all(work: Sequence[BuildTask], workers: int) -> Iterator[tuple[BuildTask, Outcome]]:
-    """Builds objects; see `core.crew.work_through`."""
-    return work_through(work, workers, __name__, attempt)
+def build(item: BuildTask) -> Built:
+    """Builds one object.
 
-
-def attempt(item: BuildTask) -> Outcome:
-    """Builds one object; one broken mesh is one failure, whatever it broke."""
+    Raises:
+        SimulationError: Drake ended by a failed condition.
+        Exception: a broken mesh is one failure, whatever it breaks.
+    """
+    item.folder.mkdir()
     try:
-        item.folder.mkdir()
         return build_object(item.source, item.keys, item.root, item.folder, item.confirm)
-    except Exception as error:
-        return error
     except SystemExit as error:  # DRAKE_DEMAND ends this way
-        return SimulationError(f"Drake gave up: {error}")
-
-
-def main(handle: int) -> None:
-    """Runs a worker; `handle` is the file descriptor of its end of the pipe."""
-    serve(handle, attempt)
+        raise SimulationError(f"Drake gave up: {error}") from error

@@ -18,3 +18,11 @@ from .pen import (
     Pen as Pen,
     rectangle as rectangle,
 )
+from .relief import (
+    HeightMap as HeightMap,
+    height_map as height_map,
+)
+from .tiling import (
+    Tile as Tile,
+    Tiling as Tiling,
+)

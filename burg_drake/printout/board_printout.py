@@ -21,7 +21,7 @@ from burg_drake.printout.paper import PAPERS, Paper, orientations
 from burg_drake.printout.pen import POINT, WHITE, Pen, rectangle
 from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
 from burg_drake.printout.tiling import Tile, Tiling, tile_board
-from burg_drake.scene.document import EDGE, MarkerLayout, Scene, validate_scene
+from burg_drake.scene.document import EDGE, MarkerLayout, Scene, SceneLike, as_scene, validate_scene
 
 MEASURED = (0.080, 0.125)
 """What a printed ruler of 100 mm can measure [m]; else it was read in another unit."""
@@ -103,7 +103,7 @@ class Printout:
         atomic_write(path, self.pdf)
 
 
-def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout:
+def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Printout:
     """Prints the board of a scene.
 
     Args:
@@ -114,6 +114,7 @@ def print_board(scene: Scene, settings: PrintSettings | None = None) -> Printout
         UnknownNameError: there is no such page; a mesh file is missing.
         InvalidInputError: no markers fit on the board, or none on a page; too many pages.
     """
+    scene = as_scene(scene)
     scene.require_markers()
     settings = settings or PrintSettings()
     size, layout = scene.board.size, scene.board.layout

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from burg_drake.core import InvalidInputError, transform_points
 from burg_drake.printout.projection import Grid, Layer, lowest_of, lowest_surface
 from burg_drake.printout.tints import FIXED_HUE, Rgb, hue, luma_at, tint
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 RESOLUTION = 0.5e-3
 """Side of a pixel of a height map, if not told otherwise [m]."""
@@ -44,7 +44,7 @@ class HeightMap:
     resolution: float
 
 
-def height_map(scene: Scene, resolution: float = RESOLUTION) -> HeightMap:
+def height_map(scene: SceneLike, resolution: float = RESOLUTION) -> HeightMap:
     """The height map of a scene, without markers.
 
     Args:
@@ -55,6 +55,7 @@ def height_map(scene: Scene, resolution: float = RESOLUTION) -> HeightMap:
         InvalidInputError: the resolution makes no image, or too large a one.
         UnknownNameError: a mesh file is missing.
     """
+    scene = as_scene(scene)
     size = scene.board.size
     if not resolution > 0.0 or size[0] * size[1] / resolution**2 > MAX_PIXELS:
         raise InvalidInputError(

@@ -1,1 +1,5 @@
 """Executed grasp trials: phases, success criteria and margins."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -30,6 +30,11 @@ X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p
 """One that lifts the box, one that collides with it, one in thin air."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _judged_here(judged_here: None, measured_once: None) -> None:
+    """What the verbs say and write is not about processes; `tests/evaluation` has those."""
+
+
 @pytest.fixture
 def mesh(tmp_path: Path) -> Path:
     """A block of 50 x 40 x 60 mm, in metres."""
@@ -56,6 +61,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "panda_tabletop",
         folder,
         grasps={"box": grasps},
+        engine="screening",
         workers=1,
         mode="hand",
         progress=False,

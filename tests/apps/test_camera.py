@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.camera.verbs import field_of_view
+from burg_drake.apps.camera.intrinsics_text import field_of_view
 from burg_drake.apps.cli import main
 from burg_drake.cameras.calibration.target import CharucoTarget
 from burg_drake.cameras.optics.intrinsics import Intrinsics

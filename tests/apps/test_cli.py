@@ -22,9 +22,9 @@ from burg_drake.apps.options.arguments import (
 )
 from burg_drake.apps.runs import evaluate
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.grasps import MODES
 from burg_drake.core.paths.resources import builtin_names
 from burg_drake.evaluation.candidates.sampling import DEFAULT_APPROACH_ANGLE_DEG
-from burg_drake.evaluation.stages.mode import MODES
 from burg_drake.station.document.engine import ENGINES
 
 GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"], ["trials"])
@@ -202,7 +202,8 @@ def test_an_interrupt_behind_another_error_is_an_interrupt(
 
 def test_further_interrupts_change_nothing() -> None:
     code = (
-        "import os, signal, sys\nfrom burg_drake.apps import cli, report\n"
+        "import os, signal, sys\nfrom burg_drake.apps import cli\n"
+        "from burg_drake.apps.runs import report\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def interrupt(*_): os.kill(os.getpid(), signal.SIGINT)\n"
         "report.run_report = interrupt\nsys.argv[1:] = ['report', 'somewhere']\n"
@@ -261,7 +262,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 def test_names_that_are_no_text_are_printed() -> None:
     code = (
-        "import sys\nfrom burg_drake.apps import cli, report\n"
+        "import sys\nfrom burg_drake.apps import cli\nfrom burg_drake.apps.runs import report\n"
         "report.run_report = lambda _: print('\\udcff') or 0\nsys.argv[1:] = ['report', 'x']\n"
         "sys.exit(cli.main())"
     )

@@ -10,6 +10,7 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.apps.runs import robustness
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.columns import describe
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.progress import Progress
@@ -18,7 +19,6 @@ from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.robustness import assessment as tested, probes
 from burg_drake.evaluation.robustness.assessment import assess_robustness
 from burg_drake.evaluation.robustness.probes import RobustnessSettings
-from burg_drake.evaluation.stages.judge import Verdict
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.simulation.robustness.friction_search import friction_limit
 from burg_drake.simulation.robustness.grip import Grip, take_grip

@@ -15,10 +15,10 @@ from burg_drake.apps.cli import main
 from burg_drake.apps.options.retries import how_to_retry
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.records.journal import Journal
-from burg_drake.evaluation.stages.judge import Verdict
 from burg_drake.evaluation.store.run_folder import Run, load_run, save_run
 
 Capture = pytest.CaptureFixture[str]
@@ -91,7 +91,7 @@ def test_failures_to_report_end_with_1(
 ) -> None:
     failed = run.results["id"][:2].tolist()
     monkeypatch.setattr(Run, "failures", failed)
-    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", lambda *a, **k: run)
+    monkeypatch.setattr("burg_drake.evaluation.evaluate", lambda *a, **k: run)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: 2 of 3 grasps could not be simulated, such as {failed[0]}")
@@ -110,6 +110,7 @@ def test_what_was_ended_from_outside_is_tried_again_by_the_same_command(
     run.candidates.grasps.save(tmp_path / "grasps.npz")
     command = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
     command += ["--grasps", str(tmp_path / "grasps.npz"), "--workers", "1", "--quiet"]
+    command += ["--engine", "screening"]
     assert main(command) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line == (
@@ -139,7 +140,7 @@ def test_interrupted_evaluation_says_how_to_go_on(
     def interrupt(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("burg_drake.evaluation.cascade.evaluate", interrupt)
+    monkeypatch.setattr("burg_drake.evaluation.evaluate", interrupt)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 130
     assert capsys.readouterr().err == (
         "burg-drake: interrupted; the same command goes on from here\n"
@@ -217,8 +218,8 @@ def test_replay_compares_with_the_engine_of_the_row(
     changed = row.replace("whole_trial=False", "whole_trial=True")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 2
-    assert "engine 'standard' and engine_settings contradict" in capsys.readouterr().err
-    changed = changed.replace(",standard,", ",standard (custom),")
+    assert "engine 'screening' and engine_settings contradict" in capsys.readouterr().err
+    changed = changed.replace(",screening,", ",screening (custom),")
     path.write_text(f"{header}\n{changed}\n")
     assert main(["replay", str(path), "--no-wait"]) == 1
     out = capsys.readouterr().out.splitlines()

@@ -25,7 +25,7 @@ from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.text_table import TextTable
-from burg_drake.evaluation.results.summary import OutcomeCounts, StageCost, Summary
+from burg_drake.evaluation.results.counts import OutcomeCounts, StageCost, Summary
 from burg_drake.evaluation.results.summary_tables import SummaryView
 from burg_drake.evaluation.robustness.probes import RobustnessSettings
 from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_view

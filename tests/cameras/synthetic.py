@@ -21,8 +21,8 @@ from burg_drake.scene.document.scene import Board
 
 SAMPLES = 89
 """Samples a pixel that an edge crosses; a Fibonacci number, see `_lattice`."""
-CHUNK = 1 << 14
-"""Pixels that are sampled at once."""
+CHUNK = 1 << 9
+"""Pixels that are sampled at once; few enough that their samples stay in the processor's cache."""
 HORIZON = -0.02
 """Least slope of rays to the table, z in S of rays of about unit length; far beyond all boards."""
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -189,7 +189,11 @@ class _Sheet:
         """
         i = np.searchsorted(self._y, p_S[..., 1]) * (len(self._x) + 1)
         i += np.searchsorted(self._x, p_S[..., 0])
-        low, high = p_S.min(axis=1), p_S.max(axis=1)
+        if not len(self._covers):
+            return i
+        x, y = (np.ascontiguousarray(p_S[..., k]) for k in range(2))
+        low = np.stack([x.min(axis=1), y.min(axis=1)], axis=1)
+        high = np.stack([x.max(axis=1), y.max(axis=1)], axis=1)
         for k, cover in enumerate(self._covers):
             center, reach = cover[:2], np.hypot(*cover[2:4])
             near = np.flatnonzero(((high > center - reach) & (low < center + reach)).all(axis=1))
@@ -228,9 +232,11 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
     rays[..., 2] = np.minimum(rays[..., 2], HORIZON)  # the table goes on to the sky
     at = sheet.region(_on_plane(X_SC, rays).reshape(-1, 1, 2)).reshape(h + 1, w + 1)
     corners = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]])
-    colors = sheet.colors
-    image = colors[corners[0]]
-    share = sheet.on_table[corners[0]].astype(float)
+    looks, kinds = np.unique(
+        np.column_stack([sheet.colors, sheet.on_table]), axis=0, return_inverse=True
+    )
+    kinds = kinds.ravel().astype(np.int8)
+    image = looks[kinds[corners[0]]]
     rows, columns = np.nonzero((corners != corners[0]).any(axis=0))
     fx, fy = _lattice()
     for k in range(0, len(rows), CHUNK):
@@ -240,11 +246,11 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
         above = rays[r, c, np.arange(3)] * (1 - across) + rays[r, c + 1, np.arange(3)] * across
         below = rays[r + 1, c, np.arange(3)] * (1 - across)
         below = below + rays[r + 1, c + 1, np.arange(3)] * across
-        inside = sheet.region(_on_plane(X_SC, above * (1 - down) + below * down))
-        image[r[:, 0, 0], c[:, 0, 0]] = colors[inside].mean(axis=1)
-        share[r[:, 0, 0], c[:, 0, 0]] = sheet.on_table[inside].mean(axis=1)
+        inside = kinds[sheet.region(_on_plane(X_SC, above * (1 - down) + below * down))]
+        counts = np.stack([(inside == kind).sum(axis=1) for kind in range(len(looks))], axis=1)
+        image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / SAMPLES
     p_S = _on_plane(X_SC, rays[:-1, :-1])
-    return image + (share * _grain(p_S))[..., None]
+    return image[..., :3] + image[..., 3:] * _grain(p_S)[..., None]
 
 
 def _rays(intrinsics: Intrinsics, pixels: Array) -> Array:

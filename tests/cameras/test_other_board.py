@@ -75,7 +75,7 @@ def test_this_board_gives_no_alarm(poses: BoardPose) -> None:
         ImageDegradation(gradient=0.6, noise=6.0),
     ]
     valid = 0
-    for k in range(12):
+    for k in range(6):
         target = rng.uniform([0.1, 0.05], [0.2, 0.16])
         X_SC = view(tuple(target), rng.uniform(0.3, 0.7), 5.0 * k, *rng.uniform(0.0, 360.0, 2))
         covers, _ = covers_of(BOARD.layout, (0.0, 0.5, 0.85)[k % 3], rng, partial=k % 2 == 0)
@@ -83,7 +83,7 @@ def test_this_board_gives_no_alarm(poses: BoardPose) -> None:
         estimate = poses.estimate(image)
         assert "another board" not in estimate.reason, k
         valid += estimate.valid
-    assert valid >= 10
+    assert valid >= 5
 
 
 def test_things_beside_the_board_are_no_markers(poses: BoardPose) -> None:

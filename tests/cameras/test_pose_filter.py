@@ -29,7 +29,7 @@ def noisy(truth: np.ndarray, rng: np.random.Generator) -> BoardEstimate:
     return BoardEstimate(X_SC=X_SC, valid=True, covariance=COVARIANCE)
 
 
-@pytest.mark.parametrize("window", [1.0, 4.0, 16.0])
+@pytest.mark.parametrize("window", [1.0, 16.0])
 def test_noise_falls_with_the_square_root_of_the_window(window: float) -> None:
     rng = np.random.default_rng(1)
     pose_filter = PoseFilter(0.1, window=window)

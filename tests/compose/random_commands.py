@@ -19,7 +19,7 @@ from burg_drake.compose import (
     Delete,
     Distribute,
     Duplicate,
-    Move,
+    MoveObjects,
     PutDown,
     RandomConfiguration,
     Rename,
@@ -65,7 +65,7 @@ def _picked(chosen: list[int], names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _moved(names: tuple[str, ...], X_SO: Any) -> Command:
-    return Move(dict.fromkeys(names[:1], X_SO))
+    return MoveObjects(dict.fromkeys(names[:1], X_SO))
 
 
 def _renamed(names: tuple[str, ...], new: str) -> Command:

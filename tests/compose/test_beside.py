@@ -5,18 +5,24 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move
-from burg_drake.compose.background.process import Cancelled
+from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects
 from burg_drake.compose.background.settling import SettlingProposal
 from burg_drake.compose.document.checker import known_scene
 from burg_drake.compose.editing.view import SessionView
-from burg_drake.core.errors import InvalidInputError, SimulationError, UnknownNameError
+from burg_drake.core.errors import (
+    InvalidInputError,
+    SimulationError,
+    TaskCancelled,
+    UnknownNameError,
+)
 from burg_drake.core.paths.resources import resolve
 from burg_drake.objects.library.document import LIBRARY_FILE, load_library
 from burg_drake.scene.document.scene import load_scene
@@ -31,7 +37,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     session.restrict_movement(False)
     X_SO = session.view.X_SO("box")
     X_SO[2, 3] += 0.03
-    hovering = session.do(Move({"box": X_SO}))
+    hovering = session.do(MoveObjects({"box": X_SO}))
     views: list[SessionView] = []
     session.on_change(views.append)
     proposal = session.settle().wait(PATIENCE)
@@ -49,12 +55,13 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
 
     job = session.settle()
     job.cancel()
-    with pytest.raises(Cancelled):
+    with pytest.raises(TaskCancelled):
         job.wait(PATIENCE)
     job = session.settle()
-    while session._settler._process is None and not job.done:
-        pass
-    os.kill(session._settler._process.pid, 9)  # type: ignore[union-attr]
+    while (process := session._settler.process) is None and not job.done:
+        time.sleep(0.001)
+    assert process is not None
+    os.kill(process, signal.SIGKILL)
     with pytest.raises(SimulationError, match=r"ended from outside by SIGKILL; the scene is as"):
         job.wait(PATIENCE)
     assert "cannot settle the scene" in session.view.notices[0]

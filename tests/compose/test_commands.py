@@ -13,7 +13,7 @@ from burg_drake.compose import (
     ComposeSession,
     Distribute,
     Duplicate,
-    Move,
+    MoveObjects,
     PutDown,
     RandomConfiguration,
     Rename,
@@ -126,14 +126,14 @@ def test_what_hovers_is_put_on_what_is_below(session: ComposeSession) -> None:
     session.restrict_movement(False)
     X_SO = session.view.X_SO("marble")
     X_SO[2, 3] += 0.4
-    assert session.do(Move({"marble": X_SO})).status["marble"] == "hovering"
+    assert session.do(MoveObjects({"marble": X_SO})).status["marble"] == "hovering"
     view = session.do(PutDown(("marble",)))
     assert set(view.status.values()) == {"ok"}
     top = span(view, "box")[1, 2]
     assert span(view, "marble")[0, 2] == pytest.approx(top, abs=2e-4)  # a marble of many faces
     X_SO[2, 3] = -0.05
     X_SO[0, 3] = 0.05
-    assert session.do(Move({"marble": X_SO})).status["marble"] == "in_ground"
+    assert session.do(MoveObjects({"marble": X_SO})).status["marble"] == "in_ground"
     view = session.do(PutDown(("marble",)))
     assert span(view, "marble")[0, 2] == pytest.approx(0.0, abs=ROUNDED)
 
@@ -142,7 +142,7 @@ def test_planar_movement_takes_place_and_yaw_alone(three: ComposeSession) -> Non
     before = three.view.X_SO("box")
     yaw = make_pose(rotation_from_rpy((0.0, 0.0, 0.5)))
     tilt = make_pose(rotation_from_rpy((0.05, 0.0, 0.0)), (0.2, 0.1, 0.3))
-    X_SO = three.do(Move({"box": tilt @ yaw @ before})).X_SO("box")
+    X_SO = three.do(MoveObjects({"box": tilt @ yaw @ before})).X_SO("box")
     assert X_SO[2, 3] == before[2, 3]
     np.testing.assert_allclose(X_SO[2, :3], before[2, :3], atol=2e-6)  # tilt
     turn = X_SO[:3, :3] @ before[:3, :3].T
@@ -177,8 +177,11 @@ def test_a_random_configuration_is_that_of_its_seed(three: ComposeSession) -> No
         (AddObject("cann"), "object 'cann' is not in library"),
         (AddObject("can", 9), "'can': stable pose 9 does not exist; give 0 to 1"),
         (AddObject("can", position=(0.1, np.inf)), "y of the new 'can' is inf; give a number from"),
-        (Move({"box": make_pose(p_AB=(0.0, 0.0, 200.0))}), "z of 'box' is 200; give a number from"),
-        (Move({}), "nothing is selected; select 1 or more objects"),
+        (
+            MoveObjects({"box": make_pose(p_AB=(0.0, 0.0, 200.0))}),
+            "z of 'box' is 200; give a number from",
+        ),
+        (MoveObjects({}), "nothing is selected; select 1 or more objects"),
         (Align(("box",), "left"), "only 'box' is selected; select 2 or more objects"),
         (SnapToGrid(("box",), float("nan")), "spacing of the grid is nan; give a number from"),
         (Rename("box", "can"), "name 'can' is used already; give another one"),

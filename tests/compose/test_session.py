@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Delete, Move, Rename
+from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects, Rename
 from burg_drake.compose.document import amending
 from burg_drake.compose.storage.journal import journal_path, recover
 from burg_drake.compose.storage.scene_file import FileChanged, UnsavedChanges
@@ -53,7 +53,7 @@ def test_what_is_typed_bit_by_bit_is_one_step(session: ComposeSession) -> None:
     named = session.do(Rename("box", "box2"), field="Name")
     assert list(named.instances) == ["box2"]
     for x in (0.002, 0.021, 0.21):
-        moved = session.do(Move({"box2": make_pose(p_AB=(x, 0.1, 0.0))}), field="x")
+        moved = session.do(MoveObjects({"box2": make_pose(p_AB=(x, 0.1, 0.0))}), field="x")
     journal = recover(journal_path(session.folder / "new_scene.yaml"))
     assert journal is not None and journal.history is not None
     documents = [mug.document, named.document, moved.document]
@@ -71,10 +71,10 @@ def test_what_was_typed_stays_a_step_once_something_else_was_done(
     poses = iter(make_pose(p_AB=(x, 0.1, 0.0)) for x in np.linspace(0.1, 0.3, 40))
 
     def steps(between: Callable[[], object]) -> int:
-        before = session.do(Move({"mug": next(poses)})).document
-        session.do(Move({"mug": next(poses)}), field="x")
+        before = session.do(MoveObjects({"mug": next(poses)})).document
+        session.do(MoveObjects({"mug": next(poses)}), field="x")
         between()
-        session.do(Move({"mug": next(poses)}), field="x")
+        session.do(MoveObjects({"mug": next(poses)}), field="x")
         count = 1
         while session.undo().document != before:
             count += 1
@@ -82,19 +82,19 @@ def test_what_was_typed_stays_a_step_once_something_else_was_done(
 
     assert steps(lambda: None) == 1
     assert steps(lambda: session.select(["mug"])) == 2
-    assert steps(lambda: session.do(Move({"mug": next(poses)}), field="y")) == 3
-    assert steps(lambda: session.do(Move({"mug": next(poses)}))) == 3
+    assert steps(lambda: session.do(MoveObjects({"mug": next(poses)}), field="y")) == 3
+    assert steps(lambda: session.do(MoveObjects({"mug": next(poses)}))) == 3
     assert steps(session.save) == 2
     assert steps(lambda: monkeypatch.setattr(amending, "AMENDING", 0.0)) == 1
     assert steps(lambda: None) == 2  # too late
     monkeypatch.setattr(amending, "AMENDING", 3600.0)
     # typed back to what it was, there is nothing to undo; and nothing typed, nothing to amend
     start = session.view
-    session.do(Move({"mug": next(poses)}), field="x")
-    back = session.do(Move({"mug": start.X_SO("mug")}), field="x")
+    session.do(MoveObjects({"mug": next(poses)}), field="x")
+    back = session.do(MoveObjects({"mug": start.X_SO("mug")}), field="x")
     assert back.document == start.document and back.undo_label == start.undo_label
-    session.do(Move({"mug": start.X_SO("mug")}), field="y")
-    session.do(Move({"mug": next(poses)}), field="y")
+    session.do(MoveObjects({"mug": start.X_SO("mug")}), field="y")
+    session.do(MoveObjects({"mug": next(poses)}), field="y")
     assert session.undo().document == start.document
 
 
@@ -116,7 +116,7 @@ def test_a_drag_is_one_step_and_tells_of_collisions_on_its_way(session: ComposeS
 def test_what_is_refused_changes_nothing(session: ComposeSession) -> None:
     before = session.do(AddObject("mug"))
     with pytest.raises(InvalidInputError, match=r"the pose of 'mug' has NaN or infinite numbers"):
-        session.do(Move({"mug": make_pose(p_AB=(np.nan, 0.0, 0.0))}))
+        session.do(MoveObjects({"mug": make_pose(p_AB=(np.nan, 0.0, 0.0))}))
     assert session.view is before
 
 

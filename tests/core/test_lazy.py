@@ -43,9 +43,7 @@ def test_a_name_is_loaded_on_first_use_and_then_stays():
 
 def test_unknown_attributes_fail_as_in_any_module():
     assert not hasattr(burg_drake, "no_such_name")
-    with pytest.raises(
-        AttributeError, match=r"^module 'burg_drake' has no attribute 'no_such_name'$"
-    ):
+    with pytest.raises(AttributeError, match="no_such_name"):
         _ = burg_drake.no_such_name
 
 

@@ -7,8 +7,9 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 
 from burg_drake.core.errors import BurgError
+from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
+from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 
 

@@ -76,7 +76,7 @@ class KnownJudge:
                 file.write(f"{grasp.id}\n")
         outcome = expected(grasp.id)
         if outcome is Outcome.COLLISION_TABLE:
-            return Decision(outcome, "table", margins={"overlap": number(grasp.id) / 3e3})
+            return Decision(outcome, blocker="table", margins={"overlap": number(grasp.id) / 3e3})
         return Decision(margins={"overlap": 0.0})
 
     def reach(self, grasp: Candidate) -> Decision:

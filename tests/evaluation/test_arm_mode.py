@@ -17,11 +17,14 @@ from burg_drake.evaluation.records.table import table_row
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.records.trial import read_trial
 from burg_drake.evaluation.replay import as_result, decisive_mode, differences, rerun
-from burg_drake.evaluation.results.summary import Pushes, pushes, summarize
+from burg_drake.evaluation.results.counts import Pushes, pushes
+from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.results.summary_tables import summary_view
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
+
+pytestmark = pytest.mark.usefixtures("judged_here")
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

@@ -26,6 +26,8 @@ from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 DOWN = (0.0, 0.0, -1.0)
 LEFT, RIGHT = (0.1, 0.2, 0.025), (0.3, 0.2, 0.025)
 X_SC = make_pose(Rotation.from_euler("xyz", [170, 10, 30], degrees=True).as_matrix(), (0.3, 0, 0.6))

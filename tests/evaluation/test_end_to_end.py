@@ -22,8 +22,10 @@ from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
+
+pytestmark = pytest.mark.usefixtures("judged_here")
 
 SCENE, STATION = "tabletop_six", "panda_tabletop"
 BOX = (0.06, 0.158, 0.21)

@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 from contextlib import closing
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -186,8 +187,8 @@ def test_what_cannot_be_built_is_said_as_it_is() -> None:
 
 
 def children() -> set[int]:
-    pid = os.getpid()
-    return {int(p) for p in open(f"/proc/{pid}/task/{pid}/children").read().split()}
+    threads = Path("/proc/self/task").glob("*/children")
+    return {int(p) for thread in threads for p in thread.read_text().split()}
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="looks for children in /proc")

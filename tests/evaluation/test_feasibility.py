@@ -17,6 +17,7 @@ from known_judge import refuse
 
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.columns import describe
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
@@ -24,8 +25,7 @@ from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.feasibility import reach, reach_columns
 from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.table_file import read_table, write_table
-from burg_drake.evaluation.stages.judge import Verdict
-from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Station, load_station

@@ -24,6 +24,8 @@ from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.gripper_document import locate_hand
 from burg_drake.station.document.station_document import Station, load_station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:

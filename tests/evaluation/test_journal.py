@@ -8,9 +8,9 @@ import os
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.records.journal import Journal, decode, encode, read_journal
-from burg_drake.evaluation.stages.judge import Verdict
 
 LIFTED = Verdict(
     Outcome.LIFTED,

@@ -26,6 +26,8 @@ from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import load_station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 HANDLE = grasp_from_axes((0.0, 1.0, 0.0), (-0.18, 0.0, -0.98), (-0.071, 0.0, 0.012))

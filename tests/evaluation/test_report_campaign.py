@@ -24,11 +24,14 @@ from burg_drake.evaluation.report.elements.style import STYLES
 from burg_drake.evaluation.report.sections.causes import causes_of, rows_of_run
 from burg_drake.evaluation.report.sections.outcomes import worst_first
 from burg_drake.evaluation.report.sections.scenes import ranked_chart
-from burg_drake.evaluation.results.summary import OutcomeCounts, summarize
+from burg_drake.evaluation.results.counts import OutcomeCounts
+from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.part_store import StoredRows
+from burg_drake.evaluation.store.stored_rows import StoredRows
 from burg_drake.scene.document.scene import Scene
 from burg_drake.visualization.style.palette import group_of
+
+pytestmark = pytest.mark.usefixtures("judged_here")
 
 pytest.importorskip("pyarrow")
 PER_OBJECT = 8

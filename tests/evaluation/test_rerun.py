@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.records.origin import TrialOrigin
 from burg_drake.evaluation.records.run_document import software_versions
 from burg_drake.evaluation.replay import comparison, differences
-from burg_drake.evaluation.stages.judge import Verdict
 from burg_drake.station.document.engine import ENGINES
 
 VERDICT = Verdict(

@@ -17,6 +17,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.core.files.bounded_text import Limits
 from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
+from burg_drake.core.grasps import MODES, Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates.candidates import Candidates
@@ -30,8 +31,6 @@ from burg_drake.evaluation.records.table_file import (
     write_table,
 )
 from burg_drake.evaluation.records.trial import RecordedTrial, read_trial
-from burg_drake.evaluation.stages.judge import Verdict
-from burg_drake.evaluation.stages.mode import MODES
 from burg_drake.station.document.engine import ENGINES
 
 INSTANCES = ("mug_1", "box", "bowl.2")
@@ -61,7 +60,9 @@ def candidates() -> Candidates:
 def columns() -> Columns:
     ids = candidates().id
     verdicts = {
-        ids[3]: Verdict(Outcome.COLLISION_TABLE, Stage.CLEAR, "table", cpu={Stage.CLEAR: 1e-4}),
+        ids[3]: Verdict(
+            Outcome.COLLISION_TABLE, Stage.CLEAR, blocker="table", cpu={Stage.CLEAR: 1e-4}
+        ),
         ids[0]: Verdict(
             Outcome.LIFTED,
             Stage.EXECUTED,
@@ -153,7 +154,7 @@ def test_a_row_of_an_arm_trial_gives_back_all_that_it_was(tmp_path: Path) -> Non
     verdict = Verdict(
         Outcome.BLOCKED,
         Stage.EXECUTED,
-        "panda_link5 vs box",
+        blocker="panda_link5 vs box",
         margins={"tracking_error": 1e-3 / 3, "duration": 5.25, "arm_clearance": 2e-3 / 7},
         pushed={"mug_1": 1 / 7, "box": 0.0},
         touched="panda_link5 vs box",

@@ -17,6 +17,8 @@ from burg_drake.motion.workspace.usable_arm import require_usable_arm
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
+pytestmark = pytest.mark.usefixtures("judged_here")
+
 NOTHING: dict[str, GraspSet] = {}
 
 

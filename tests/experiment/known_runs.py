@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.grasps import Mode, Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates.candidates import Candidates
@@ -22,8 +23,6 @@ from burg_drake.evaluation.records.run_document import (
     run_hash,
     software_versions,
 )
-from burg_drake.evaluation.stages.judge import Verdict
-from burg_drake.evaluation.stages.mode import Mode
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, create_run, load_run
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.station.document.engine import ENGINES

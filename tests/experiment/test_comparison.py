@@ -19,7 +19,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.robustness.shares import lifted_shares
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparison import SUCCESSES, compare
+from burg_drake.experiment.comparison.comparing import SUCCESSES, compare
 from burg_drake.experiment.comparison.placement_error import LIMIT_MM
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
@@ -110,7 +110,7 @@ def make_sheet(run: Run, folder: Path, real: tuple[str, ...] = REAL, **fields: o
 
 def test_a_run_against_another(tmp_path: Path) -> None:
     first, second = make_runs(tmp_path)
-    found = burg.compare(first.path, second.path)
+    found = burg.trials.compare(first.path, second.path)
     one, other = np.array(FIRST * 2) == "lifted", np.array(SECOND * 2) == "lifted"
     tn, fp, fn, tp = confusion_matrix(other, one).ravel()
     assert found.kind == "runs" and found.coverage.compared == 12
@@ -346,8 +346,10 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
 def test_the_headline_where_nothing_succeeded(tmp_path: Path) -> None:
     scene = known_runs.make_scene(tmp_path)
     run = known_runs.make_run(tmp_path / "run", scene, {"mug": [known_runs.ended("slipped")]})
-    sheet = burg.plan_trials(run, out=tmp_path / "trials.yaml")
-    burg.TrialBook(tmp_path / "trials.yaml").record(sheet.trials[0].number, outcome="slipped")
+    sheet = burg.trials.plan_trials(run, out=tmp_path / "trials.yaml")
+    burg.trials.TrialBook(tmp_path / "trials.yaml").record(
+        sheet.trials[0].number, outcome="slipped"
+    )
     told = headline(compare(run, tmp_path / "trials.yaml"))
     assert told.startswith("In 1 trial on the robot") and "undefined" not in told
     assert told.endswith("it predicted no success, none came about.")

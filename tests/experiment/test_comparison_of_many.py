@@ -15,7 +15,7 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.table_file import write_table
 from burg_drake.evaluation.run import preparation
 from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.experiment.comparison.comparison import compare
+from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.scene.document.scene import save_scene
 from burg_drake.station.document.station_document import load_station
 from tests.evaluation import known_judge

@@ -15,8 +15,8 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.experiment.planning.plan import plan_trials
 from burg_drake.experiment.trials.export import export_trials
 from burg_drake.experiment.trials.sheet import save_trials
-from burg_drake.motion.plans.plan_file import load_plan
-from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.motion.plans.grasp_plan import load_plan
+from burg_drake.station.diagram.station_diagram import instance_pose
 from tests.experiment.known_runs import ended, make_run, make_scene
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))

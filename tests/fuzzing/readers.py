@@ -38,8 +38,9 @@ from burg_drake.formats.common.one_object import description_of
 from burg_drake.formats.common.pose_file import read_poses
 from burg_drake.formats.grasp_files import FORMATS, format_of, read_grasp_file
 from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.plan_file import load_plan
-from burg_drake.motion.plans.trajectory import Plan, PlanOrigin, Trajectory
+from burg_drake.motion.plans.grasp_plan import Plan, load_plan
+from burg_drake.motion.plans.planned_motion import PlanOrigin
+from burg_drake.motion.plans.trajectory import Trajectory
 from burg_drake.objects.library.document import load_library
 from burg_drake.objects.meshes.mesh_file import read_mesh
 from burg_drake.pipeline.recipe import load_recipe

@@ -116,7 +116,7 @@ def random_grasps(n: int) -> np.ndarray:
 def test_agrees_with_points_in_the_hand(clearance: HandClearance) -> None:
     points_G = hand_points()
     found = 0
-    for X_WG in random_grasps(400):
+    for X_WG in random_grasps(200):
         depth = deepest(transform_points(X_WG, points_G))
         verdict = clearance.check("box", X_WG)
         if verdict.outcome is None:
@@ -127,7 +127,7 @@ def test_agrees_with_points_in_the_hand(clearance: HandClearance) -> None:
         else:
             assert max(depth.values()) > 0.0
             assert depth[verdict.blocker] > 0.0
-    assert found > 40
+    assert found > 20
 
 
 def test_swapped_fingers_get_the_same_verdict(clearance: HandClearance) -> None:

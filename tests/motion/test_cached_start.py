@@ -11,7 +11,7 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.motion.proximity import arm_shape
 from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import instance_pose
+from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
 
 KINDS = {"distances", "postures", "roadmap", "robot"}

@@ -19,7 +19,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.grasping.sampling.antipodal import sample_antipodal
 from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.plan_file import load_plan
+from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram

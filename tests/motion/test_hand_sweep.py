@@ -193,7 +193,7 @@ def overlapped(clearance: HandClearance, path: Array, closed: float) -> set[str]
 def test_dense_samples_in_drake_agree(shelf: tuple[Scene, Station], swept: HandSweep) -> None:
     clearance = HandClearance(build_station_diagram(*shelf, robot="hand"))
     rng, seen = np.random.default_rng(2), set[tuple[bool, bool]]()
-    for name, X in random_grasps(*shelf, 8):
+    for name, X in random_grasps(*shelf, 5):
         width = rng.uniform(0.0, 0.08, len(X))
         approach, lift = swept.approach(name, X), swept.lift(name, X, width)
         for i, X_WG in enumerate(X):
@@ -285,7 +285,7 @@ def test_a_bound_below_every_sample(shelf: tuple[Scene, Station], swept: HandSwe
 
 
 def test_a_grasp_alone_and_in_any_batch(shelf: tuple[Scene, Station]) -> None:
-    name, X = random_grasps(*shelf, 24)[0]
+    name, X = random_grasps(*shelf, 12)[0]
     width = np.random.default_rng(3).uniform(0.0, 0.08, len(X))
     order = np.random.default_rng(4).permutation(len(X))
     swept = HandSweep(*shelf, AWAY)
@@ -348,7 +348,7 @@ def test_swapped_fingers_and_a_turned_world(
     turned = HandSweep(
         scene, replace(station, document=document), replace(motion, lift_direction=direction)
     )
-    for name, X in random_grasps(scene, station, 8):
+    for name, X in random_grasps(scene, station, 4):
         width = np.full(len(X), 0.05)
         ways = [
             (s.approach(name, Y), s.retreat(name, Y, width), s.lift(name, Y, width))

@@ -18,7 +18,8 @@ from burg_drake.motion.collision.home_posture import (
 )
 from burg_drake.motion.workspace.station_check import empty_scene
 from burg_drake.scene.document.scene import Instance, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 TIP = 0.487

@@ -9,7 +9,8 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.motion.collision.checker import ArmCollision
 from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 
 OWN, OTHER = "panda_tabletop", "panda_wsg"

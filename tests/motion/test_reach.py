@@ -56,11 +56,14 @@ AT_ONCE = barely_lifted(0.0)
 
 
 def grasp_by_dh(q: np.ndarray) -> np.ndarray:
-    """`X_AG` (4, 4) of one configuration."""
+    """`X_AG` (N, 4, 4) of configurations (N, 7)."""
     X = np.eye(4)
-    for (a, d, alpha), theta in zip(DH, [*q, 0.0], strict=True):
+    for k, (a, d, alpha) in enumerate(DH):
+        turn = np.zeros((len(q), 3))
+        turn[:, 2] = q[:, k] if k < 7 else 0.0
+        along = np.repeat([[0.0, 0.0, d]], len(q), axis=0)
         X = X @ make_pose(rotation_from_rpy((alpha, 0, 0)), (a, 0, 0))
-        X = X @ make_pose(rotation_from_rpy((0, 0, theta)), (0, 0, d))
+        X = X @ make_pose(rotation_from_rpy(turn), along)
     return X @ X_FG
 
 
@@ -156,7 +159,7 @@ def on_line(
 ) -> float:
     """How far the hand strays from its straight way [m, and rad on a lever of 0.1 m]."""
     halfway = 0.5 * (rows[1:] + rows[:-1])
-    X = np.array([grasp_by_dh(q) for q in np.concatenate([rows, halfway])])
+    X = grasp_by_dh(np.concatenate([rows, halfway]))
     p = X[:, :3, 3] - X_WG[:3, 3]
     along = p @ direction
     np.testing.assert_allclose([along[0], along[len(rows) - 1]], [begin, end], atol=1e-6)
@@ -196,7 +199,7 @@ def test_free_configurations_are_found_again(scene: Scene, station: Station) -> 
     drawn = (rng.uniform(lower, upper) for _ in range(200))
     free = [q for q in drawn if arm.collision.is_free(q)][:48]
     assert len(free) == 48
-    found = arm.check_all([""] * 48, np.array([grasp_by_dh(q) for q in free]))
+    found = arm.check_all([""] * 48, grasp_by_dh(np.array(free)))
     missed = [q for q, reach in zip(free, found, strict=True) if reach.outcome is not None]
     assert sum(arm.tree.connect(q[None]) is not None for q in missed) <= 1
 
@@ -246,9 +249,9 @@ def test_a_turned_world_has_the_same_verdicts(
     X_WS = Pose.from_matrix(X_WV @ before.document.X_WS.matrix())
     after = changed(table=table, arm=arm_after, X_WS=X_WS)
     one, other = ArmReach(scene, before), ArmReach(scene, after)
-    grasps = np.array(random_grasps(40, seed=3))
-    turned = other.check_all([""] * 40, X_WV @ grasps)
-    for a, b in zip(one.check_all([""] * 40, grasps), turned, strict=True):
+    grasps = np.array(random_grasps(40, seed=3)[:20])
+    turned = other.check_all([""] * 20, X_WV @ grasps)
+    for a, b in zip(one.check_all([""] * 20, grasps), turned, strict=True):
         assert (a.outcome, a.blocker) == (b.outcome, b.blocker)
         if a.outcome is not None:  # else a lower bound, by boxes that lie along the axes
             np.testing.assert_allclose([b.clearance, b.excess], [a.clearance, a.excess], atol=1e-4)

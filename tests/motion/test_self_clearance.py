@@ -18,7 +18,8 @@ from burg_drake.motion.proximity.link_distance import LinkDistance
 from burg_drake.motion.proximity.pair_table import JointGrid, PairTable, may_meet
 from burg_drake.motion.proximity.self_clearance import counted_pairs
 from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 from tests.motion.gantry import gantry_diagram
 

@@ -13,7 +13,8 @@ from burg_drake.core.frames import inverse, rotation_from_rpy
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.ik.numeric import ArmKinematics
 from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.plans.trajectory import Plan, Trajectory
+from burg_drake.motion.plans.grasp_plan import Plan
+from burg_drake.motion.plans.trajectory import Trajectory
 from burg_drake.motion.reach.witness import Witness
 from burg_drake.motion.timing.grasp_timing import PathChecks, time_motion
 from burg_drake.motion.timing.timing_settings import TimingSettings

@@ -14,8 +14,9 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.plan_file import load_plan
-from burg_drake.motion.plans.trajectory import PHASES, Plan, PlanOrigin, Trajectory
+from burg_drake.motion.plans.grasp_plan import Plan, load_plan
+from burg_drake.motion.plans.planned_motion import PHASES, PlanOrigin
+from burg_drake.motion.plans.trajectory import Trajectory
 from burg_drake.motion.timing.cubics import DoubleS
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station

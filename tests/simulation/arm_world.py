@@ -14,7 +14,8 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, inverse, make_pose, rot_z
 from burg_drake.core.paths.resources import resolve
 from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.plans.trajectory import Plan, Trajectory
+from burg_drake.motion.plans.grasp_plan import Plan
+from burg_drake.motion.plans.trajectory import Trajectory
 from burg_drake.simulation.trials.arm_trial import ArmTrial
 from burg_drake.station.document.station_document import Arm, Obstacle, Station
 

@@ -31,7 +31,7 @@ MakeScene = Callable[..., Scene]
 
 
 @pytest.fixture(scope="session")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Box, block, ball, can, bar, post, a box that weighs 20 kg; each stands on its origin."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))

@@ -19,6 +19,7 @@ from burg_drake.scene.document.scene import Instance, Scene
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import ENGINES
 
 GRASPS = {
     "lifted": ("box", from_above(0.065), None, None),
@@ -32,6 +33,8 @@ GRASPS = {
     "slippery ball": ("ball", from_above(0.03, y=0.024), 0.05, None),
 }
 """Target, grasp, friction and mass."""
+QUICK = ENGINES["screening"]
+"""What a trial leaves behind does not depend on the length of its steps."""
 
 
 def exact(result: TrialResult) -> dict[str, str]:
@@ -62,7 +65,7 @@ def scene(make_scene: Callable[..., Scene]) -> Scene:
 @pytest.fixture(scope="module")
 def alone(scene: Scene) -> dict[str, dict[str, str]]:
     """Each trial by itself, in a diagram of its own."""
-    return {name: execute(HandTrial(scene, make_station()), name) for name in GRASPS}
+    return {name: execute(HandTrial(scene, make_station(), engine=QUICK), name) for name in GRASPS}
 
 
 def test_trials_differ_from_each_other(alone) -> None:
@@ -75,14 +78,14 @@ def test_trials_differ_from_each_other(alone) -> None:
 
 def test_in_a_batch(scene: Scene, alone) -> None:
     """After each other and after itself; backwards they are executed in another process, below."""
-    trial = HandTrial(scene, make_station())
+    trial = HandTrial(scene, make_station(), engine=QUICK)
     for name in (name for name in GRASPS for _ in range(2)):
         assert execute(trial, name) == alone[name], name
 
 
 def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.MonkeyPatch) -> None:
     """The state turns into NaN in the middle of a trial, after which no more can be told."""
-    trial = HandTrial(scene, make_station())
+    trial = HandTrial(scene, make_station(), engine=QUICK)
     advance = Execution.advance
 
     def spoil(execution: Execution) -> float:
@@ -103,7 +106,7 @@ def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.Monk
 
 def test_after_a_trial_that_was_left_in_the_middle(scene: Scene, alone) -> None:
     """With the hand on its way up, neighbours free and other coefficients."""
-    trial = HandTrial(scene, make_station())
+    trial = HandTrial(scene, make_station(), engine=QUICK)
     execution = trial.begin(
         "carrier", trial.X_WG("carrier", from_above(0.05, y=-0.03)), friction=0.9, mass=0.4
     )
@@ -127,7 +130,7 @@ def load_scene_trial(path: str) -> HandTrial:
     """For another process."""
     from burg_drake.scene.document.scene import load_scene
 
-    return HandTrial(load_scene(path), make_station())
+    return HandTrial(load_scene(path), make_station(), engine=QUICK)
 
 
 def test_in_another_process_backwards(scene: Scene, alone) -> None:

@@ -108,7 +108,7 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     def source(name: str, size: tuple[float, float, float]) -> ObjectSource:
         standing = trimesh.transformations.translation_matrix((0.0, 0.0, size[2] / 2))
         return ObjectSource(name=name, mesh=trimesh.creation.box(size, standing), mass=MASS)

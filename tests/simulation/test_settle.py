@@ -12,7 +12,8 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.objects.library.document import load_library
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 from burg_drake.simulation.rest.criterion import settle
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 
 GRAVITY = 9.81

@@ -14,7 +14,8 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import inverse
 from burg_drake.scene.document.markers import Markers, marker_dictionary
 from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Camera, Station, load_station
 from burg_drake.station.world.board_visual import board_meshes
 from burg_drake.system_libraries import missing_render_libraries

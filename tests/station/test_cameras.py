@@ -12,7 +12,8 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import MissingDependencyError
 from burg_drake.core.frames import inverse
 from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Camera, Obstacle, Station, load_station
 from burg_drake.station.world.camera_sensors import render_cameras
 from burg_drake.station.world.surroundings import PAPER

@@ -15,7 +15,8 @@ from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.scene.document.validation import SceneIssue
-from burg_drake.station.checks.scene_issues import check_scene, require_valid_scene
+from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.checks.valid_scene import require_valid_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import (
     Obstacle,

@@ -20,7 +20,8 @@ from pydrake.systems.primitives import ConstantVectorSource
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import (
     MODEL_NAMES,
     Obstacle,

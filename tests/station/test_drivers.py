@@ -17,8 +17,9 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array
 from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.mounted_hand import MountedHand
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Arm, Obstacle, Station, load_station
 
 BLOCK = 0.04

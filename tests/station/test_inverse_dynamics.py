@@ -19,7 +19,8 @@ from burg_drake.core.documents.schema import load_document
 from burg_drake.core.errors import DocumentError, InvalidInputError
 from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
 from burg_drake.station.control.inverse_dynamics import controller_plant
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.arm_control import ACCELERATION_KP, ArmControl
 from burg_drake.station.document.station_document import Station, StationDocument, load_station
 

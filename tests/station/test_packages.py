@@ -13,7 +13,8 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.paths.resources import resolve
 from burg_drake.objects.library.document import load_library
 from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 
 STATION = """\

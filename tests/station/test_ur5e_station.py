@@ -12,7 +12,8 @@ from pydrake.systems.analysis import Simulator
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.paths.resources import resolve
 from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import StationDiagram, build_station_diagram
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 
 HOME = [0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]

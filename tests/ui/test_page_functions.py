@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Move, SetBoard
+from burg_drake.compose import AddObject, ComposeSession, MoveObjects, SetBoard
 from burg_drake.core.frames import make_pose, quaternion_from_rotation, rot_z
 from burg_drake.scene.document.scene import Board
 from burg_drake.scene.document.validation import validate_scene
@@ -147,7 +147,7 @@ def test_objects_have_the_colours_that_were_chosen(
         session.do(AddObject(name))
     onto = session.view.X_SO("can")
     onto[:2, 3] = session.view.X_SO("box")[:2, 3]
-    session.do(Move({"can": onto}))
+    session.do(MoveObjects({"can": onto}))
     assert session.view.status == {"box": "collision", "can": "collision", "mug": "ok"}
 
     def colors() -> list[tuple[int, ...] | None]:
@@ -187,7 +187,7 @@ def test_grasps_are_counted_again_after_a_move(session: ComposeSession, client: 
     apart = session.view.grasps
     assert set(apart) == {"can", "mug"} and "can" not in apart["mug"].in_the_way
     assert apart["mug"].reachable is not None and 0 < apart["mug"].reachable <= apart["mug"].clear
-    session.do(Move({"can": session.view.X_SO("mug") @ make_pose(p_AB=(0.0, -0.09, 0.0))}))
+    session.do(MoveObjects({"can": session.view.X_SO("mug") @ make_pose(p_AB=(0.0, -0.09, 0.0))}))
     until(lambda: "Counting" in client.text(GRASPS), "they are counted anew")
     until(counted, "counts beside the mug")
     beside = session.view.grasps

@@ -8,7 +8,7 @@ from eye import VIEWS, in_view, messages
 from burg_drake.core.frames import grasp_from_axes, transform_points
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.planner import plan
-from burg_drake.motion.plans.trajectory import Plan
+from burg_drake.motion.plans.grasp_plan import Plan
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station

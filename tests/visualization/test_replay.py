@@ -15,10 +15,11 @@ from burg_drake.core.frames import (
     rotation_from_rpy,
     transform_points,
 )
+from burg_drake.core.grasps import Margins
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import Margins, TrialResult
+from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import Station, load_station
 from burg_drake.visualization.scenes.replay import (

@@ -7,6 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.camera.intrinsics_text import print_intrinsics
 from burg_drake.apps.camera.target import add_board, given_target, two_numbers
 from burg_drake.apps.options import add_verb, positive_int
 
@@ -184,7 +185,6 @@ def _take(
 
 def _print(calibration: Calibration) -> None:
     """Prints views, what was left out, parameters and where the image was covered."""
-    from burg_drake.apps.camera.verbs import print_intrinsics
     from burg_drake.cameras.calibration import coverage, image_grid, uncertainty
     from burg_drake.core.terminal import TextTable, format_number
 

@@ -13,7 +13,7 @@ from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.store import Inputs
-    from burg_drake.evaluation.stages import Verdict
+    from burg_drake.core.grasps import (Verdict)
     from burg_drake.evaluation.records import TrialOrigin
     from burg_drake.evaluation.records import Columns
     from burg_drake.evaluation.records import RecordedTrial

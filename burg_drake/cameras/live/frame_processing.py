@@ -17,7 +17,7 @@ from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.cameras.pose import BoardEstimate, BoardPose
 from burg_drake.cameras.sources import Frame
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
-from burg_drake.scene.document import Board, Scene
+from burg_drake.scene.document import Board, Scene, SceneLike, as_scene
 
 if TYPE_CHECKING:
     from burg_drake.cameras.systems import PoseFilter, Track
@@ -84,12 +84,13 @@ class FrameProcessor:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: SceneLike,
         intrinsics: Intrinsics,
         *,
         print_scale: tuple[float, float] = (1.0, 1.0),
         style: OverlayStyle = OverlayStyle(),  # noqa: B008 (frozen)
     ) -> None:
+        scene = as_scene(scene)
         scene.require_markers()
         self.scene, self.intrinsics, self.style = scene, intrinsics, style
         self._board_pose = BoardPose(scene.board, intrinsics, print_scale)

@@ -29,7 +29,7 @@ from burg_drake.cameras.projection import (
 )
 from burg_drake.core import Array, InvalidInputError, inverse, transform_points
 from burg_drake.core.terminal import CATEGORIES, distinct_colors
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 LIGHT = np.array([0.35, -0.45, 0.82])
 """Where the light comes from, in S: from above, and a little from the front and the right."""
@@ -71,7 +71,7 @@ class Overlay:
     """
 
     def __init__(
-        self, scene: Scene, intrinsics: Intrinsics, style: OverlayStyle | None = None
+        self, scene: SceneLike, intrinsics: Intrinsics, style: OverlayStyle | None = None
     ) -> None:
         """Loads the objects' surfaces.
 
@@ -83,6 +83,7 @@ class Overlay:
         Raises:
             UnknownNameError: a mesh file of the library is missing.
         """
+        scene = as_scene(scene)
         self.scene, self.intrinsics = scene, intrinsics
         self.style = style or OverlayStyle()
         self._view = FieldOfView(intrinsics)

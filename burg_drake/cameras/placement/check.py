@@ -34,13 +34,13 @@ from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.cameras.pose import BoardEstimate, BoardPose
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.documents import Pose
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 NO_CONTRAST = "the board's paper and ink look alike in the photo; give it more light"
 
 
 def check_placement(
-    scene: Scene,
+    scene: SceneLike,
     image: NDArray[np.uint8],
     intrinsics: Intrinsics,
     *,
@@ -68,6 +68,7 @@ def check_placement(
         InvalidInputError: an image of another size than the intrinsics', or not an image; depth
             that is not in metres; markers that do not fit on the board.
     """
+    scene = as_scene(scene)
     scene.require_markers()
     color = _checked_image(image, intrinsics)
     if depth is not None:

@@ -16,7 +16,7 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.core import Array, InvalidInputError, make_pose, rotation_angle
 from burg_drake.core.documents import Pose
-from burg_drake.station.document import Camera, Station
+from burg_drake.station.document import Camera, StationLike, as_station
 
 APART = 0.005, np.deg2rad(0.5)
 """Images of one fixed camera whose poses differ by more [m, rad] are of a camera or board that was
@@ -40,7 +40,7 @@ class LocatedCamera:
 
 
 def locate_camera(
-    station: Station, estimates: Sequence[BoardEstimate], intrinsics: Intrinsics
+    station: StationLike, estimates: Sequence[BoardEstimate], intrinsics: Intrinsics
 ) -> LocatedCamera:
     """Places a camera that did not move between its images.
 
@@ -52,6 +52,7 @@ def locate_camera(
     Raises:
         InvalidInputError: no estimate is valid, or they are of different places.
     """
+    station = as_station(station)
     X_SC = np.array([e.X_SC for e in estimates if e.valid]).reshape(-1, 4, 4)
     if not len(X_SC):
         reasons = "; ".join(dict.fromkeys(e.reason for e in estimates)) or "there is no image"

@@ -9,8 +9,8 @@ from burg_drake.cameras.optics import NEAR, Intrinsics, of_camera
 from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
 from burg_drake.core import Array, inverse, make_pose, transform_points
 from burg_drake.geometry import RayCaster
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 RAYS = 96
 """Rows and columns of rays over the rectangle that an object's surface is projected into; shares
@@ -20,7 +20,7 @@ WIDEST = 20.0
 for: objects beside the camera, none of which it sees."""
 
 
-def visible_from(scene: Scene, station: Station, camera: str) -> dict[str, float]:
+def visible_from(scene: SceneLike, station: StationLike, camera: str) -> dict[str, float]:
     """The share of each free object's silhouette that a camera of the station sees.
 
     The silhouette is all that the camera would see of the object alone if its image had no edges.
@@ -39,6 +39,7 @@ def visible_from(scene: Scene, station: Station, camera: str) -> dict[str, float
         UnknownNameError: there is no such camera, or a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
+    scene, station = as_scene(scene), as_station(station)
     document = station.camera(camera)
     intrinsics = of_camera(document)
     X_SW = inverse(station.document.X_WS.matrix())

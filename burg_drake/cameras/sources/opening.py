@@ -14,7 +14,7 @@ from burg_drake.cameras.sources.frame import (
 )
 from burg_drake.core import InvalidInputError
 from burg_drake.core.paths import expanded
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 STREAMS = ("rtsp://", "rtsps://", "rtmp://", "http://", "https://", "udp://", "tcp://")
 
@@ -22,7 +22,7 @@ STREAMS = ("rtsp://", "rtsps://", "rtmp://", "http://", "https://", "udp://", "t
 def open_source(
     reference: str | Path | int | Sequence[str | Path],
     *,
-    scene: Scene | None = None,
+    scene: SceneLike | None = None,
     size: tuple[int, int] | None = None,
     fps: float | None = None,
 ) -> FrameSource:
@@ -45,6 +45,7 @@ def open_source(
         UnknownNameError: no such station, or it has no such camera.
         MissingDependencyError: a simulated camera without the renderer's system libraries.
     """
+    scene = None if scene is None else as_scene(scene)
     if not isinstance(reference, (str, Path, int)):
         if len(reference) != 1:
             return _images([str(item) for item in reference])

@@ -30,9 +30,9 @@ from burg_drake.cameras.overlay import OverlayStyle
 from burg_drake.cameras.systems.pose_estimator import BoardPoseEstimator
 from burg_drake.cameras.systems.scene_overlay import SceneOverlay
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, inverse, nearest
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 from burg_drake.station.world import Robot
 
 if TYPE_CHECKING:
@@ -89,8 +89,8 @@ class BoardLoop:
 
 
 def build_board_loop(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     camera: str = "board",
     *,
     robot: Robot = "none",
@@ -121,6 +121,7 @@ def build_board_loop(
             markers do not fit on it; and as `build_station_diagram`.
         MissingDependencyError: a system library of the renderer is missing.
     """
+    scene, station = as_scene(scene), as_station(station)
     if period is not None and period <= 0.0:
         raise InvalidInputError(f"period {period:g} of a camera must be above 0 [s]")
     simulated = replace(station.camera(camera), samples=samples)

@@ -16,7 +16,7 @@ from burg_drake.cameras.overlay import Overlay, OverlayStyle
 from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.cameras.pose import BoardEstimate
 from burg_drake.core import InvalidInputError
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 
 NO_POSE = "no pose of the camera"
 """Written over the image when no reason is known."""
@@ -43,7 +43,7 @@ class SceneOverlay(LeafSystem):
     """
 
     def __init__(
-        self, scene: Scene, intrinsics: Intrinsics, style: OverlayStyle | None = None
+        self, scene: SceneLike, intrinsics: Intrinsics, style: OverlayStyle | None = None
     ) -> None:
         """Loads the objects' surfaces.
 
@@ -55,6 +55,7 @@ class SceneOverlay(LeafSystem):
         Raises:
             UnknownNameError: a mesh file of the library is missing.
         """
+        scene = as_scene(scene)
         super().__init__()
         self.set_name("scene_overlay")
         self._overlay = Overlay(scene, intrinsics, style)

@@ -5,9 +5,9 @@ from .grasp_counts import (
 from .process import (
     BackgroundJob as BackgroundJob,
     BackgroundWorker as BackgroundWorker,
-    Cancelled as Cancelled,
 )
 from .settling import (
     Settle as Settle,
     SettlingProposal as SettlingProposal,
+    moved_names as moved_names,
 )

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
-import os
-import subprocess
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
-from multiprocessing.connection import Connection
+from concurrent.futures import Future
 from typing import Any, Generic, Protocol, TypeVar
 
-from burg_drake.core import BurgError, SimulationError
-from burg_drake.core.workers import cause_of_death, start_worker
+from burg_drake.core import BurgError, SimulationError, TaskCancelled, WorkerDied
+from burg_drake.core.workers import Task, WorkerFuture, WorkerPool, report_progress
 
 Result = TypeVar("Result", covariant=True)
 T = TypeVar("T")
 
 
 class ProgressCallback(Protocol):
-    """How a task tells how far it is; it raises `Cancelled` if nobody waits for the result."""
+    """How a task tells how far it is; it raises `TaskCancelled` if nobody waits for the result."""
 
     def __call__(self, share: float, word: str, partial: Any = None) -> None:
         """Tells it.
@@ -55,6 +50,8 @@ class BackgroundJob(Generic[T]):
         cancelled: nobody waits for it any more.
         done: it has a result or an error, or was cancelled.
         error: why it has no result; None if it has, or is not done.
+        task: what was asked.
+        future: what will become of it.
     """
 
     def __init__(
@@ -72,6 +69,7 @@ class BackgroundJob(Generic[T]):
         self._worker, self._on_change = worker, on_change
         self._result: list[T] = []
         self._notify = threading.Event()
+        self.future: WorkerFuture[T] | None = None
 
     @property
     def result(self) -> T:
@@ -118,33 +116,22 @@ class BackgroundJob(Generic[T]):
         self._notify.set()
 
 
-class Cancelled(BurgError):
-    """Nobody waits for a result any more."""
-
-
-@dataclass(frozen=True)
-class _Report:
-    share: float
-    word: str
-    partial: Any
-
-
-@dataclass(frozen=True)
-class _Stop:
-    """What the worker process does, nobody waits for any more."""
+CLOSE = 5.0
+"""Time in which a worker has to end that is closed [s]."""
 
 
 class BackgroundWorker:
     """One process, started with the first task, that does what it was asked last."""
 
     def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._waiting: BackgroundJob[Any] | None = None
-        self._running: BackgroundJob[Any] | None = None
-        self._process: subprocess.Popen[bytes] | None = None
-        self._connection: Connection | None = None
-        self._thread: threading.Thread | None = None
-        self._closed = False
+        self._pool = WorkerPool(1, retries=0)
+        self._lock = threading.Lock()
+        self._newest: BackgroundJob[Any] | None = None
+
+    @property
+    def process(self) -> int | None:
+        """Identifier of the process, if it was started."""
+        return next(iter(self._pool.processes), None)
 
     def submit(
         self,
@@ -158,147 +145,81 @@ class BackgroundWorker:
             on_change: called with the job when it is further or done, in a thread of the worker.
         """
         job = BackgroundJob(self, task, on_change)
-        with self._changed:
-            older, self._waiting = self._waiting, job
-            if self._running is not None and not self._running.cancelled:
-                self._running.cancelled = True
-                self._send(_Stop())
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._serve, daemon=True)
-                self._thread.start()
-            self._changed.notify()
-        if older is not None:
-            _cancel_job(older)
+        with self._lock:
+            older, self._newest = self._newest, job
+            try:
+                job.future = self._pool.submit_task(
+                    Task(do_in_background, (task,), on_progress=_reports_to(job))
+                )
+            except RuntimeError:  # it was closed
+                job.cancelled = True
+        if older is not None and not older.done and older.future is not None:
+            older.cancelled = True
+            older.future.interrupt()
+        if job.future is None:
+            job.finish(TaskCancelled("this was cancelled"))
+        else:
+            job.future.add_done_callback(lambda future: _finish(job, future))
         return job
 
     def cancel(self, job: BackgroundJob[Any]) -> None:
         """See `BackgroundJob.cancel`."""
-        with self._changed:
-            if job.done or job.cancelled:
+        with self._lock:
+            if job.done or job.cancelled or job.future is None:
                 return
             job.cancelled = True
-            if job is self._waiting:
-                self._waiting = None
-            elif job is self._running and self._process is not None:
-                self._process.kill()
-                return  # its thread sees that, and finishes the job
-        _cancel_job(job)
+        job.future.terminate()
 
     def close(self) -> None:
         """Ends the process."""
-        with self._changed:
-            self._closed = True
-            if self._waiting is not None:
-                self._waiting.cancelled = True
-            if self._running is not None:
-                self._running.cancelled = True
-            if self._process is not None:
-                self._process.kill()
-            self._changed.notify()
-            thread = self._thread
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(timeout=5.0)
-
-    def _serve(self) -> None:
-        while True:
-            with self._changed:
-                while self._waiting is None and not self._closed:
-                    self._changed.wait()
-                job, self._waiting = self._waiting, None
-                closed = self._closed
-                self._running = job
-            if closed or job is None:
-                self._end()
-                if job is not None:
-                    _cancel_job(job)
-                return
-            result = self._run_job(job)
-            with self._changed:
-                self._running = None
-            job.finish(result)
-
-    def _run_job(self, job: BackgroundJob[Any]) -> Any:
-        """The result of a job, or why there is none."""
-        try:
-            if self._connection is None:
-                process, connection = start_worker("burg_drake.compose.background.process")
-                with self._changed:
-                    self._process, self._connection = process, connection
-            connection = self._connection
-            assert connection is not None
-            with self._changed:
-                if job.cancelled:
-                    return _cancelled()
-                connection.send(job.task)
-            while True:
-                message = connection.recv()
-                if not isinstance(message, _Report):
-                    return _cancelled() if job.cancelled else message
-                if not job.cancelled:
-                    job.report(message.share, message.word, message.partial)
-        except (EOFError, OSError):
-            cause = "no worker process can be started"
-            if self._process is not None:
-                cause = cause_of_death(self._process)
-            self._end()
-            if job.cancelled:
-                return _cancelled()
-            return SimulationError(f"{cause}; the scene is as it was, try again")
-
-    def _send(self, message: object) -> None:
-        with contextlib.suppress(OSError):  # it has died; its thread finds out
-            if self._connection is not None:
-                self._connection.send(message)
-
-    def _end(self) -> None:
-        with self._changed:
-            process, connection = self._process, self._connection
-            self._process = self._connection = None
-        if connection is not None:
-            connection.close()
-        if process is not None:
-            process.kill()
-            process.wait()
+        with self._lock:
+            if self._newest is not None:
+                self._newest.cancelled = True
+        self._pool.kill_workers(CLOSE)
 
 
-def _cancel_job(job: BackgroundJob[Any]) -> None:
-    job.cancelled = True
-    job.finish(_cancelled())
+def do_in_background(task: BackgroundTask[T]) -> T:
+    """Does a task in a worker.
 
-
-def _cancelled() -> Cancelled:
-    return Cancelled("this was cancelled")
-
-
-def main(handle: int) -> None:
-    """Runs a worker until its parent closes the pipe.
-
-    Args:
-        handle: file descriptor of this end of the pipe.
+    Raises:
+        BurgError: it cannot be done.
     """
-    logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
-    connection = Connection(handle)
-    try:
-        while True:
-            task = connection.recv()
-            if not isinstance(task, _Stop):  # one that came too late
-                connection.send(_result(task, connection))
-    except (EOFError, BrokenPipeError, ConnectionResetError):
-        pass  # the parent is gone
-    os._exit(0)
 
-
-def _result(task: BackgroundTask[Any], connection: Connection) -> Any:
     def report(share: float, word: str, partial: Any = None) -> None:
-        if connection.poll():
-            raise _cancelled()
-        connection.send(_Report(share, word, partial))
+        report_progress((share, word, partial))
 
     try:
         return task(report)
-    except BurgError as error:
-        return error
+    except BurgError:
+        raise
     except (Exception, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-        return SimulationError(
-            f"this failed: {' '.join(str(error).split()) or type(error).__name__}"
-        )
+        raise _failed(error) from error
+
+
+def _reports_to(job: BackgroundJob[Any]) -> Callable[[Any], None]:
+    def told(message: tuple[float, str, Any]) -> None:
+        if not job.cancelled:
+            job.report(*message)
+
+    return told
+
+
+def _finish(job: BackgroundJob[T], future: Future[T]) -> None:
+    job.finish(_outcome(job, future))
+
+
+def _outcome(job: BackgroundJob[Any], future: Future[Any]) -> Any:
+    """The result of a job, or why there is none."""
+    if job.cancelled or future.cancelled():
+        job.cancelled = True
+        return TaskCancelled("this was cancelled")
+    error = future.exception()
+    if error is None:
+        return future.result()
+    if isinstance(error, WorkerDied):
+        return SimulationError(f"{error}; the scene is as it was, try again")
+    return error if isinstance(error, BurgError) else _failed(error)
+
+
+def _failed(error: BaseException) -> SimulationError:
+    return SimulationError(f"this failed: {' '.join(str(error).split()) or type(error).__name__}")

@@ -14,6 +14,10 @@ from burg_drake.station.document import Station
 if TYPE_CHECKING:
     from burg_drake.simulation.rest import Displacement
 
+STAYS = 5e-4
+"""What moves by less stays, for people [m]."""
+STAYS_DEG = 0.1
+
 
 @dataclass(frozen=True)
 class SettlingProposal:
@@ -78,3 +82,14 @@ class Settle:
             settled.fallen,
             settled.duration,
         )
+
+
+def moved_names(
+    proposal: SettlingProposal, distance: float = STAYS, angle_deg: float = STAYS_DEG
+) -> list[str]:
+    """Instances that would move further, or turn by more, than given [m, degrees]."""
+    return [
+        name
+        for name, d in proposal.displacements.items()
+        if d.distance > distance or math.degrees(d.angle) > angle_deg
+    ]

@@ -10,7 +10,7 @@ from burg_drake.compose.document.state import State
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.arrangement import ObjectShapes
 from burg_drake.scene.document import Scene, SceneDocument, SceneIssue
-from burg_drake.station.document import Station
+from burg_drake.station.document import StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.station.checks import SceneCheck
@@ -23,8 +23,8 @@ class SceneChecker:
         station: where scenes stand.
     """
 
-    def __init__(self, station: Station) -> None:
-        self._station = station
+    def __init__(self, station: StationLike) -> None:
+        self._station = as_station(station)
         self._check: SceneCheck | None = None
         self._library: ObjectLibrary | None = None
         self._shapes: ObjectShapes | None = None

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from burg_drake.compose.background import (
     BackgroundJob,
     BackgroundWorker,
-    Cancelled,
     CountedGrasps,
     GraspWatch,
     Settle,
@@ -19,7 +18,7 @@ from burg_drake.compose.document import known_scene, with_missing_objects
 from burg_drake.compose.editing.editor import Editor
 from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.storage import Opened
-from burg_drake.core import InvalidInputError
+from burg_drake.core import InvalidInputError, TaskCancelled
 from burg_drake.station.document import Station
 
 if TYPE_CHECKING:
@@ -137,7 +136,7 @@ class BackgroundEditor(Editor):
                 self._settling = None
                 if job.error is None:
                     self._proposal = job.result
-                elif not isinstance(job.error, Cancelled):
+                elif not isinstance(job.error, TaskCancelled):
                     self.notify(f"cannot settle the scene: {job.error}")
             self._publish()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +13,27 @@ from burg_drake.compose.commands import MoveObjects
 from burg_drake.core import InvalidInputError, make_pose, rot_z
 
 if TYPE_CHECKING:
-    from burg_drake.compose.editing.editor import Editor
     from burg_drake.compose.editing.view import SessionView
+
+
+class DragOwner(Protocol):
+    """What a drag needs of the session that it belongs to."""
+
+    @property
+    def view(self) -> SessionView:
+        """What one sees."""
+
+    def holds(self, drag: Drag) -> bool:
+        """Whether a drag is the one that goes on."""
+
+    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+        """Shows what is dragged elsewhere."""
+
+    def drop(self, drag: Drag) -> SessionView:
+        """Makes a drag a step."""
+
+    def put_back(self, drag: Drag) -> SessionView:
+        """Ends a drag without a step."""
 
 
 class Drag:
@@ -27,7 +46,7 @@ class Drag:
         names: instances that are held.
     """
 
-    def __init__(self, session: Editor, names: tuple[str, ...], start: SessionView) -> None:
+    def __init__(self, session: DragOwner, names: tuple[str, ...], start: SessionView) -> None:
         self.names = names
         self._session = session
         self._start = {name: start.X_SO(name) for name in names}

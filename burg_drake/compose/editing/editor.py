@@ -23,7 +23,7 @@ from burg_drake.compose.editing.view import SessionView, status_of
 from burg_drake.compose.storage import Opened, Storage
 from burg_drake.core import BurgError, InvalidInputError
 from burg_drake.scene.document import SceneIssue
-from burg_drake.station.document import Station
+from burg_drake.station.document import StationLike, as_station
 
 Callback = Callable[[SessionView], None]
 
@@ -36,13 +36,13 @@ class Editor:
         station: where it stands.
     """
 
-    def __init__(self, opened: Opened, station: Station) -> None:
-        self.station = station
+    def __init__(self, opened: Opened, station: StationLike) -> None:
+        self.station = as_station(station)
         self._lock = threading.RLock()
         self._depth = 0
         self._callbacks: list[Callback] = []
         self._last_reported = 0
-        self._checker = SceneChecker(station)
+        self._checker = SceneChecker(self.station)
         self._amending = Amending()
         self._planar = True
         self._serial = self._revision = 0

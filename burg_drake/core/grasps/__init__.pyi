@@ -1,18 +1,21 @@
-from .columns import (
-    INPUT_PREFIX as INPUT_PREFIX,
+from .column import (
     PLAIN as PLAIN,
     TEXT as TEXT,
     Column as Column,
+)
+from .columns import (
+    INPUT_PREFIX as INPUT_PREFIX,
     describe as describe,
 )
 from .csv_metadata_file import (
     csv_metadata as csv_metadata,
     metadata_path as metadata_path,
 )
-from .grasp_set import (
-    FIXED_COLUMNS as FIXED_COLUMNS,
-    GraspSet as GraspSet,
-    parts_of as parts_of,
+from .grasp_set import GraspSet as GraspSet
+from .mode import (
+    MODES as MODES,
+    Mode as Mode,
+    asks as asks,
 )
 from .outcome import (
     UNTRIED as UNTRIED,
@@ -20,4 +23,35 @@ from .outcome import (
     RealOutcome as RealOutcome,
     Stage as Stage,
 )
-from .storage import FORMAT as FORMAT
+from .provenance import parts_of as parts_of
+from .storage import (
+    FIXED_COLUMNS as FIXED_COLUMNS,
+    FORMAT as FORMAT,
+)
+from .verdict import (
+    Findings as Findings,
+    Margins as Margins,
+    TrialFindings as TrialFindings,
+    Verdict as Verdict,
+)
+from .verdict_columns import (
+    ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
+    CPU_COLUMNS as CPU_COLUMNS,
+    FINDINGS as FINDINGS,
+    LIFT_HEIGHT as LIFT_HEIGHT,
+    MARGINS as MARGINS,
+    MOVED as MOVED,
+    PREFIXES as PREFIXES,
+    PUSHED as PUSHED,
+    TRIAL_FINDINGS as TRIAL_FINDINGS,
+    VERDICT_FIELDS as VERDICT_FIELDS,
+    fields_in as fields_in,
+    joined_findings as joined_findings,
+)
+from .verdict_field import (
+    COST as COST,
+    DECIDED as DECIDED,
+    MEASURED as MEASURED,
+    POSTURE as POSTURE,
+    TableShape as TableShape,
+)

@@ -8,28 +8,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
 
-TEXT: Final = ""
-"""Unit of what is no number."""
-PLAIN: Final = "1"
-"""Unit of numbers without one: ratios, counts, labels."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """Meaning of a column.
-
-    Attributes:
-        unit: `TEXT`, `PLAIN`, or a unit such as m, rad, N, s; `g` is the standard gravity of
-            9.81 m/s2, and `weights` are those of the object.
-        description: what its values are, in which frame.
-    """
-
-    unit: str
-    description: str
-
+from burg_drake.core.grasps.column import PLAIN, TEXT, Column
+from burg_drake.core.grasps.verdict_columns import VERDICT_FIELDS
+from burg_drake.core.grasps.verdict_field import (
+    InstancesField,
+    JointsField,
+    MarginsField,
+    StagesField,
+    TextField,
+    VerdictField,
+)
 
 _GRASP = {
     "id": Column(TEXT, "the grasp; in results and reach tables INSTANCE-GRASP"),
@@ -50,54 +40,21 @@ _GRASP = {
     ),
 }
 
-_VERDICT = {
-    "outcome": Column(TEXT, "what became of the grasp"),
-    "stage": Column(TEXT, "the stage that decided the outcome"),
-    "blocker": Column(TEXT, "the body that was in the way"),
-    "reason": Column(TEXT, "why there is no outcome, or no plan: the message of what failed"),
-    "touched": Column(TEXT, "what the arm touched first against its plan, as LINK vs BODY"),
-}
+
+def _meanings(kind: type[VerdictField]) -> dict[str, Column]:
+    """Columns of the fields of a verdict that are of a kind."""
+    of_kind = (one for one in VERDICT_FIELDS if isinstance(one, kind))
+    return {name: meaning for one in of_kind for name, meaning in one.meanings().items()}
+
+
+_VERDICT = _meanings(TextField)
 
 _MARGINS = {
-    "overlap": Column("m", "how deep the open hand overlaps what it collides with; 0 if clear"),
-    "clearance": Column("m", "signed distance of the open hand from what is nearest to it"),
-    "slip": Column("m", "way of the target in the hand since the grip, at the origin of G"),
-    "tilt": Column("rad", "turn of the target in the hand since the grip"),
-    "pad_force": Column("N", "normal force of the weaker pad along the closing direction"),
-    "patch_area": Column("m2", "contact patch of the pad with the smaller one"),
-    "lift": Column(
-        "m",
-        "how far the target's centre of mass rose, or went along the straight ways of another"
-        " motion; of a trial decided on the way with the rest of it, which is free by geometry",
-    ),
-    "lift_height": Column(
-        "m", "length of the lift: as asked, or as far as there is room where less is allowed"
-    ),
-    "others_moved": Column("m", "largest displacement of any other object's centre of mass"),
-    "end_time": Column(
-        "s",
-        "simulated time at which the outcome was decided, which ends the trial, often before"
-        " the hand is all the way up",
-    ),
-    "arm_clearance": Column(
-        "m", "least distance that the robot keeps on its way, or signed distance of what is in it"
-    ),
-    "joint_excess": Column("rad", "how far the closest configuration is beyond a joint limit"),
-    "duration": Column("s", "of the planned motion"),
-    "tracking_error": Column("rad", "largest deviation of a joint from its command"),
-    "tracking_distance": Column("m", "largest deviation of the origin of G from where commanded"),
-    "pushed": Column(
-        "m",
-        "largest displacement of any free object before the hand closed; of one that hovers, its"
-        " fall once it is touched",
-    ),
+    **_meanings(MarginsField),
     "friction": Column(PLAIN, "coefficient of the target; empty in results: the library's"),
     "mass": Column("kg", "of the target; empty in results: the library's"),
     "cpu": Column("s", "CPU time of all stages"),
-    "cpu_clear": Column("s", "CPU time of the hand's screen"),
-    "cpu_reach": Column("s", "CPU time of the arm's screen and the search for motions"),
-    "cpu_plan": Column("s", "CPU time of the motion's timing"),
-    "cpu_trial": Column("s", "CPU time of the trial"),
+    **_meanings(StagesField),
 }
 
 _ORIGIN = {
@@ -171,10 +128,8 @@ GROUPS: Mapping[str, Mapping[str, Column]] = {
 """All columns with names of their own, by subject."""
 
 FAMILIES: Mapping[str, Column] = {
-    "moved_NAME": Column("m", "largest displacement of the centre of mass of an object"),
-    "pushed_NAME": Column("m", "displacement of an object before the hand closed"),
-    "q_grasp_NUMBER": Column("rad", "position of a joint of the arm at the grasp, from 1"),
-    "q_pregrasp_NUMBER": Column("rad", "position of a joint of the arm at the pregrasp, from 1"),
+    **_meanings(InstancesField),
+    **_meanings(JointsField),
     "tug_AXIS_g": Column("g", "acceleration along an axis of G that the grip bears; or inf"),
     "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
     "shake_AXIS_g": Column("g", "amplitude of an oscillation along an axis of G that it bears"),

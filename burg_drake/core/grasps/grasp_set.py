@@ -1,8 +1,7 @@
-"""`GraspSet`: grasps as a struct of arrays; how it is stored is the matter of `grasp_storage`."""
+"""`GraspSet`: grasps as a struct of arrays; how it is stored is the matter of `storage`."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,13 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
+from burg_drake.core.files import reporting_read_errors
 from burg_drake.core.frames import FARTHEST, Array, canonical_fingers, check_pose
-
-ID_DIGITS = 12
-"""Hexadecimal digits of an identifier; among 100,000 grasps two share one with chance 2e-5."""
-
-FIXED_COLUMNS = ("width", "id", "object", "score")
-"""Columns that every set has."""
+from burg_drake.core.grasps.identifiers import identifiers
+from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_grasp_file, write_grasp_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +83,7 @@ class GraspSet:
         widths = _column("width", np.asarray(np.nan if width is None else width, float), n) + 0.0
         _require_widths(widths)
         scores = _column("score", np.asarray(np.nan if score is None else score, float), n)
-        ids = _identifiers(names, poses, widths)
+        ids = identifiers(names, poses, widths)
         try:
             plain = json.loads(json.dumps(dict(provenance or {})))
         except (TypeError, ValueError) as error:
@@ -214,9 +210,8 @@ class GraspSet:
         Raises:
             InvalidInputError: another suffix, or the place cannot be written to.
         """
-        from burg_drake.core.grasps.storage import save_grasps
-
-        save_grasps(self, path)
+        fixed = {name: getattr(self, name) for name in FIXED}
+        write_grasp_file(path, self.provenance, fixed, dict(self.columns))
 
     @classmethod
     def load(cls, path: str | Path) -> GraspSet:
@@ -225,17 +220,12 @@ class GraspSet:
         Raises:
             InvalidInputError: not such a file, or of a newer version.
         """
-        from burg_drake.core.grasps.storage import load_grasps
-
-        return load_grasps(path)
-
-
-def parts_of(provenance: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """The provenances of the sets that a set was joined of, which `parts` lists or has by name."""
-    parts = provenance.get("parts")
-    if isinstance(parts, Mapping):
-        parts = list(parts.values())
-    return [p for p in parts if isinstance(p, Mapping)] if isinstance(parts, (list, tuple)) else []
+        path = Path(path)
+        with reporting_read_errors(path, "a grasp set written by burg_drake"):
+            provenance, fixed, columns = read_grasp_file(path)
+            grasps = cls(**fixed, provenance=provenance, columns=columns)
+            require_valid(grasps)
+            return grasps
 
 
 def require_valid(grasps: GraspSet) -> None:
@@ -275,21 +265,6 @@ def _column(name: str, values: NDArray[Any], n: int) -> NDArray[Any]:
     if values.shape not in ((), (n,)):
         raise InvalidInputError(f"{name} has shape {values.shape}; expected ({n},) or one value")
     return np.array(np.broadcast_to(values, (n,)))
-
-
-def _identifiers(object: NDArray[np.str_], X_OG: Array, width: Array) -> NDArray[np.str_]:
-    """(N,) hashes of names, poses and widths (BLAKE2b, which takes a microsecond a grasp)."""
-    numbers = np.column_stack([X_OG.reshape(-1, 16), width]).astype("<f8")
-    prefixes = {
-        name: hashlib.blake2b(f"{name}\0".encode(), digest_size=ID_DIGITS // 2)
-        for name in np.unique(object).tolist()
-    }
-    ids = []
-    for name, row in zip(object.tolist(), numbers, strict=True):
-        digest = prefixes[name].copy()
-        digest.update(row.data)
-        ids.append(digest.hexdigest())
-    return np.array(ids, dtype=f"<U{ID_DIGITS}")
 
 
 def _joined(name: str, sets: list[GraspSet]) -> NDArray[Any]:

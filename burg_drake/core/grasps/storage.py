@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +28,8 @@ from burg_drake.core.files import (
     is_hdf5,
     open_hdf5,
     open_npz,
-    reporting_read_errors,
 )
 from burg_drake.core.grasps.columns import describe
-from burg_drake.core.grasps.grasp_set import FIXED_COLUMNS, GraspSet, require_valid
 from burg_drake.core.paths import with_resolved_references, with_shareable_references
 
 FORMAT = "burg_drake.grasps"
@@ -39,7 +37,10 @@ VERSION = 2
 READABLE = (1, 2)
 """Version 1 had no further columns."""
 
-FIXED = ("X_OG", "width", "id", "object", "score")
+FIXED_COLUMNS = ("width", "id", "object", "score")
+"""Columns that every set has."""
+FIXED = ("X_OG", *FIXED_COLUMNS)
+"""Arrays that every set has."""
 TEXT = ("id", "object")
 PREFIX = "column:"
 """Of the names of further columns in `.npz`."""
@@ -47,29 +48,41 @@ PREFIX = "column:"
 Columns = dict[str, NDArray[Any]]
 
 
-def save_grasps(grasps: GraspSet, path: str | Path) -> None:
-    """See `GraspSet.save`."""
+def write_grasp_file(
+    path: str | Path, provenance: Mapping[str, Any], fixed: Columns, columns: Columns
+) -> None:
+    """Writes a set of N grasps; see `GraspSet.save`.
+
+    Args:
+        path: ends in `.npz` or `.h5`.
+        provenance: JSON values.
+        fixed: the arrays of `FIXED`: (N, 4, 4) poses, and (N,) each of the others.
+        columns: (N,) further values by name.
+
+    Raises:
+        InvalidInputError: another suffix, or the place cannot be written to.
+    """
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".h5", ".hdf5"):
         raise InvalidInputError(f"{path} ends in {suffix!r}; give a name that ends in .npz or .h5")
-    provenance = with_shareable_references(grasps.provenance, Path(path).absolute().parent)
-    header = {"format": FORMAT, "version": VERSION, "provenance": provenance}
-    fixed = {name: getattr(grasps, name) for name in FIXED}
+    shareable = with_shareable_references(provenance, Path(path).absolute().parent)
+    header = {"format": FORMAT, "version": VERSION, "provenance": shareable}
     write = _npz if suffix == ".npz" else _hdf5
-    atomic_write(path, write(header, fixed, dict(grasps.columns)))
+    atomic_write(path, write(header, fixed, columns))
 
 
-def load_grasps(path: str | Path) -> GraspSet:
-    """See `GraspSet.load`."""
-    path = Path(path)
-    with reporting_read_errors(path, "a grasp set written by burg_drake"):
-        header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
-        if not isinstance(header["provenance"], dict):
-            raise ValueError("its provenance is no mapping")
-        provenance = with_resolved_references(header["provenance"], path.absolute().parent)
-        grasps = GraspSet(**fixed, provenance=provenance, columns=columns)
-        require_valid(grasps)
-        return grasps
+def read_grasp_file(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
+    """Provenance, fixed arrays and further columns, as `write_grasp_file` takes them.
+
+    Raises:
+        ValueError: or another of `core.files.READ_ERRORS`, where the file is not as it was written.
+        InvalidInputError: a file of another format or of a newer version.
+    """
+    header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
+    if not isinstance(header["provenance"], dict):
+        raise ValueError("its provenance is no mapping")
+    provenance = with_resolved_references(header["provenance"], path.absolute().parent)
+    return provenance, fixed, columns
 
 
 def _check(path: Path, header: dict[str, Any]) -> None:

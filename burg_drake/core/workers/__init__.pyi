@@ -1,14 +1,15 @@
-from .crew import (
-    serve as serve,
-    work_through as work_through,
-)
-from .prefetch import (
-    OrderedWorker as OrderedWorker,
-    Prefetcher as Prefetcher,
-)
+from .limits import TimeLimit as TimeLimit
+from .pool import WorkerPool as WorkerPool
+from .prefetch import Prefetcher as Prefetcher
 from .processes import (
     cause_of_death as cause_of_death,
     default_workers as default_workers,
     start_worker as start_worker,
-    was_ended_from_outside as was_ended_from_outside,
 )
+from .tasks import (
+    Session as Session,
+    Task as Task,
+    WorkerFuture as WorkerFuture,
+)
+from .unordered import map_unordered as map_unordered
+from .worker import report_progress as report_progress

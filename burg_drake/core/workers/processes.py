@@ -32,7 +32,7 @@ def default_workers() -> int:
     return os.cpu_count() or 1
 
 
-def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
+def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes], Connection]:
     """Starts a process with our import path.
 
     An interrupt from the keyboard reaches the whole group of processes. Workers start with it
@@ -42,6 +42,7 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
     Args:
         module: has a function `main(handle: int)`, called with the file descriptor of its end of
             the pipe.
+        arguments: of that function, after the first.
 
     Returns:
         The process and our end of the pipe.
@@ -50,7 +51,8 @@ def start_worker(module: str) -> tuple[subprocess.Popen[bytes], Connection]:
     program = (
         f"import sys; sys.path[:] = {sys.path!r};"
         f" from {__name__} import end_with_parent; end_with_parent({os.getpid()});"
-        f" from {module} import main; main({theirs.fileno()})"
+        f" from {module} import main;"
+        f" main{(theirs.fileno(), *arguments)!r}"
     )
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
@@ -78,14 +80,19 @@ def end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, name="parent-watch", daemon=True).start()
 
 
-def cause_of_death(process: subprocess.Popen[bytes], last_words: str = "") -> str:
-    """Why a worker process ended, in half a sentence; waits for its end."""
+def cause_of_death(process: subprocess.Popen[bytes], reason: str = "") -> str:
+    """Why a worker process ended, in half a sentence; waits for its end.
+
+    Args:
+        process: the worker.
+        reason: what it has said itself about that.
+    """
     code = process.wait()
     if code < 0:
         name = signal.Signals(-code).name
         outside = " from outside" if was_ended_from_outside(process) else ""
         return f"the worker process was ended{outside} by {name}"
-    return f"the worker process ended: {last_words or f'exit code {code}'}"
+    return f"the worker process ended: {reason or f'exit code {code}'}"
 
 
 def was_ended_from_outside(process: subprocess.Popen[bytes]) -> bool:

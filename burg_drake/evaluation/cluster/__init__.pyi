@@ -1,1 +1,4 @@
-from .dask_executor import connect_cluster as connect_cluster
+from .dask_executor import (
+    DaskExecutor as DaskExecutor,
+    connect_cluster as connect_cluster,
+)

@@ -16,10 +16,10 @@ from typing import Any
 from distributed import WorkerPlugin, get_worker
 
 from burg_drake.core import BurgError, SimulationError
+from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.bundles import JudgeRecipe, unpack
-from burg_drake.evaluation.stages import Verdict
-from burg_drake.evaluation.workers import Job, JobFailed, Pool, WorkerLimits
+from burg_drake.evaluation.workers import Job, JobFailed, JudgePool, WorkerLimits
 
 IDLE = 60.0
 """A child without work ends after that time, as its driver may be gone [s]."""
@@ -78,8 +78,8 @@ class Supervisor(WorkerPlugin):
 
     def setup(self, worker: Any) -> None:
         """Called by Dask as the worker starts, or as the plugin is registered."""
-        self._pools: list[Pool] = []
-        self._idle: list[Pool] = []
+        self._pools: list[JudgePool] = []
+        self._idle: list[JudgePool] = []
         self._lock = threading.Lock()
         self._timers: dict[int, threading.Timer] = {}
         self._stopped = False
@@ -122,7 +122,7 @@ class Supervisor(WorkerPlugin):
             error=failed[0].error if failed else None,
         )
 
-    def _take(self, limits: WorkerLimits) -> Pool | None:
+    def _take(self, limits: WorkerLimits) -> JudgePool | None:
         with self._lock:
             if self._stopped:
                 return None
@@ -130,11 +130,11 @@ class Supervisor(WorkerPlugin):
                 pool = self._idle.pop()
                 self._timers.pop(id(pool)).cancel()
             else:
-                pool = Pool(1, limits)
+                pool = JudgePool(1, limits)
                 self._pools.append(pool)
             return pool
 
-    def _give_back(self, pool: Pool) -> None:
+    def _give_back(self, pool: JudgePool) -> None:
         with self._lock:
             if self._stopped:
                 return
@@ -144,7 +144,7 @@ class Supervisor(WorkerPlugin):
             self._timers[id(pool)] = timer
             timer.start()
 
-    def _end(self, pool: Pool) -> None:
+    def _end(self, pool: JudgePool) -> None:
         with self._lock:
             if pool not in self._idle:
                 return

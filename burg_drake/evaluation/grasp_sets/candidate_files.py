@@ -23,7 +23,7 @@ from burg_drake.evaluation.candidates import (
 from burg_drake.evaluation.grasp_sets.input import read_input
 from burg_drake.evaluation.grasp_sets.near_objects import require_near
 from burg_drake.formats.common import PANDA, Frame, Gripper, with_objects_renamed
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 OBJECT_ID, SCENE_ID = "object_id", "scene_id"
 """Columns by which files of several objects, or of several scenes, tell theirs apart."""
@@ -49,7 +49,7 @@ class GivenGrasps:
 
 
 def read_grasps(
-    scene: Scene,
+    scene: SceneLike,
     path: str | Path,
     gripper: Gripper = PANDA,
     *,
@@ -84,6 +84,7 @@ def read_grasps(
         InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
         UnknownNameError: an object, instance or scene that is not there.
     """
+    scene = as_scene(scene)
     imported = read_input(path, format, gripper)
     names = InstanceNames(scene, str(path), dict(objects or {}))
     grasps = _of_one_scene(imported.grasps, scene_id, names.path)

@@ -18,13 +18,13 @@ from burg_drake.evaluation.candidates import (
 )
 from burg_drake.evaluation.grasp_sets.provenance import object_files, set_documents
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 
 def sample_grasps(
-    source: Scene | ObjectLibrary,
-    station: Station,
+    source: SceneLike | ObjectLibrary,
+    station: StationLike,
     n: int,
     *,
     seed: int = 0,
@@ -50,7 +50,12 @@ def sample_grasps(
         UnknownNameError: no such instance or object, or a mesh file is missing.
     """
     chosen = settings or SamplingSettings()
-    scene, library = (source, source.library) if isinstance(source, Scene) else (None, source)
+    station = as_station(station)
+    if isinstance(source, ObjectLibrary):
+        scene, library = None, source
+    else:
+        scene = as_scene(source)
+        library = scene.library
     stream = (
         sample_library(library, station, n, seed, chosen, only)
         if scene is None
@@ -58,7 +63,9 @@ def sample_grasps(
     )
     sampled = dict(stream)
     if not sampled:
-        raise InvalidInputError(f"{source.name!r} has no free objects; nothing to sample on")
+        raise InvalidInputError(
+            f"{(scene or library).name!r} has no free objects; nothing to sample on"
+        )
     return sampled_set(sampled, library, scene, station, n, seed, chosen)
 
 

@@ -27,8 +27,8 @@ from burg_drake.grasping.quality import (
     score_of,
 )
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 BATCH = 2000
 """Grasps that are scored at a time; a grasp's figures do not depend on it."""
@@ -39,8 +39,8 @@ SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
 def scored_set(
     grasps: GraspSet,
     library: ObjectLibrary,
-    station: Station,
-    scene: Scene | None = None,
+    station: StationLike,
+    scene: SceneLike | None = None,
     *,
     friction: Mapping[str, float] | None = None,
     by: str = DEFAULT_METRIC,
@@ -71,6 +71,8 @@ def scored_set(
             on, or the metric needs a scene.
         MeshError: the surface of an object cannot be used.
     """
+    station = as_station(station)
+    scene = None if scene is None else as_scene(scene)
     check_metric(by)
     if by == "gravity_margin" and scene is None:
         raise InvalidInputError("gravity_margin needs to know where up is; give a scene")

@@ -1,1 +1,4 @@
-from .runs import unite as unite
+from .runs import (
+    merge_runs as merge_runs,
+    unite as unite,
+)

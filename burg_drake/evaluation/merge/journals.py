@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import open_regular
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.evaluation.records import LONGEST_LINE, encode, journal_lines
-from burg_drake.evaluation.stages import Verdict
 
 INTERRUPTED, FAILED, JUDGED = 1, 2, 3
 """How much a verdict is worth: one whose worker was ended from outside gives way to one about a

@@ -12,14 +12,13 @@ import re
 import secrets
 import shutil
 from collections.abc import Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core import BurgError, InvalidInputError, listing
-from burg_drake.core.documents import load_document, save_document
+from burg_drake.core import InvalidInputError, listing
 from burg_drake.core.files import writable_folder
-from burg_drake.core.paths import PACKAGE_URI, portable_reference, resolve
+from burg_drake.evaluation.merge.campaigns import merge_campaigns
 from burg_drake.evaluation.merge.finishing import (
     MissingFromMerge,
     finish,
@@ -27,29 +26,9 @@ from burg_drake.evaluation.merge.finishing import (
     note_unfinished,
     unfinished,
 )
-from burg_drake.evaluation.merge.journals import JournalChoice, choose, chosen_lines
-from burg_drake.evaluation.records import (
-    JOURNAL_FILE,
-    Shard,
-    WorkSession,
-    differences,
-    identity,
-    share,
-    unchanged,
-)
-from burg_drake.evaluation.store import (
-    GRASPS_FILE,
-    SCENE_FILE,
-    STATION_FILE,
-    Campaign,
-    Run,
-    is_campaign,
-    open_results,
-    portable_station,
-    save_run,
-)
-from burg_drake.scene.document import SceneDocument, save_scene
-from burg_drake.station.document import StationDocument
+from burg_drake.evaluation.merge.united import missing_shards, write_united
+from burg_drake.evaluation.records import unchanged
+from burg_drake.evaluation.store import Campaign, Run, is_campaign, open_results
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +114,6 @@ def _unite(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
     try:
         campaigns = [result for result in results if isinstance(result, Campaign)]
         if campaigns:
-            from burg_drake.evaluation.merge.campaigns import merge_campaigns
-
             left = merge_campaigns(campaigns, beside, folder)
         else:
             runs = [result for result in results if isinstance(result, Run)]
@@ -147,106 +124,6 @@ def _unite(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
         return left
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-
-
-def write_united(
-    runs: Sequence[Run], beside: Path, folder: Path, shard: str | None = None
-) -> JournalChoice:
-    """Writes a united run, but for what is made from its journal.
-
-    Args:
-        runs: of one scene.
-        beside: an empty folder to write it to.
-        folder: where it is to be, which references have to fit.
-        shard: that the united run is; what all of them are if None.
-
-    Returns:
-        Which verdicts were taken.
-
-    Raises:
-        InvalidInputError: the runs are not of the same, or disagree.
-    """
-    first = runs[0]
-    for run in runs[1:]:
-        require_mergeable(first, run)
-    shard = common_shard(runs) if shard is None else shard
-    ids = share(first.candidates.id, shard)
-    journals = [run.path / JOURNAL_FILE for run in runs]
-    choice = choose(journals, ids)
-    shutil.copyfile(first.path / GRASPS_FILE, beside / GRASPS_FILE)
-    with (beside / JOURNAL_FILE).open("wb") as stream:
-        stream.writelines(chosen_lines(journals, choice))
-        stream.flush()
-        os.fsync(stream.fileno())
-    document = replace(
-        first.document,
-        shard=shard,
-        stretches=all_sessions([run.document.stretches for run in runs]),
-    )
-    save_run(Run(beside, document))
-    copy_documents(first, beside, folder)
-    return choice
-
-
-def require_mergeable(first: Run, other: Run) -> None:
-    """Refuses to unite runs that are not of the same.
-
-    Raises:
-        InvalidInputError: names every difference.
-    """
-    a, b = first.document, other.document
-    if a.hash == b.hash:
-        return
-    found = differences(identity(a), identity(b))
-    if not found:
-        found = [f"grasps are {a.grasps.content[:12]} there, {b.grasps.content[:12]} here"]
-    raise InvalidInputError(
-        f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only shards and"
-        " copies of one run can be united"
-    )
-
-
-def copy_documents(run: Run, beside: Path, folder: Path) -> None:
-    """Copies scene and station of a run, with references that hold in another folder."""
-    for name in (SCENE_FILE, STATION_FILE):
-        shutil.copyfile(run.path / name, beside / name)
-    scene = load_document(run.path / SCENE_FILE, SceneDocument)
-    if not scene.library.startswith(PACKAGE_URI):
-        with suppress(BurgError):  # it is gone: the run's document knows where it was
-            root = resolve(scene.library, "models", run.path)
-            library = portable_reference(root, folder)
-            save_scene(replace(scene, library=library), beside / SCENE_FILE)
-    station = load_document(run.path / STATION_FILE, StationDocument)
-    told = [station.hand, *([station.arm.model] if station.arm else []), *station.packages.values()]
-    if not all(reference.startswith(PACKAGE_URI) for reference in told):
-        with suppress(BurgError):
-            save_document(portable_station(run.station(), folder), beside / STATION_FILE)
-
-
-def common_shard(runs: Sequence[Run | Campaign]) -> str:
-    """The shard that all of them are; empty if they are several, or none."""
-    shards = {run.document.shard for run in runs}
-    return shards.pop() if len(shards) == 1 else ""
-
-
-def missing_shards(runs: Sequence[Run | Campaign]) -> tuple[str, ...]:
-    """Shards of the same number that are not among runs; none if one of them is of everything."""
-    shards = [run.document.shard for run in runs]
-    if not all(shards):
-        return ()
-    counts = {Shard.parse(shard).count for shard in shards}
-    return tuple(
-        f"{k}/{count}"
-        for count in (counts if len(counts) == 1 else ())
-        for k in range(1, count + 1)
-        if f"{k}/{count}" not in shards
-    )
-
-
-def all_sessions(stretches: Sequence[Sequence[WorkSession]]) -> tuple[WorkSession, ...]:
-    """All stretches of work, by their beginning."""
-    found = dict.fromkeys(stretch for some in stretches for stretch in some)
-    return tuple(sorted(found, key=lambda stretch: stretch.started))
 
 
 def move(beside: Path, folder: Path) -> None:

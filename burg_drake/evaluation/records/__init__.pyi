@@ -67,7 +67,6 @@ from .shard import (
     share as share,
 )
 from .table import (
-    CPU_COLUMNS as CPU_COLUMNS,
     INPUT_PREFIX as INPUT_PREFIX,
     TEXT as TEXT,
     Columns as Columns,
@@ -83,8 +82,6 @@ from .table_file import (
     write_table as write_table,
 )
 from .trial import (
-    MOVED as MOVED,
-    PUSHED as PUSHED,
     RecordedTrial as RecordedTrial,
     read_trial as read_trial,
 )

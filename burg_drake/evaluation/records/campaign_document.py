@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError, content_hash, listing
+from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import require_name
 from burg_drake.evaluation.records.run_document import (
     HASH_DIGITS,
@@ -18,7 +19,6 @@ from burg_drake.evaluation.records.run_document import (
     what_is_asked,
 )
 from burg_drake.evaluation.records.shard import Shard, as_shard
-from burg_drake.evaluation.stages import Mode
 from burg_drake.station.document import Engine
 
 FEW_SCENES = 100

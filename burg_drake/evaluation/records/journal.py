@@ -7,7 +7,6 @@ one at the end, which is cut off when the run goes on.
 from __future__ import annotations
 
 import json
-import math
 import os
 import stat
 from collections.abc import Iterator
@@ -15,14 +14,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from burg_drake.core import InvalidInputError, quoted
+from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import parse_json
 from burg_drake.core.files import open_regular
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import VERDICT_FIELDS, Verdict
 from burg_drake.evaluation.records.folder_lock import being_written, lock
-from burg_drake.evaluation.stages import Verdict
 
 JOURNAL_FILE = "journal.jsonl"
+ORIGINAL = frozenset(
+    {"outcome", "stage", "blocker", "reason", "margins", "q_grasp", "q_pregrasp", "cpu"}
+)
+"""Fields that all releases have written; others are empty in lines that lack them."""
 LONGEST_LINE = 1 << 20
 """Bytes; what is longer was not written by `encode`, whose lines have some hundred."""
 
@@ -125,20 +127,8 @@ def journal_lines(
 
 def encode(id: str, verdict: Verdict) -> bytes:
     """One line for one grasp; numbers that are not finite become null."""
-    record: dict[str, Any] = {
-        "id": id,
-        "outcome": verdict.outcome.value,
-        "stage": verdict.stage.value,
-        "blocker": verdict.blocker,
-        "reason": verdict.reason,
-        "margins": {k: _finite(v) for k, v in verdict.margins.items()},
-        "displacements": {k: _finite(v) for k, v in verdict.displacements.items()},
-        "pushed": {k: _finite(v) for k, v in verdict.pushed.items()},
-        "touched": verdict.touched,
-        "q_grasp": list(verdict.q_grasp),
-        "q_pregrasp": list(verdict.q_pregrasp),
-        "cpu": {stage.value: round(seconds, 6) for stage, seconds in verdict.cpu.items()},
-    }
+    record: dict[str, Any] = {"id": id}
+    record |= {one.name: one.to_json(getattr(verdict, one.name)) for one in VERDICT_FIELDS}
     if verdict.interrupted:
         record["interrupted"] = True
     return json.dumps(record, separators=(",", ":"), allow_nan=False).encode() + b"\n"
@@ -151,37 +141,10 @@ def decode(line: bytes) -> tuple[str, Verdict]:
         ValueError, KeyError, TypeError, AttributeError: it was not written by `encode`.
     """
     record: dict[str, Any] = parse_json(line.decode(), "a line")
-    return str(record["id"]), Verdict(
-        outcome=Outcome(record["outcome"]),
-        stage=Stage(record["stage"]),
-        blocker=_text(record["blocker"]),
-        reason=_text(record["reason"]),
-        margins=_numbers(record["margins"]),
-        displacements=_numbers(record.get("displacements", {})),  # older journals have none
-        pushed=_numbers(record.get("pushed", {})),
-        touched=_text(record.get("touched", "")),
-        q_grasp=tuple(map(_number, record["q_grasp"])),
-        q_pregrasp=tuple(map(_number, record["q_pregrasp"])),
-        cpu={Stage(stage): _number(seconds) for stage, seconds in record["cpu"].items()},
-        interrupted=record.get("interrupted", False) is True,
-    )
-
-
-def _numbers(values: dict[str, float | None]) -> dict[str, float]:
-    return {name: math.nan if value is None else _number(value) for name, value in values.items()}
-
-
-def _number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise TypeError(f"{quoted(value)} is no number")
-    return float(value)
-
-
-def _text(value: object) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"{quoted(value)} is no text")
-    return value
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    known = {
+        one.name: one.from_json(record[one.name])
+        for one in VERDICT_FIELDS
+        if one.name in record or one.name in ORIGINAL
+    }
+    interrupted = record.get("interrupted", False) is True
+    return str(record["id"]), Verdict(**known, interrupted=interrupted)

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from burg_drake.core import InvalidInputError, nearest, quoted
 from burg_drake.core.documents import Reader, parse_nodes
+from burg_drake.core.grasps import MODES, Mode
 from burg_drake.evaluation.records.motion_numbers import gathered, without_motion
-from burg_drake.evaluation.stages import MODES, Mode
 from burg_drake.station.document import ENGINES, Engine
 
 if TYPE_CHECKING:

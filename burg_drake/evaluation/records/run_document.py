@@ -11,10 +11,10 @@ from typing import Literal, Protocol
 
 from burg_drake import __version__
 from burg_drake.core import InvalidInputError, content_hash
+from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import data_root
 from burg_drake.evaluation.records.motion_numbers import motion_in, motion_text, without_motion
 from burg_drake.evaluation.records.origin import TrialOrigin, engine_label
-from burg_drake.evaluation.stages import Mode
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, Station
 

@@ -5,9 +5,9 @@
     blocker, reason           the body in the way; the simulator's message if it failed
     width, score              distance of the contacts [m]; the sampler's score
     x, y, z, qw, qx, qy, qz   grasp frame in the object frame [m; quaternion]
-    overlap ... end_time      margins, see `simulation.result.Margins` (SI units)
+    overlap ... end_time      margins, see `core.grasps.Margins` (SI units)
     moved_NAME                peak displacement of each object that was not the target [m]
-    arm_clearance ... pushed  in the modes `reach` and `arm`: see `judge.ARM_MARGINS` (SI units)
+    arm_clearance ... pushed  in the modes `reach` and `arm`: see `core.grasps.Margins`
     pushed_NAME, touched      in mode `arm`: displacement of each object before the hand closed [m];
                               what the arm touched first against its plan
     friction, mass            of the target, where the trial had others than the library's [-; kg]
@@ -48,22 +48,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import quaternion_from_rotation
-from burg_drake.core.grasps import INPUT_PREFIX, Stage
+from burg_drake.core.grasps import (
+    COST,
+    DECIDED,
+    INPUT_PREFIX,
+    MEASURED,
+    POSTURE,
+    VERDICT_FIELDS,
+    TableShape,
+    Verdict,
+    fields_in,
+)
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records.origin import ORIGIN_TEXT, TrialOrigin, engine_label
-from burg_drake.evaluation.records.trial import MOVED, PUSHED, RecordedTrial, pose_text
-from burg_drake.evaluation.stages import ARM_MARGINS, ARM_SCREEN_MARGINS, MARGINS, Mode, Verdict
+from burg_drake.evaluation.records.trial import RecordedTrial, pose_text
 
 Columns = dict[str, NDArray[Any]]
 
-CPU_COLUMNS = {
-    Stage.CLEAR: "cpu_clear",
-    Stage.REACHABLE: "cpu_reach",
-    Stage.PLANNED: "cpu_plan",
-    Stage.EXECUTED: "cpu_trial",
-}
 TEXT = (
-    *("id", "instance", "object", "outcome", "stage", "blocker", "reason", "touched"),
+    *("id", "instance", "object"),
+    *(one.name for one in VERDICT_FIELDS if one.is_text),
     *("engine", "run"),
     *ORIGIN_TEXT,
     "X_OG",
@@ -117,57 +121,47 @@ def trial_columns(
     rows = [t.verdict for t in trials if t.verdict is not None]
     if len(rows) != len(trials):
         raise ValueError("a table is made of judged trials only")
+    shape = TableShape(origin.mode, instances, joints)
     X_OG = np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)
     wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if rows else np.empty((0, 4))
     columns: Columns = {
         "id": _texts([t.id for t in trials]),
         "instance": _texts([t.instance for t in trials]),
         "object": _texts([t.object for t in trials]),
-        "outcome": _texts([v.outcome.value for v in rows]),
-        "stage": _texts([v.stage.value for v in rows]),
-        "blocker": _texts([v.blocker for v in rows]),
-        "reason": _texts([v.reason for v in rows]),
+        **verdict_columns(rows, DECIDED, shape),
         "width": _numbers([t.width for t in trials]),
         "score": _numbers([t.score for t in trials]),
         **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
         **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        **{name: _numbers([v.margins.get(name) for v in rows]) for name in _margins(origin.mode)},
-        **{MOVED + name: _numbers([v.displacements.get(name) for v in rows]) for name in instances},
-        **(_arm_columns(rows, instances) if origin.mode == "arm" else {}),
+        **verdict_columns(rows, MEASURED, shape),
         "friction": _numbers([t.friction for t in trials]),
         "mass": _numbers([t.mass for t in trials]),
+        **verdict_columns(rows, POSTURE, shape),
     }
-    for name in ("q_grasp", "q_pregrasp"):
-        for k in range(joints):
-            angles = [q[k] if len(q := getattr(v, name)) > k else None for v in rows]
-            columns[f"{name}_{k + 1}"] = _numbers(angles)
     columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
     columns["engine"] = _same(engine_label(origin.engine), len(rows))
     columns["run"] = _same(origin.run, len(rows))
-    for stage, name in CPU_COLUMNS.items():
-        if stage is not Stage.PLANNED or origin.mode == "arm":
-            columns[name] = _numbers([v.cpu.get(stage) for v in rows])
+    columns |= verdict_columns(rows, COST, shape)
     for name, text in origin.cells().items():
         columns[name] = _same(text, len(rows))
     columns["X_OG"] = _texts([pose_text(t.X_OG) for t in trials])
     return columns
 
 
+def verdict_columns(rows: Sequence[Verdict], part: str, shape: TableShape) -> Columns:
+    """The columns of verdicts that lie in a part of a row, see `core.grasps.verdict_field`."""
+    columns: Columns = {}
+    for one in fields_in(shape.mode, part):
+        values = [getattr(verdict, one.name) for verdict in rows]
+        make = _texts if one.is_text else _numbers
+        for name, key in one.columns(shape).items():
+            columns[name] = make([one.cell(value, key) for value in values])
+    return columns
+
+
 def table_row(columns: Columns, index: int) -> dict[str, Any]:
     """One row as Python values by column."""
     return {name: values[index].item() for name, values in columns.items()}
-
-
-def _margins(mode: Mode) -> list[str]:
-    """The margins that a mode measures."""
-    without = {"hand": ARM_MARGINS, "reach": ARM_MARGINS[len(ARM_SCREEN_MARGINS) :], "arm": ()}
-    return [name for name in MARGINS if name not in without[mode]]
-
-
-def _arm_columns(rows: Sequence[Verdict], instances: Sequence[str]) -> Columns:
-    """What only trials of the whole arm have."""
-    pushed = {PUSHED + name: _numbers([v.pushed.get(name) for v in rows]) for name in instances}
-    return {**pushed, "touched": _texts([v.touched for v in rows])}
 
 
 def _plain(values: NDArray[Any]) -> NDArray[Any]:

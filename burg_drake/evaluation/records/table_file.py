@@ -29,10 +29,8 @@ from burg_drake.core.files import (
     short_message,
     text_array,
 )
-from burg_drake.core.grasps import csv_metadata, describe, metadata_path
+from burg_drake.core.grasps import MARGINS, MOVED, PUSHED, csv_metadata, describe, metadata_path
 from burg_drake.evaluation.records.table import INTEGER, TEXT, Columns
-from burg_drake.evaluation.records.trial import MOVED, PUSHED
-from burg_drake.evaluation.stages import MARGINS
 
 T = TypeVar("T", int, float)
 

@@ -11,17 +11,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, check_pose, nearest, quoted
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, TRIAL_FINDINGS, Outcome, Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records.origin import ORIGIN_TEXT
-from burg_drake.evaluation.stages import LIFT_HEIGHT, MARGINS, Verdict
 
 Name = TypeVar("Name", bound=StrEnum)
 
-MOVED = "moved_"
-"""Columns of displacements begin with this; the instance's name follows."""
-PUSHED = "pushed_"
-"""Likewise of those before the arm's hand closes."""
 LARGEST = 1e6
 """Of mass [kg] and friction; what is beyond cannot be simulated."""
 NEEDED = ("id", "instance", "outcome", "stage", "X_OG", "engine", *ORIGIN_TEXT)
@@ -125,16 +120,7 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
         )
     outcome = _member(Outcome, row["outcome"], f"{where}: outcome")
     stage = _member(Stage, row["stage"], f"{where}: stage")
-    verdict = Verdict(
-        outcome,
-        stage,
-        blocker=row.get("blocker", ""),
-        reason=row.get("reason", ""),
-        margins={name: row[name] for name in MARGINS if name in row},
-        displacements=_by_instance(row, MOVED),
-        pushed=_by_instance(row, PUSHED),
-        touched=row.get("touched", ""),
-    )
+    findings = {one.name: one.from_row(row) for one in TRIAL_FINDINGS}
     return RecordedTrial(
         id=row["id"],
         instance=row["instance"],
@@ -143,7 +129,7 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
         width=_number(row, "width", where),
         friction=_given(row, "friction", where),
         mass=_given(row, "mass", where),
-        verdict=verdict,
+        verdict=Verdict(outcome, stage, **findings),
     )
 
 
@@ -154,12 +140,6 @@ def _member(kind: type[Name], text: str, where: str) -> Name:
             f"{where} {quoted(text)} is not known to this release; {nearest(text, known)}"
         )
     return kind(text)
-
-
-def _by_instance(row: Mapping[str, Any], prefix: str) -> dict[str, float]:
-    """The finite cells of columns that begin with `prefix`, by what follows."""
-    cells = {k.removeprefix(prefix): float(v) for k, v in row.items() if k.startswith(prefix)}
-    return {name: value for name, value in cells.items() if math.isfinite(value)}
 
 
 def _given(row: Mapping[str, Any], name: str, where: str) -> float | None:

@@ -6,6 +6,12 @@ from .best_grasps import (
     ranked_set as ranked_set,
     shown_ids as shown_ids,
 )
+from .counts import (
+    PUSH as PUSH,
+    OutcomeCounts as OutcomeCounts,
+    Summary as Summary,
+    pushes as pushes,
+)
 from .notes import (
     run_notes as run_notes,
     shortfalls as shortfalls,
@@ -17,12 +23,7 @@ from .shortened_lifts import short_lifts as short_lifts
 from .status import (
     Status as Status,
     Watch as Watch,
+    read_status as read_status,
 )
-from .summary import (
-    PUSH as PUSH,
-    OutcomeCounts as OutcomeCounts,
-    Summary as Summary,
-    pushes as pushes,
-    summarize as summarize,
-)
+from .summary import summarize as summarize
 from .summary_tables import summary_view as summary_view

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import listing
-from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.evaluation.records import CPU_COLUMNS, PUSHED, motion_in
-from burg_drake.evaluation.results.shortened_lifts import short_lifts
-from burg_drake.evaluation.results.summary import (
+from burg_drake.core.grasps import CPU_COLUMNS, LIFT_HEIGHT, PUSHED, Outcome, Stage
+from burg_drake.evaluation.records import motion_in
+from burg_drake.evaluation.results.counts import (
     STAGES,
     OutcomeCounts,
     StageCost,
@@ -21,7 +20,7 @@ from burg_drake.evaluation.results.summary import (
     pushes,
     stage_cost,
 )
-from burg_drake.evaluation.stages import LIFT_HEIGHT
+from burg_drake.evaluation.results.shortened_lifts import short_lifts
 from burg_drake.evaluation.store import Campaign, StoredRows
 
 OUTCOMES = tuple(Outcome)

@@ -1,191 +1,34 @@
-"""What a run found, in numbers: counts by object, outcome and stage, rates, CPU time."""
+"""What a run found, in numbers: of one scene here, of many in `campaign_summary`."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from burg_drake.core import wilson_interval
-from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.evaluation.records import CPU_COLUMNS, PUSHED, Columns, motion_in
+from burg_drake.core.grasps import LIFT_HEIGHT, Outcome, Stage
+from burg_drake.evaluation.records import motion_in
+from burg_drake.evaluation.results.campaign_summary import summarize_campaign
+from burg_drake.evaluation.results.counts import (
+    STAGES,
+    OutcomeCounts,
+    StageCost,
+    Summary,
+    pushes,
+    stage_cost,
+)
 from burg_drake.evaluation.results.notes import run_notes
-from burg_drake.evaluation.results.shortened_lifts import ShortLifts, short_lifts
-from burg_drake.evaluation.stages import LIFT_HEIGHT, Mode
-from burg_drake.evaluation.store import Run, member_codes
+from burg_drake.evaluation.results.shortened_lifts import short_lifts
+from burg_drake.evaluation.store import Campaign, Run, member_codes
 
-if TYPE_CHECKING:
-    from burg_drake.evaluation.store import Campaign
-
-ARM_STAGES = (Stage.REACHABLE.value, Stage.PLANNED.value)
-"""Counts of the funnel that a run without the arm does not have."""
-STAGES: dict[Mode, tuple[Stage, ...]] = {
-    "hand": (Stage.CLEAR, Stage.EXECUTED),
-    "reach": (Stage.CLEAR, Stage.REACHABLE, Stage.EXECUTED),
-    "arm": tuple(Stage),
-}
-"""Stages whose cost is known by mode; that of `reachable` includes the search for motions, that of
-`planned` is their timing."""
 OUTCOMES, ALL_STAGES = tuple(Outcome), tuple(Stage)
-PUSH = 0.001
-"""Objects that the approach moved by more than this were pushed [m]."""
-
-
-@dataclass(frozen=True)
-class OutcomeCounts:
-    """Grasps of one object, or of all.
-
-    Attributes:
-        name: the object's name.
-        judged: number of grasps.
-        outcomes: number of grasps by outcome.
-        decided: number of grasps by the stage that decided.
-        failed: number of `simulation_failed` by the stage that failed.
-    """
-
-    name: str
-    judged: int
-    outcomes: Counter[Outcome]
-    decided: Counter[Stage]
-    failed: Counter[Stage]
-
-    @property
-    def clear(self) -> int:
-        """Grasps that passed the screen of the hand."""
-        return self.judged - self.decided[Stage.CLEAR]
-
-    @property
-    def reachable(self) -> int:
-        """Those where the arm can be, too; the same as `clear` where it was not asked."""
-        return self.clear - self.decided[Stage.REACHABLE]
-
-    @property
-    def planned(self) -> int:
-        """Those to which the arm can move, too, and from there up; likewise."""
-        return self.reachable - self.decided[Stage.PLANNED]
-
-    @property
-    def executed(self) -> int:
-        """Those whose trial came to an end."""
-        return self.planned - self.failed[Stage.EXECUTED]
-
-    @property
-    def held(self) -> int:
-        """Those whose target was held to the end."""
-        return sum(count for outcome, count in self.outcomes.items() if outcome.held)
-
-    @property
-    def lifted(self) -> int:
-        """Those that succeeded: held, and nothing else was disturbed."""
-        return self.outcomes[Outcome.LIFTED]
-
-    @property
-    def funnel(self) -> dict[str, int]:
-        """Counts from the first stage to success; none is larger than the one before."""
-        return {
-            "candidates": self.judged,
-            "clear": self.clear,
-            "reachable": self.reachable,
-            "planned": self.planned,
-            "executed": self.executed,
-            "held": self.held,
-            "lifted": self.lifted,
-        }
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the share of executed grasps that are lifted."""
-        return wilson_interval(self.lifted, self.executed)
-
-
-@dataclass(frozen=True)
-class StageCost:
-    """CPU time of a stage.
-
-    Attributes:
-        name: of the stage.
-        grasps: how many it looked at.
-        seconds: CPU time in all [s].
-        median: CPU time of the median grasp [s]; NaN where it is not known.
-    """
-
-    name: str
-    grasps: int
-    seconds: float
-    median: float
-
-    @property
-    def rate(self) -> float:
-        """Grasps a second of CPU time."""
-        return self.grasps / self.seconds if self.seconds > 0.0 else math.nan
-
-
-@dataclass(frozen=True)
-class Pushes:
-    """What the arm moved before the hand closed.
-
-    Attributes:
-        trials: in which the arm went to the grasp.
-        pushed: those in which it moved any free object, the target too, by more than `PUSH`.
-        largest: displacement of any of them [m].
-        target_pushed, target_largest: the same of the target alone.
-    """
-
-    trials: int
-    pushed: int
-    largest: float
-    target_pushed: int
-    target_largest: float
-
-    def __str__(self) -> str:
-        text = f"The approach pushed something by more than {1e3 * PUSH:g} mm"
-        text += f" in {self.pushed} of {self.trials} trials"
-        if self.pushed:
-            text += f" (largest {1e3 * self.largest:.1f} mm)"
-            text += f", the object to be grasped in {self.target_pushed}"
-        if self.target_pushed:
-            text += f" (largest {1e3 * self.target_largest:.1f} mm)"
-        return f"{text}."
-
-
-@dataclass(frozen=True)
-class Summary:
-    """A run in numbers.
-
-    Attributes:
-        objects: by object, in the order of the scene.
-        total: all together.
-        costs: by stage, sampling first.
-        mode: what was asked about each grasp.
-        pushes: what the arm's approaches pushed; None where no arm executed anything.
-        lifts: where there is no room for the whole lift; None if there is wherever there is any.
-        notes: what is missing, and why, one sentence each; see `run_notes`.
-        scenes: by scene, in a run over many, in their order.
-    """
-
-    objects: tuple[OutcomeCounts, ...]
-    total: OutcomeCounts
-    costs: tuple[StageCost, ...]
-    mode: Mode
-    pushes: Pushes | None = None
-    lifts: ShortLifts | None = None
-    notes: tuple[str, ...] = ()
-    scenes: tuple[OutcomeCounts, ...] = ()
-
-    @property
-    def steps(self) -> list[str]:
-        """Names of the funnel's counts that the mode has, first to last."""
-        return [n for n in self.total.funnel if self.mode != "hand" or n not in ARM_STAGES]
 
 
 def summarize(run: Run | Campaign) -> Summary:
     """Counts what a run, of one scene or of many, has found so far."""
     if not isinstance(run, Run):
-        from burg_drake.evaluation.results.campaign_summary import summarize_campaign
-
         return summarize_campaign(run)
     columns, document = run.results, run.document
     outcome = member_codes(columns["outcome"], OUTCOMES)
@@ -206,27 +49,6 @@ def summarize(run: Run | Campaign) -> Summary:
     )
 
 
-def pushes(columns: Columns) -> Pushes | None:
-    """What the arm pushed in the trials of a table; None if it executed nothing."""
-    if "pushed" not in columns:
-        return None
-    went = np.isfinite(columns["pushed"])
-    if not went.any():
-        return None
-    anything, instance = columns["pushed"][went], columns["instance"][went]
-    target = np.zeros(len(anything))
-    for name in np.unique(instance):
-        of = instance == name
-        target[of] = columns[PUSHED + name][went][of]
-    return Pushes(
-        trials=len(anything),
-        pushed=int((anything > PUSH).sum()),
-        largest=float(anything.max()),
-        target_pushed=int((target > PUSH).sum()),
-        target_largest=float(target.max()),
-    )
-
-
 def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> OutcomeCounts:
     """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`."""
     failed = stage[outcome == OUTCOMES.index(Outcome.SIMULATION_FAILED)]
@@ -242,11 +64,3 @@ def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> OutcomeCounts:
 def _counter(members: tuple[Any, ...], codes: np.ndarray) -> Counter[Any]:
     counts = np.bincount(codes, minlength=len(members)).tolist()
     return Counter({member: n for member, n in zip(members, counts, strict=True) if n})
-
-
-def stage_cost(columns: Columns, stage: Stage) -> StageCost:
-    """CPU time of a stage, from its column."""
-    cpu = columns[CPU_COLUMNS[stage]]
-    cpu = cpu[np.isfinite(cpu)]
-    median = float(np.median(cpu)) if len(cpu) else math.nan
-    return StageCost(stage.value, len(cpu), float(cpu.sum()), median)

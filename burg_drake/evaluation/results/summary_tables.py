@@ -13,7 +13,7 @@ from burg_drake.core.terminal import (
     format_number,
     format_percent,
 )
-from burg_drake.evaluation.results.summary import OutcomeCounts, Summary
+from burg_drake.evaluation.results.counts import OutcomeCounts, Summary
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType, RenderResult

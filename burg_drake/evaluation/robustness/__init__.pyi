@@ -1,8 +1,14 @@
-from .assessment import assess_robustness as assess_robustness
+from .assessment import (
+    Robustness as Robustness,
+    assess_robustness as assess_robustness,
+)
 from .probes import RobustnessSettings as RobustnessSettings
 from .shares import (
     TABLE_FILES as TABLE_FILES,
     lifted_shares as lifted_shares,
     own_table as own_table,
 )
-from .table import robustness_view as robustness_view
+from .table import (
+    GraspRobustness as GraspRobustness,
+    robustness_view as robustness_view,
+)

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import writable_folder
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
@@ -26,15 +26,14 @@ from burg_drake.evaluation.records import (
     software_versions,
     write_table,
 )
+from burg_drake.evaluation.robustness.probe_judge import ProbeJudgeFactory
 from burg_drake.evaluation.robustness.probes import (
     Probe,
-    ProbeJudgeFactory,
     RobustnessSettings,
     known_answers,
     make_probes,
 )
 from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_columns
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.workers import judge_all
 
@@ -177,11 +176,13 @@ def _answer(
         STARTING, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
     pace = ProgressMeter(reporter.show, begin, "testing", work=work)
-    with closing(judge_all(todo, factory, workers=workers)) as answered:
+    tests = {probe.id: probe.test for probe in todo}
+    trials = [probe.trial for probe in todo]
+    factory = replace(factory, tests=tests)
+    with closing(judge_all(trials, factory, workers=workers)) as answered:
         for asked, verdict in answered:
-            assert isinstance(asked, Probe)
             journal.append(asked.id, verdict)
-            pace.step(work=COST[asked.test])
+            pace.step(work=COST[tests[asked.id]])
 
 
 def _trial_time(run: Run, probes: Sequence[Probe]) -> float:
@@ -197,7 +198,7 @@ def _gather(
     context: Sequence[object],
 ) -> GraspRobustness:
     instance = factory.scene.instance(grasp.instance)
-    return GraspRobustness.from_verdicts(
+    return GraspRobustness.from_answers(
         grasp.id,
         grasp.instance,
         instance.object,

@@ -1,38 +1,31 @@
-"""What is asked about the robustness of one grasp, and how a worker answers.
+"""What is asked about the robustness of one grasp.
 
 A probe is one question about one grasp: how hard it can be tugged or shaken, how much friction it
-needs, or what becomes of one perturbed repeat of its trial. Probes go to the same workers as the
-grasps of an evaluation, and their answers are verdicts: numbers are among the margins. An infinite
-one, which stands for a limit beyond all that is tried, comes back from a journal as NaN.
+needs, or what becomes of one perturbed repeat of its trial. What an answer is, is in
+`probe_answer`; how a worker finds it, in `probe_judge`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import count, takewhile
 from typing import TYPE_CHECKING
 
 from burg_drake.core import InvalidInputError, UnknownNameError, content_hash, nearest
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Decide, Decision, Screen, Verdict, trial_decision
+from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.robustness import (
     FrictionSettings,
     LoadSettings,
     Noise,
-    friction_limit,
     perturb,
-    shake,
-    take_grip,
-    tug,
 )
-from burg_drake.simulation.trials import TrialResult
-from burg_drake.station.document import Engine, Station
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.trials import TrialSettings
+    pass
 
 TESTS = ("tug", "shake", "friction", "noise")
 HASH_DIGITS = 8
@@ -74,16 +67,23 @@ class RobustnessSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Probe(Candidate):
+class Probe:
     """One question.
 
     Attributes:
         test: one of `TESTS`.
-        grasp: id of the grasp; the probe's own `id` tells test, repeat and settings, too.
+        grasp: id of the grasp.
+        trial: the grasp as it is tried, perturbed or not; its id tells test, repeat and settings.
     """
 
-    test: str = ""
-    grasp: str = ""
+    test: str
+    grasp: str
+    trial: Candidate
+
+    @property
+    def id(self) -> str:
+        """Under which the answer is kept."""
+        return self.trial.id
 
 
 def make_probes(
@@ -101,7 +101,8 @@ def make_probes(
         key = _key(test, settings, context)
         if test != "noise":
             id = _probe_id(grasp.id, test, key)
-            yield Probe(id, grasp.instance, grasp.X_OG, lift=grasp.lift, test=test, grasp=grasp.id)
+            trial = Candidate(id, grasp.instance, grasp.X_OG, lift=grasp.lift)
+            yield Probe(test, grasp.id, trial)
             continue
         entry = scene.entry(grasp.instance)
         for repeat in range(settings.repeats):
@@ -114,16 +115,15 @@ def make_probes(
                 grasp=grasp.id,
                 repeat=repeat,
             )
-            yield Probe(
+            trial = Candidate(
                 _probe_id(grasp.id, test, key, repeat),
                 grasp.instance,
                 drawn.X_OG,
                 drawn.friction,
                 drawn.mass,
                 lift=grasp.lift,
-                test=test,
-                grasp=grasp.id,
             )
+            yield Probe(test, grasp.id, trial)
 
 
 def known_answers(
@@ -131,24 +131,25 @@ def known_answers(
     answers: Mapping[str, Verdict],
     settings: RobustnessSettings,
     context: Sequence[object],
-) -> list[tuple[str, Verdict]]:
+) -> list[ProbeAnswer]:
     """Answers about a grasp, whichever call asked for them: all tests, and all repeats.
 
     Args:
         grasp: its id.
-        answers: by the id of the probe.
+        answers: by the id of the probe, as a journal has them.
         settings: only answers found with these count; tests and number of repeats do not matter.
         context: as for `make_probes`.
 
     Returns:
-        Pairs of a test and its answer; of the repeats those up to the first that is missing.
+        In the order of tests; of the repeats those up to the first that is missing.
     """
-    found = []
+    found: list[ProbeAnswer] = []
     for test in TESTS:
         key = _key(test, settings, context)
         repeats: Iterable[int | None] = count() if test == "noise" else (None,)
         ids = (_probe_id(grasp, test, key, repeat) for repeat in repeats)
-        found += [(test, answers[id]) for id in takewhile(answers.__contains__, ids)]
+        known = takewhile(answers.__contains__, ids)
+        found += [ProbeAnswer.from_verdict(test, answers[id]) for id in known]
     return found
 
 
@@ -158,53 +159,3 @@ def _key(test: str, settings: RobustnessSettings, context: Sequence[object]) -> 
 
 def _probe_id(grasp: str, test: str, key: str, repeat: int | None = None) -> str:
     return ":".join([grasp, test, *([] if repeat is None else [str(repeat)]), key])
-
-
-class ProbeJudge:
-    """Answers probes. There are no screens: what starts in a collision is an answer, too."""
-
-    screens: tuple[Screen, ...] = ()
-
-    def __init__(self, factory: ProbeJudgeFactory) -> None:
-        from burg_drake.simulation.trials import HandTrial
-
-        self._settings = factory.settings
-        self._trial = HandTrial(
-            factory.scene, factory.station, engine=factory.engine, settings=factory.trial
-        )
-        self.stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._answer)]
-
-    def _answer(self, probe: Candidate, motion: object) -> Decision:
-        assert isinstance(probe, Probe)
-        trial, settings, lift = self._trial, self._settings, probe.lift
-        what = (probe.instance, probe.X_OG)
-        if probe.test == "noise":
-            return trial_decision(
-                trial.run(*what, friction=probe.friction, mass=probe.mass, lift=lift)
-            )
-        if probe.test == "friction":
-            limit = friction_limit(trial, *what, lift=lift, settings=settings.friction)
-            return Decision(Outcome.LIFTED, margins={"friction": limit})
-        grip = take_grip(trial, *what, lift=lift)
-        if isinstance(grip, TrialResult):
-            return trial_decision(grip)
-        found = (tug if probe.test == "tug" else shake)(grip, settings.loads)
-        return Decision(Outcome.LIFTED, margins={**found.accelerations, "weight": found.weight})
-
-
-@dataclass(frozen=True)
-class ProbeJudgeFactory:
-    """What a worker process needs to build its `ProbeJudge`."""
-
-    scene: Scene
-    station: Station
-    engine: Engine
-    trial: TrialSettings
-    settings: RobustnessSettings
-
-    def __call__(self) -> ProbeJudge:
-        return ProbeJudge(self)
-
-    def content(self) -> list[object]:
-        """What decides about answers beside the settings of the tests."""
-        return [self.scene.content, self.station.content, asdict(self.engine), asdict(self.trial)]

@@ -32,8 +32,8 @@ import numpy as np
 from burg_drake.core.grasps import Outcome, Stage
 from burg_drake.core.terminal import TextTable, format_number
 from burg_drake.evaluation.records import Columns, engine_label, pairs_text
+from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
 from burg_drake.evaluation.robustness.probes import RobustnessSettings
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.simulation.robustness import AXES, DIRECTIONS, HoldForces, SuccessRate
 from burg_drake.station.document import Engine
 
@@ -68,44 +68,24 @@ class GraspRobustness:
     failed: tuple[str, ...] = ()
 
     @classmethod
-    def from_verdicts(
-        cls,
-        id: str,
-        instance: str,
-        object: str,
-        friction: float,
-        answers: Sequence[tuple[str, Verdict]],
+    def from_answers(
+        cls, id: str, instance: str, object: str, friction: float, answers: Sequence[ProbeAnswer]
     ) -> GraspRobustness:
-        """Gathers the answers of probes, given with the names of their tests."""
-        by_test = {test: verdict for test, verdict in answers if test != "noise"}
-        lost = tuple(test for test, v in by_test.items() if v.outcome is not Outcome.LIFTED)
-        good = {test: verdict for test, verdict in by_test.items() if test not in lost}
-        repeats = Counter(verdict.outcome for test, verdict in answers if test == "noise")
-        needed = good.get("friction")
+        """Gathers the answers to the probes of a grasp."""
+        by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
+        repeats = Counter(answer.outcome for answer in answers if answer.test == "noise")
+        nothing = ProbeAnswer("")
         return cls(
             id,
             instance,
             object,
             friction,
-            tug=_hold_forces(good.get("tug")),
-            shake=_hold_forces(good.get("shake")),
-            friction_min=None if needed is None else _unlimited(needed.margins["friction"]),
+            tug=by_test.get("tug", nothing).forces,
+            shake=by_test.get("shake", nothing).forces,
+            friction_min=by_test.get("friction", nothing).friction,
             success=SuccessRate(repeats) if repeats else None,
-            failed=lost,
+            failed=tuple(test for test, answer in by_test.items() if answer.failed),
         )
-
-
-def _hold_forces(verdict: Verdict | None) -> HoldForces | None:
-    if verdict is None:
-        return None
-    accelerations = {name: _unlimited(value) for name, value in verdict.margins.items()}
-    weight = accelerations.pop("weight")
-    return HoldForces(accelerations, weight)
-
-
-def _unlimited(value: float) -> float:
-    """Journals have no infinity; see `evaluation.probes`."""
-    return math.inf if math.isnan(value) else value
 
 
 def robustness_columns(

@@ -18,7 +18,7 @@ import numpy as np
 
 from burg_drake.core import BurgError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.records import (
     CampaignDocument,
@@ -38,7 +38,6 @@ from burg_drake.evaluation.run.scene_judging import SceneJudging, is_finished
 from burg_drake.evaluation.run.scene_list import Scenes, read_scenes, require_used
 from burg_drake.evaluation.run.scene_processes import SceneProcesses
 from burg_drake.evaluation.run.scene_tasks import Prepare, Preparer, SceneOutputs
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.store import (
     LOCK_FILE,
     SCENES_FOLDER,
@@ -50,13 +49,13 @@ from burg_drake.evaluation.store import (
     save_campaign,
 )
 from burg_drake.evaluation.workers import Executor, Job, JobFailed
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike
 
 MakeJudge = Callable[..., Callable[[], Any]]
 
 
 def evaluate_scenes(
-    references: Sequence[Scene | str | Path],
+    references: Sequence[SceneLike],
     request: Request,
     folder: Path,
     executor: Executor,

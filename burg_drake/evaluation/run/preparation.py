@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.candidates import (
     Candidate,
     Candidates,
@@ -24,7 +25,6 @@ from burg_drake.evaluation.records import (
 )
 from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run.request import ByInstance, Request
-from burg_drake.evaluation.stages import Mode
 from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,

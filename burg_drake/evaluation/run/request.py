@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core import content_hash
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import GraspSet, Mode
 from burg_drake.core.paths import PACKAGE_URI, portable_reference
 from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
 from burg_drake.evaluation.grasp_sets import by_names
@@ -25,7 +25,7 @@ from burg_drake.evaluation.records import (
     numbers,
     software_versions,
 )
-from burg_drake.evaluation.stages import Mode, arm_settings
+from burg_drake.evaluation.stages import arm_settings
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, GraspMotion, Station
 

@@ -8,13 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import JOURNAL_FILE, Journal, SceneState, WorkSession, begun_now
 from burg_drake.evaluation.results import shortfalls
 from burg_drake.evaluation.run.preparation import open_grasps
 from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.store import PART_ROWS, REPORT_FILE, Run, load_run, save_run
 
 

@@ -16,7 +16,7 @@ from burg_drake.evaluation.candidates import INSTANCE
 from burg_drake.evaluation.records import CampaignDocument, SceneEntry, input_reference
 from burg_drake.evaluation.run.request import Request
 from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.document import Scene, load_scene
+from burg_drake.scene.document import Scene, SceneLike, load_scene
 
 MANY = 5
 """So many scenes that cannot be read are named in full."""
@@ -37,9 +37,7 @@ class Scenes:
     libraries: dict[str, str]
 
 
-def read_scenes(
-    references: Sequence[Scene | str | Path], known: CampaignDocument | None = None
-) -> Scenes:
+def read_scenes(references: Sequence[SceneLike], known: CampaignDocument | None = None) -> Scenes:
     """Looks at all scenes before any work is spent on one.
 
     Args:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 from burg_drake.core import BurgError
-from burg_drake.core.workers import OrderedWorker, Prefetcher
+from burg_drake.core.workers import Prefetcher, Session, Task, WorkerFuture, WorkerPool
 from burg_drake.evaluation.run.scene_tasks import (
     CloseParts,
     Finish,
@@ -13,10 +15,11 @@ from burg_drake.evaluation.run.scene_tasks import (
     Prepare,
     Preparer,
     SceneOutputs,
+    finish_scene,
+    prepare_scene,
 )
 from burg_drake.scene.document import Scene
 
-MODULE = "burg_drake.evaluation.run.scene_tasks"
 WORKERS_EACH = 16
 """So many workers are kept busy by one process that prepares scenes: sampling takes about a
 thirtieth of the time of the trials."""
@@ -39,20 +42,30 @@ class SceneProcesses:
             keeping: what is kept of them.
             workers: that judge.
         """
-        self._preparer, self._keeping = preparer, keeping
+        self._preparer = preparer
         self._count = preparers(workers)
-        self._ahead: Prefetcher[Prepare] | None = None
+        self._pools: list[WorkerPool] = []
         self._work: Iterator[Prepare] = iter(())
-        self._side = OrderedWorker(MODULE, keeping) if self._count else None
+        self._ahead: Prefetcher[Prepare, Scene | None] | None = None
+        self._finisher: WorkerPool | None = None
+        self._finishing: deque[tuple[Finish | CloseParts, WorkerFuture[None]]] = deque()
+        self._session = Session("finish", partial(Finisher, keeping))
         self._here = Finisher(keeping)
         self._used = False
         self._failed: list[Finish | CloseParts] = []
+        if self._count:
+            self._finisher = self._pool(1)
 
     def prepare(self, work: Iterable[Prepare]) -> None:
         """Says which scenes are to be prepared, in order."""
         self._work = iter(work)
         if self._count:
-            self._ahead = Prefetcher(self._work, MODULE, self._preparer.request, self._count)
+            session = Session("prepare", partial(Preparer, self._preparer.request))
+            self._ahead = Prefetcher(
+                self._pool(self._count),
+                self._work,
+                lambda item: Task(prepare_scene, (item,), session=session),
+            )
 
     def ready(self) -> bool:
         """Whether `prepared` returns at once."""
@@ -81,10 +94,9 @@ class SceneProcesses:
         Raises:
             BurgError: something cannot be written.
         """
-        if self._side is not None and self._used:
-            self._side.give(CloseParts())
-            while self._side.waiting:
-                self._hear(self._side)
+        if self._finisher is not None and self._used:
+            self._submit(self._finisher, CloseParts())
+            self._hear(wait=True)
         for work in self._failed or (() if self._used else (CloseParts(),)):
             self._here(work)  # where it fails again it is an error
         if self._failed:
@@ -94,10 +106,12 @@ class SceneProcesses:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._ahead is not None:
-            self._ahead.end()
-        if self._side is not None:
-            self._side.end()
+        for pool in self._pools:
+            pool.kill_workers()
+
+    def _pool(self, workers: int) -> WorkerPool:
+        self._pools.append(WorkerPool(workers, retries=0, own_group=True))
+        return self._pools[-1]
 
     def _prepared_here(self, item: Prepare) -> Scene | BaseException | None:
         try:
@@ -106,15 +120,20 @@ class SceneProcesses:
             return error
 
     def _give(self, work: Finish) -> None:
-        if self._side is None:
+        if self._finisher is None:
             self._here(work)
             return
         self._used = True
-        self._side.give(work)
-        while self._side.ready():
-            self._hear(self._side)
+        self._submit(self._finisher, work)
+        self._hear(wait=False)
 
-    def _hear(self, side: OrderedWorker) -> None:
-        work, error = side.take()
-        if error is not None:
-            self._failed.append(work)
+    def _submit(self, finisher: WorkerPool, work: Finish | CloseParts) -> None:
+        task = Task(finish_scene, (work,), session=self._session)
+        self._finishing.append((work, finisher.submit_task(task)))
+
+    def _hear(self, wait: bool) -> None:
+        """Notes what could not be written, of what is finished, or of all when that is."""
+        while self._finishing and (wait or self._finishing[0][1].done()):
+            work, future = self._finishing.popleft()
+            if future.exception() is not None:
+                self._failed.append(work)

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from burg_drake.core import SimulationError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.workers import serve
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.records import JOURNAL_FILE, Journal, TableFormat
 from burg_drake.evaluation.run.preparation import finish_run, open_run, require_sound
 from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.stages import Mode
 from burg_drake.evaluation.store import (
     RUN_FILE,
     PartWriter,
@@ -19,7 +19,7 @@ from burg_drake.evaluation.store import (
     load_run,
     require_run_folder,
 )
-from burg_drake.scene.document import Scene, load_scene
+from burg_drake.scene.document import Scene, as_scene
 from burg_drake.station.document import Station
 
 
@@ -74,7 +74,7 @@ class Preparer:
         Raises:
             BurgError: it cannot be judged.
         """
-        scene = work.scene if isinstance(work.scene, Scene) else load_scene(work.scene)
+        scene = as_scene(work.scene)
         request = self.request.of_scene(scene)
         if request is None:
             return None
@@ -140,27 +140,22 @@ class Finisher:
         return self._writer
 
 
-class _SceneProcess:
-    """What a process does: the first message says whether it prepares or finishes."""
+def prepare_scene(preparer: Preparer, work: Prepare) -> Scene | None:
+    """Prepares a scene in a worker; see `Preparer`.
 
-    def __init__(self) -> None:
-        self._do: Preparer | Finisher | None = None
-
-    def __call__(self, work: object) -> object:
-        if isinstance(work, (Request, SceneOutputs)):
-            self._do = Preparer(work) if isinstance(work, Request) else Finisher(work)
-            return None
-        assert self._do is not None
-        try:
-            return self._do(work)  # type: ignore[arg-type]
-        except (Exception, SystemExit) as error:
-            return error
-
-
-def main(handle: int) -> None:
-    """Runs a process until the parent closes the pipe.
-
-    Args:
-        handle: file descriptor of this end of the pipe.
+    Raises:
+        BurgError: it cannot be judged.
     """
-    serve(handle, _SceneProcess())
+    try:
+        return preparer(work)
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"SystemExit: {error}") from error
+
+
+def finish_scene(finisher: Finisher, work: Finish | CloseParts) -> None:
+    """Writes what came of a scene in a worker; see `Finisher`.
+
+    Raises:
+        BurgError: a file cannot be written.
+    """
+    finisher(work)

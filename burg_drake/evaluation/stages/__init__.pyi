@@ -1,29 +1,21 @@
 from .counts import (
     GraspCount as GraspCount,
+    count_grasps as count_grasps,
     grasp_counts as grasp_counts,
 )
 from .judge import (
-    ARM_MARGINS as ARM_MARGINS,
-    ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
-    LIFT_HEIGHT as LIFT_HEIGHT,
-    MARGINS as MARGINS,
     Decide as Decide,
     Decision as Decision,
     Judge as Judge,
     Screen as Screen,
     ScreenAnswers as ScreenAnswers,
-    Verdict as Verdict,
     judge_grasp as judge_grasp,
     one_line as one_line,
     screen_grasps as screen_grasps,
     trial_decision as trial_decision,
     trial_verdict as trial_verdict,
 )
-from .mode import (
-    MODES as MODES,
-    Mode as Mode,
-    mode_for as mode_for,
-)
+from .mode import mode_for as mode_for
 from .scene_acceptance import (
     clear_grasp_counts as clear_grasp_counts,
     within_reach as within_reach,
@@ -38,4 +30,5 @@ from .screening import (
 from .station_judge import (
     StationJudge as StationJudge,
     StationJudgeFactory as StationJudgeFactory,
+    build_judge as build_judge,
 )

@@ -19,8 +19,8 @@ from burg_drake.core import InvalidInputError
 from burg_drake.evaluation.candidates import ObjectGrasps, chosen_instances, object_grasps
 from burg_drake.evaluation.stages.screening import arm_reach, hand_alone
 from burg_drake.motion.reach import Reach
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import GraspMotion, Station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import GraspMotion, Station, StationLike, as_station
 
 Names = NDArray[np.object_]
 
@@ -56,8 +56,8 @@ class GraspCount:
 
 
 def count_grasps(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     only: Iterable[str] | None = None,
     grasps_per_object: int = 50,
@@ -89,6 +89,7 @@ def count_grasps(
         UnknownNameError: no such instance or object, or a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
+    scene, station = as_scene(scene), as_station(station)
     names = chosen_instances(scene, only)
     found = dict(
         grasp_counts(

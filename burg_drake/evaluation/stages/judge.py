@@ -7,13 +7,12 @@ each. The stages of a station are in `station_judge`.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, Findings, Outcome, Stage, Verdict, joined_findings
 from burg_drake.evaluation.candidates import Candidate
 
 if TYPE_CHECKING:
@@ -21,92 +20,18 @@ if TYPE_CHECKING:
     from burg_drake.motion.reach import Witness
     from burg_drake.simulation.trials import TrialResult
 
-ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess")
-"""Of the arm's screen. `arm_clearance` [m]: if the arm can execute the grasp, a bound that the
-whole robot keeps from all else on its way; if something is in its way, the signed distance from
-that, negative for how deep they overlap. `joint_excess` [rad]: how far the configuration that comes
-closest is beyond a joint limit."""
-ARM_MARGINS = (
-    *ARM_SCREEN_MARGINS,
-    *("duration", "tracking_error", "tracking_distance", "pushed"),
-)
-"""Margins that only stations with an arm have: those of the arm's screen, the `duration` of the
-planned motion [s], and those of `simulation.arm_trial`, see `simulation.result.Margins`."""
-LIFT_HEIGHT = "lift_height"
-"""Margin: length of the lift, as long as the run's motion asks for, or as there is room where it
-allows less [m]."""
-MARGINS = (
-    *("overlap", "clearance", "slip", "tilt", "pad_force", "patch_area"),
-    *("lift", LIFT_HEIGHT, "others_moved", "end_time"),
-    *ARM_MARGINS,
-)
-"""Margins of a verdict: see `simulation.result.Margins`, `LIFT_HEIGHT` and `ARM_MARGINS`."""
-
 
 @dataclass(frozen=True)
-class Decision:
+class Decision(Findings):
     """The answer of one stage.
 
     Attributes:
         outcome: how the grasp ends here; None passes it on to the next stage.
-        blocker: name of the body in the way, if any.
-        reason: explanation for people, where the outcome alone does not say enough.
-        margins: by name of `MARGINS`; what is not measured is left out.
-        displacements: peak displacement of every other free object by instance [m]; empty if the
-            trial did not start.
-        pushed: displacement of every free object, the target too, before the arm's hand closes, by
-            instance [m].
-        touched: the first body that the arm touched against its plan, and with what.
-        q_grasp, q_pregrasp: arm configurations found [rad].
         motion: the arm's motion, if later stages need it.
     """
 
     outcome: Outcome | None = None
-    blocker: str = ""
-    reason: str = ""
-    margins: Mapping[str, float] = field(default_factory=dict)
-    displacements: Mapping[str, float] = field(default_factory=dict)
-    pushed: Mapping[str, float] = field(default_factory=dict)
-    touched: str = ""
-    q_grasp: tuple[float, ...] = ()
-    q_pregrasp: tuple[float, ...] = ()
-    motion: Witness | Plan | None = field(default=None, compare=False, repr=False)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What became of a grasp.
-
-    Attributes:
-        outcome: the one outcome.
-        stage: the stage that decided; for `simulation_failed` the stage that failed.
-        blocker, reason, margins, displacements, pushed, touched, q_grasp, q_pregrasp: as in
-            `Decision`.
-        cpu: CPU time by stage [s].
-        interrupted: whether it failed because its worker process was ended from outside, so that
-            another try may give an answer.
-    """
-
-    outcome: Outcome
-    stage: Stage
-    blocker: str = ""
-    reason: str = ""
-    margins: Mapping[str, float] = field(default_factory=dict)
-    displacements: Mapping[str, float] = field(default_factory=dict)
-    pushed: Mapping[str, float] = field(default_factory=dict)
-    touched: str = ""
-    q_grasp: tuple[float, ...] = ()
-    q_pregrasp: tuple[float, ...] = ()
-    cpu: Mapping[Stage, float] = field(default_factory=dict)
-    interrupted: bool = False
-
-    def is_open(self, *, retry_failed: bool = False) -> bool:
-        """Whether a later call asks again.
-
-        Args:
-            retry_failed: not only where it was interrupted, but wherever the simulation failed.
-        """
-        return self.interrupted or (retry_failed and self.outcome is Outcome.SIMULATION_FAILED)
+    motion: Witness | Plan | None = field(default=None, compare=False, repr=False, kw_only=True)
 
 
 class Screen(NamedTuple):
@@ -252,45 +177,16 @@ def one_line(error: BaseException) -> str:
 
 
 def _verdict(decisions: Sequence[Decision], stage: Stage, cpu: Mapping[Stage, float]) -> Verdict:
-    last = decisions[-1]
-    assert last.outcome is not None
-    failed = last.outcome is Outcome.SIMULATION_FAILED
-    return Verdict(
-        outcome=last.outcome,
-        stage=stage if failed else last.outcome.stage,
-        blocker=last.blocker,
-        reason=last.reason,
-        margins=_margins(decisions),
-        displacements={k: float(v) for d in decisions for k, v in d.displacements.items()},
-        pushed={k: float(v) for d in decisions for k, v in d.pushed.items()},
-        touched=last.touched,
-        q_grasp=next((d.q_grasp for d in decisions if d.q_grasp), ()),
-        q_pregrasp=next((d.q_pregrasp for d in decisions if d.q_pregrasp), ()),
-        cpu=cpu,
-    )
-
-
-def _margins(decisions: Sequence[Decision]) -> dict[str, float]:
-    """The margins of all stages; a later one does not unsay what an earlier one has measured."""
-    found: dict[str, float] = {}
-    for decision in decisions:
-        for name, value in decision.margins.items():
-            if name not in found or not math.isnan(value):
-                found[name] = float(value)
-    return found
+    last = decisions[-1].outcome
+    assert last is not None
+    failed = last is Outcome.SIMULATION_FAILED
+    decided = stage if failed else last.stage
+    return Verdict(last, decided, cpu=cpu, **joined_findings(decisions))
 
 
 def trial_decision(result: TrialResult) -> Decision:
     """The answer of an executed trial, of the hand alone or of the arm."""
-    return Decision(
-        result.outcome,
-        result.blocker,
-        result.reason,
-        margins=asdict(result.margins),
-        displacements=result.displacements,
-        pushed=result.pushed,
-        touched=result.touched,
-    )
+    return Decision(result.outcome, **result.of_trial() | {"margins": result.margins.of_trial()})
 
 
 def trial_verdict(result: TrialResult) -> Verdict:

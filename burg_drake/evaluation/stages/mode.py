@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
-
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import MODES, Mode
 from burg_drake.station.document import Station
-
-Mode = Literal["hand", "reach", "arm"]
-"""`hand`: the hand alone executes the grasp in simulation. `reach`: the same, of grasps that the
-arm can execute. `arm`: of those, too, but the whole arm executes them."""
-MODES: tuple[Mode, ...] = get_args(Mode)
 
 
 def mode_for(station: Station, asked: Mode | None = None) -> Mode:

@@ -7,8 +7,8 @@ from burg_drake.core import Array
 from burg_drake.evaluation.candidates import object_grasps
 from burg_drake.evaluation.stages.counts import count_grasps
 from burg_drake.motion.workspace import reach_without_objects
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 TRIED = 24
 """Grasps of an object that the arm is asked for ..."""
@@ -16,7 +16,7 @@ ROUNDS = (2, 4, 6, 12)
 """... so many at a time, until it can execute one: most objects need no more than the first."""
 
 
-def within_reach(scene: Scene, station: Station) -> tuple[str, ...]:
+def within_reach(scene: SceneLike, station: StationLike) -> tuple[str, ...]:
     """Objects that are out of the arm's reach.
 
     An object is within reach if the arm can execute one of `TRIED` sampled grasps, all the way from
@@ -37,6 +37,7 @@ def within_reach(scene: Scene, station: Station) -> tuple[str, ...]:
         UnknownNameError: a mesh file is missing.
         MeshError: a mesh file is damaged.
     """
+    scene, station = as_scene(scene), as_station(station)
     X_WS = station.document.X_WS.matrix()
     reach_without_objects(station)  # refuses a station without an arm, whatever the scene
     return tuple(
@@ -61,7 +62,7 @@ def _is_within_reach(scene: Scene, object: str, X_WO: Array, station: Station) -
 
 
 def clear_grasp_counts(
-    scene: Scene, station: Station, *, grasps_per_object: int = 50
+    scene: SceneLike, station: StationLike, *, grasps_per_object: int = 50
 ) -> dict[str, int]:
     """How many grasps of each free object the open hand can take; the arm is not asked.
 
@@ -76,5 +77,6 @@ def clear_grasp_counts(
     Raises:
         InvalidInputError, UnknownNameError, MeshError: see `count_grasps`.
     """
+    scene, station = as_scene(scene), as_station(station)
     counts = count_grasps(scene, station, grasps_per_object=grasps_per_object, reach=False)
     return {name: count.clear for name, count in counts.items()}

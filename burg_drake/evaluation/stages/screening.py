@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, Stage
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages.judge import LIFT_HEIGHT, Decision, Screen
+from burg_drake.evaluation.stages.judge import Decision, Screen
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import GraspMotion, Station
 
@@ -56,7 +56,7 @@ def hand_screen(
                 margins = {"overlap": answer.overlap, "clearance": answer.clearance}
                 if math.isfinite(lift):
                     margins[LIFT_HEIGHT] = lift
-                decisions[k] = Decision(answer.outcome, answer.blocker, margins=margins)
+                decisions[k] = Decision(answer.outcome, blocker=answer.blocker, margins=margins)
         return decisions
 
     return Screen(Stage.CLEAR, ask, HAND_BATCH)
@@ -98,7 +98,7 @@ def _decision(answer: Reach, motions: bool) -> Decision:
     }
     return Decision(
         answer.outcome,
-        answer.blocker,
+        blocker=answer.blocker,
         margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
         q_grasp=_floats(answer.q_grasp),
         q_pregrasp=_floats(answer.q_pregrasp),

@@ -25,7 +25,6 @@ from .part_file import require_arrow as require_arrow
 from .part_store import (
     PARTS_FOLDER as PARTS_FOLDER,
     PartIndex as PartIndex,
-    StoredRows as StoredRows,
     StoredRun as StoredRun,
 )
 from .part_writer import (
@@ -53,6 +52,7 @@ from .run_folder import (
     save_run as save_run,
     write_copies as write_copies,
 )
+from .stored_rows import StoredRows as StoredRows
 from .text_codes import (
     Texts as Texts,
     member_codes as member_codes,

@@ -19,8 +19,10 @@ from burg_drake.core import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
 from burg_drake.evaluation.records import CampaignDocument, Columns, Ledger, SceneState, share
-from burg_drake.evaluation.store.part_store import StoredRows, StoredRun, read_rows
+from burg_drake.evaluation.store.frame import frame_of_rows
+from burg_drake.evaluation.store.part_store import StoredRun, read_rows
 from burg_drake.evaluation.store.run_folder import REPORT_FILE, RUN_FILE, Run, load_run
+from burg_drake.evaluation.store.stored_rows import StoredRows
 
 if TYPE_CHECKING:
     import pandas
@@ -117,11 +119,9 @@ class Campaign:
         """Judged grasps as a data frame; see `evaluation.frame`.
 
         Raises:
-            MissingDependencyError: pandas is not installed.
+            MissingDependencyError: pandas or pyarrow is not installed.
         """
-        from burg_drake.evaluation.store.frame import frame_of_rows
-
-        return frame_of_rows(self, names)
+        return frame_of_rows(self.rows(names), self.names)
 
     @property
     def failed(self) -> dict[str, str]:

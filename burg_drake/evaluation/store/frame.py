@@ -16,7 +16,7 @@ from burg_drake.evaluation.store.part_file import PLAIN_TEXT
 if TYPE_CHECKING:
     import pandas
 
-    from burg_drake.evaluation.store.campaign_folder import Campaign
+    from burg_drake.evaluation.store.stored_rows import StoredRows
 
 MEMBERS: Mapping[str, Sequence[str]] = {
     "outcome": [outcome.value for outcome in Outcome],
@@ -46,20 +46,19 @@ def frame_of_columns(columns: Columns, names: Sequence[str] | None = None) -> pa
     return _pandas().DataFrame(series)
 
 
-def frame_of_rows(campaign: Campaign, names: Sequence[str] | None = None) -> pandas.DataFrame:
+def frame_of_rows(rows: StoredRows, scenes: Sequence[str]) -> pandas.DataFrame:
     """The results of many scenes as a data frame, with a column `name` in front: the scene's name
     in the run.
 
     Args:
-        campaign: the run.
-        names: of the columns, which is all that is read; all if None.
+        rows: of the run.
+        scenes: names of the scenes that `rows.run` counts.
 
     Raises:
-        MissingDependencyError: pandas or pyarrow is not installed.
+        MissingDependencyError: pandas is not installed.
     """
     pandas = _pandas()
-    rows = campaign.rows(names)
-    series: dict[str, Any] = {"name": _category("name", rows.run, campaign.names)}
+    series: dict[str, Any] = {"name": _category("name", rows.run, list(scenes))}
     for name in rows.table.column_names:
         column = rows.table.column(name)
         if name in TEXT and name not in PLAIN_TEXT:

@@ -8,21 +8,19 @@ same rows.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.evaluation.records import JOURNAL_FILE, MOVED, PUSHED, Columns, read_journal
+from burg_drake.core.grasps import MOVED, PUSHED
+from burg_drake.evaluation.records import JOURNAL_FILE, read_journal
 from burg_drake.evaluation.store.part_file import (
     CANDIDATE,
     Part,
     arrow_table,
-    as_codes,
-    as_numpy,
     column_names,
     empty_column,
     open_part,
@@ -31,6 +29,7 @@ from burg_drake.evaluation.store.part_file import (
 )
 from burg_drake.evaluation.store.part_segments import JournalSegment, chain, whole_lines
 from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.evaluation.store.stored_rows import StoredRows
 
 PARTS_FOLDER = "parts"
 
@@ -92,39 +91,6 @@ class PartIndex:
                 found[segment.scene].append((segment, part, row))
                 row += segment.rows
         return found
-
-
-@dataclass(frozen=True, eq=False)
-class StoredRows:
-    """Judged grasps of several runs, one after the other, in the order of their candidates.
-
-    Attributes:
-        table: Arrow table.
-        counts: (S,) how many rows each run has.
-    """
-
-    table: Any
-    counts: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return int(self.counts.sum())
-
-    def column(self, name: str) -> NDArray[Any]:
-        """A column as `table.Columns` has it."""
-        return as_numpy(name, self.table.column(name))
-
-    def codes(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
-        """A column of texts as numbers, and the texts that they stand for."""
-        return as_codes(self.table.column(name))
-
-    def columns(self, names: Iterable[str]) -> Columns:
-        """Several columns."""
-        return {name: self.column(name) for name in names}
-
-    @property
-    def run(self) -> NDArray[np.int64]:
-        """(N,) which run each row is of, by its place."""
-        return np.repeat(np.arange(len(self.counts)), self.counts)
 
 
 def read_rows(

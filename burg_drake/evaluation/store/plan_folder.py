@@ -16,7 +16,7 @@ from typing import Literal
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records import (
     HASH_DIGITS,
@@ -30,7 +30,6 @@ from burg_drake.evaluation.records import (
     software_versions,
     without_motion,
 )
-from burg_drake.evaluation.stages import Verdict
 
 PlanFormat = Literal["json", "csv"]
 DOCUMENT_FILE = "plans.yaml"

@@ -23,7 +23,7 @@ import numpy as np
 from burg_drake.core import InvalidInputError, UnknownNameError
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.paths import portable_reference, resolve
 from burg_drake.evaluation.candidates import Candidate, Candidates
 from burg_drake.evaluation.records import (
@@ -39,7 +39,6 @@ from burg_drake.evaluation.records import (
     table_row,
     unknown_grasp,
 )
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, SceneDocument, save_scene
 from burg_drake.station.document import Station, StationDocument, load_station

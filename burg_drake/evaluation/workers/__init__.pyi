@@ -10,6 +10,6 @@ from .job import (
 from .limits import WorkerLimits as WorkerLimits
 from .pool import (
     Answer as Answer,
-    Pool as Pool,
+    JudgePool as JudgePool,
 )
 from .single_job import judge_all as judge_all

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.pool import Pool
+from burg_drake.evaluation.workers.pool import JudgePool
 
 __all__ = ["Executor", "Job", "JobFailed", "LocalExecutor", "OnFailure"]
 
@@ -76,6 +76,6 @@ class LocalExecutor:
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
-        pool = Pool(self.workers, self.limits)
+        pool = JudgePool(self.workers, self.limits)
         yield from pool.run(jobs, on_failure)
         pool.dismiss()

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
-TOO_LONG = (signal.SIGPROF, signal.SIGALRM)
-"""Signals by which a process ends itself that takes longer than it may: CPU time, wall time."""
+from burg_drake.core.workers import TimeLimit
 
 
 @dataclass(frozen=True)
@@ -31,28 +27,12 @@ class WorkerLimits:
     hopeless: int = 50
     false_starts: int = 2
 
+    @property
+    def of_task(self) -> TimeLimit:
+        """Limit of one grasp, or one screening."""
+        return TimeLimit(self.cpu, self.wall)
 
-@contextmanager
-def time_limit(cpu: float, wall: float) -> Iterator[None]:
-    """Ends this process by one of `TOO_LONG` if it does not leave the block in time.
-
-    The system does so, also where native code does not let the interpreter run, and where nobody
-    else is left to do it.
-
-    Args:
-        cpu, wall: CPU and wall time [s].
-    """
-    signal.setitimer(signal.ITIMER_PROF, cpu)
-    signal.setitimer(signal.ITIMER_REAL, wall)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-def let_time_limits_end_this_process() -> None:
-    """Undoes what a parent may have set: its children inherit which signals are ignored."""
-    for number in TOO_LONG:
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, TOO_LONG)
+    @property
+    def of_build(self) -> TimeLimit:
+        """Limit of building a judge."""
+        return TimeLimit(self.build, self.wall)

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-import pickle
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
+from burg_drake.core.grasps import Verdict
+from burg_drake.core.workers import Session
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import ScreenAnswers, Verdict
+from burg_drake.evaluation.stages import ScreenAnswers
 from burg_drake.evaluation.workers.job import Job
-from burg_drake.evaluation.workers.worker import JudgingTask, Screening
+from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.evaluation.workers.worker import Grasp, build_judge
 
 TASK_SIZE = 4
 """Grasps handed out at a time: few enough that workers finish together."""
-Grasp = tuple[Candidate, ScreenAnswers]
-"""A grasp with the answers of the screens that have been asked."""
+
+
+@dataclass(frozen=True)
+class Screening:
+    """Grasps for the next screen; all have been through the same ones."""
+
+    grasps: tuple[Grasp, ...]
+
+
+@dataclass(frozen=True)
+class Judging:
+    """Grasps to be judged one by one."""
+
+    grasps: tuple[Grasp, ...]
 
 
 class OpenJob:
@@ -22,24 +38,24 @@ class OpenJob:
 
     Attributes:
         job: the job.
-        recipe: its `make_judge`, pickled.
+        session: of the workers that have its judge.
         open: grasps to be judged one by one.
         unscreened: grasps that wait for each screen.
         batches: how many grasps to screen at a time, by screen.
-        false_starts: workers in a row that died while they built its judge.
         crashes_in_a_row: grasps that ended their workers since one was judged.
         failed: whether it is given up; what still comes of it does not count.
     """
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, limits: WorkerLimits) -> None:
         self.job = job
-        self.recipe = pickle.dumps(job.make_judge)
+        self.session = Session(
+            job.key, partial(build_judge, job.make_judge), limits.of_build, limits.false_starts
+        )
         self.open: deque[Grasp] = deque(
             (candidate, ScreenAnswers()) for candidate in job.candidates
         )
         self.batches: tuple[int, ...] = ()
         self.unscreened: list[deque[Grasp]] = []
-        self.false_starts = 0
         self.crashes_in_a_row = 0
         self.failed = False
 
@@ -60,7 +76,7 @@ class OpenJob:
             self.unscreened = [self.open, *(deque() for _ in batches[1:])]
             self.open = deque()
 
-    def next_work(self) -> JudgingTask | Screening:
+    def next_work(self) -> Judging | Screening:
         """Grasps to judge; when there are few of them left, grasps to screen, of which the last
         screen comes first, unless too few have come to it. So they take turns, and the pace of
         judging tells how long the rest takes."""
@@ -68,8 +84,8 @@ class OpenJob:
             for k in reversed(range(len(self.batches))):
                 waiting = self.unscreened[k]
                 if len(waiting) >= self.batches[k] or (waiting and not any(self.unscreened[:k])):
-                    return Screening(self.key, _take(waiting, self.batches[k]))
-        return JudgingTask(self.key, _take(self.open, TASK_SIZE))
+                    return Screening(_take(waiting, self.batches[k]))
+        return Judging(_take(self.open, TASK_SIZE))
 
     def sort(
         self, candidates: Sequence[Candidate], screened: Sequence[ScreenAnswers]

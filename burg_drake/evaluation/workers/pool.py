@@ -15,43 +15,35 @@ job; when there is none, it helps with one that others are at.
 
 from __future__ import annotations
 
-import contextlib
-import subprocess
 from collections.abc import Generator, Iterable, Iterator
-from multiprocessing.connection import wait
+from functools import partial
+from queue import SimpleQueue
+from typing import Any
 
-from burg_drake.core import BurgError, SimulationError
-from burg_drake.core.grasps import Outcome
+from burg_drake.core import BurgError, SimulationError, WorkerDied
+from burg_drake.core.grasps import Outcome, Verdict
+from burg_drake.core.workers import Task, WorkerPool
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Verdict
+from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
+from burg_drake.evaluation.workers.lane import GivenWork, Lane
 from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.open_job import TASK_SIZE, OpenJob
-from burg_drake.evaluation.workers.worker import (
-    Begins,
-    Judged,
-    JudgeUnavailable,
-    JudgingTask,
-    Message,
-    Ready,
-    Screens,
-    WorkerEnding,
-)
-from burg_drake.evaluation.workers.worker_process import WorkerProcess, start
+from burg_drake.evaluation.workers.open_job import TASK_SIZE, OpenJob, Screening
+from burg_drake.evaluation.workers.worker import judge_one, screen_batch, screen_sizes
 
-FAREWELL = 5.0
-"""Time that an idle worker is given to end by itself [s]."""
+KEPT_JUDGES = 2
+"""Judges that a worker keeps; more would take memory."""
 Answer = tuple[Job, Candidate, Verdict]
 """A job, a grasp of it and what became of that."""
 
 
-class Pool:
-    """Open work and living workers.
+class JudgePool:
+    """Open work and the workers that judge.
 
     Attributes:
         count: number of workers, at most.
         limits: what they may take.
-        workers: by their connection.
+        lanes: the workers.
         jobs: those under way.
         stopped: whether it was told to stop.
         deadly: ids of grasps whose outcome is that they end their workers, in the order in which
@@ -61,10 +53,13 @@ class Pool:
     def __init__(self, count: int, limits: WorkerLimits) -> None:
         self.count = count
         self.limits = limits
-        self.workers: dict[object, WorkerProcess] = {}
+        self.lanes: list[Lane] = []
         self.jobs: list[OpenJob] = []
         self.deadly: list[str] = []
         self.stopped = False
+        self._workers: WorkerPool | None = None
+        self._done: SimpleQueue[GivenWork] = SimpleQueue()
+        self._screens: dict[str, tuple[int, ...]] = {}
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
 
@@ -74,33 +69,35 @@ class Pool:
         """Judges all grasps of all jobs; see `executor.Executor.judge`. Workers that are idle at
         the end stay, for another call; whatever else ends it, ends them."""
         self._coming, self._on_failure = iter(jobs), on_failure
+        self.open()
         try:
             while not self.stopped:
                 self.employ()
-                if not any(worker.busy for worker in self.workers.values()):
+                if not any(lane.busy for lane in self.lanes):
                     break
-                for connection in wait([w.connection for w in self.workers.values()]):
-                    worker = self.workers[connection]
-                    try:
-                        message: Message = worker.connection.recv()
-                    except (EOFError, OSError):
-                        yield from self.bury(worker)
-                    else:
-                        yield from self.hear(worker, message)
+                given = self._done.get()
                 if self.stopped:
                     raise SimulationError("the workers were ended")
+                given.lane.given.remove(given)
+                if not given.job.failed:
+                    yield from self.hear(given)
         except BaseException:
             self.kill()
             raise
 
+    def open(self) -> None:
+        """Makes the workers' pool if there is none; a process is started when there is work."""
+        if self._workers is None:
+            self._workers = WorkerPool(self.count, kept_sessions=KEPT_JUDGES)
+            self._done = SimpleQueue()
+            self.lanes = [Lane(k) for k in range(self.count)]
+
     def employ(self) -> None:
-        """Gives idle workers something to do, and hires as many as there is work for."""
-        for worker in self.workers.values():
-            if not worker.busy and (job := self.choose(worker)) is not None:
-                worker.take_up(job)
+        """Gives idle workers something to do, those first that are there already."""
+        for lane in sorted(self.lanes, key=lambda lane: not lane.started):
+            if not lane.busy and (job := self.choose(lane)) is not None:
+                self.give(lane, job)
         self.jobs = [job for job in self.jobs if self.is_under_way(job)]
-        while len(self.workers) < self.count and (job := self.choose(None)) is not None:
-            self.hire(job)
 
     def is_under_way(self, job: OpenJob) -> bool:
         """Whether it has any grasp left."""
@@ -108,18 +105,18 @@ class Pool:
 
     def engaged(self, job: OpenJob) -> int:
         """Number of workers that are at a job."""
-        return sum(worker.busy and worker.job is job for worker in self.workers.values())
+        return sum(lane.busy and lane.job is job for lane in self.lanes)
 
-    def choose(self, worker: WorkerProcess | None) -> OpenJob | None:
-        """What an idle worker, or one to be hired, is to work on."""
-        built = worker.judges if worker else {}
-        if worker is not None and worker.job is not None and worker.job.waiting:
-            return worker.job
+    def choose(self, lane: Lane) -> OpenJob | None:
+        """What an idle worker is to work on."""
+        built = self.built(lane)
+        if lane.job is not None and lane.job.waiting:
+            return lane.job
         for job in self._coming:
             if job is None:  # none is ready yet; asked again when something has happened
                 break
             if job.candidates:
-                self.jobs.append(OpenJob(job))
+                self.jobs.append(OpenJob(job, self.limits))
                 return self.jobs[-1]
         share = {
             job: (job.key in built, job.waiting / (1 + self.engaged(job)))
@@ -128,73 +125,83 @@ class Pool:
         }
         return max(share, key=share.__getitem__) if share else None
 
-    def hire(self, job: OpenJob, first: JudgingTask | None = None) -> None:
-        """Starts a worker for a job, with work that is kept for it if any."""
-        if self.stopped:
+    def built(self, lane: Lane) -> tuple[str, ...]:
+        """Keys of the judges that a worker has."""
+        assert self._workers is not None
+        return self._workers.sessions(lane.number)
+
+    def give(self, lane: Lane, job: OpenJob) -> None:
+        """Hands a worker work of a job, or has it build the judge first."""
+        lane.job, lane.started = job, True
+        if job.key not in self.built(lane) or job.key not in self._screens:
+            build: Task[Any] = Task(screen_sizes, session=job.session)
+            self.submit(lane, [(GivenWork(lane, job, ()), build)])
+            return
+        job.know(self._screens[job.key])
+        work, limit = job.next_work(), self.limits.of_task
+        if isinstance(work, Screening):
+            given = GivenWork(lane, job, work.grasps, screening=True)
+            task: Task[Any] = Task(screen_batch, (work.grasps,), {}, job.session, limit, retries=0)
+            self.submit(lane, [(given, task)])
+            return
+        each = [GivenWork(lane, job, (grasp,)) for grasp in work.grasps]
+        self.submit(
+            lane,
+            [
+                (one, Task(judge_one, one.grasps[0], {}, job.session, limit, one.begins))
+                for one in each
+            ],
+        )
+
+    def submit(self, lane: Lane, work: list[tuple[GivenWork, Task[Any]]]) -> None:
+        """Sends a worker tasks; what becomes of each comes to `run`."""
+        if self.stopped or self._workers is None:
             raise SimulationError("the workers were ended")
-        worker = start(self.limits)
-        self.workers[worker.connection] = worker
-        worker.first = first
-        worker.take_up(job)
+        futures = self._workers.submit_tasks([task for _, task in work], lane.number)
+        for (given, _), future in zip(work, futures, strict=True):
+            given.future = future
+            lane.given.append(given)
+        for (given, _), future in zip(work, futures, strict=True):
+            future.add_done_callback(partial(_put, self._done, given))
 
-    def hear(self, worker: WorkerProcess, message: Message) -> Iterator[Answer]:
-        job = worker.job
-        assert job is not None
-        match message:
-            case JudgeUnavailable(error):
-                worker.building = False
-                self.fail(job, error)
-            case WorkerEnding(reason):
-                worker.last_words = reason
-            case Begins(stage):
-                worker.stage = stage
-            case Ready(batches):
-                worker.built(batches)
-                job.know(batches)
-                job.false_starts = 0
-                if worker.first is not None and not job.failed:
-                    worker.give(worker.first)
-                worker.first = None
-            case Screens(screened):
-                candidates = worker.screened()
-                if not job.failed:
-                    for candidate, verdict in job.sort(candidates, screened):
-                        yield job.job, candidate, verdict
-            case Judged(verdict):
-                job.crashes_in_a_row = 0
-                candidate = worker.judged()
-                if not job.failed:
-                    yield job.job, candidate, verdict
+    def hear(self, given: GivenWork) -> Iterator[Answer]:
+        """Deals with what became of work."""
+        job, future = given.job, given.future
+        assert future is not None
+        error = future.exception()
+        if error is not None and error is job.session.error:
+            self.fail(job, _cannot_build(error))
+        elif not given.grasps:
+            if error is None:
+                self._screens[job.key] = future.result()
+                job.know(future.result())
+        elif given.screening:
+            if (
+                error is not None
+            ):  # each goes through what is left, so that the one to blame is found
+                job.open.extend(given.grasps)
+                return
+            candidates = [candidate for candidate, _ in given.grasps]
+            for candidate, verdict in job.sort(candidates, future.result()):
+                yield job.job, candidate, verdict
+        elif error is None:
+            job.crashes_in_a_row = 0
+            yield job.job, given.grasps[0][0], future.result()
+        else:
+            yield from self.settle(given, error)
 
-    def bury(self, worker: WorkerProcess) -> Iterator[Answer]:
-        """Deals with the death of a worker: the grasp it was at is suspect, the rest is kept."""
-        del self.workers[worker.connection]
-        worker.connection.close()
-        reason, job = worker.cause_of_death(), worker.job
-        if job is None or job.failed:
-            return
-        if worker.building:
-            job.false_starts += 1
-            if job.false_starts >= self.limits.false_starts:
-                self.fail(job, SimulationError(f"cannot build the simulation: {reason}"))
-            elif worker.first is not None:
-                self.hire(job, worker.first)
-            return
-        job.open.extend(worker.screening)
-        if not worker.task:
-            return
-        suspect = worker.task.popleft()
-        job.open.extendleft(reversed(worker.task))
-        if not (worker.last_try or worker.overdue):
-            self.hire(job, JudgingTask(job.key, (suspect,), last_try=True))
-            return
-        interrupted = worker.was_interrupted
+    def settle(self, given: GivenWork, error: BaseException) -> Iterator[Answer]:
+        """Deals with a grasp that has ended its workers."""
+        job, candidate = given.job, given.grasps[0][0]
+        died = isinstance(error, WorkerDied)
+        reason = str(error) if died else one_line(error)
+        interrupted = isinstance(error, WorkerDied) and error.from_outside
         failed = Outcome.SIMULATION_FAILED
-        self.deadly.append(suspect[0].id)
+        self.deadly.append(candidate.id)
         yield (
             job.job,
-            suspect[0],
-            Verdict(failed, worker.stage, reason=reason, interrupted=interrupted),
+            candidate,
+            Verdict(failed, given.stage, reason=reason, interrupted=interrupted),
         )
         job.crashes_in_a_row += 1
         if job.crashes_in_a_row >= self.limits.hopeless:
@@ -211,34 +218,40 @@ class Pool:
         if job.failed:
             return
         job.give_up()
+        for given in [given for lane in self.lanes for given in lane.given if given.job is job]:
+            if given.future is not None:
+                given.future.interrupt()
         if self._on_failure is None:
             raise error
         self._on_failure(JobFailed(job.job, error))
 
     def dismiss(self) -> None:
         """Lets idle workers end by themselves, and ends those that are at work."""
-        for worker in self.workers.values():
-            if worker.busy:
-                worker.process.kill()
-            else:
-                worker.send(None)
-        for worker in self.workers.values():
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                worker.process.wait(FAREWELL)
+        if self._workers is not None and not any(lane.busy for lane in self.lanes):
+            self._workers.shutdown()
         self.kill()
 
     def stop(self) -> None:
         """Ends all workers, and with them `run` in another thread."""
         self.stopped = True
-        for worker in list(self.workers.values()):
-            worker.process.kill()
+        if self._workers is not None:
+            self._workers.kill_workers()
 
     def kill(self) -> None:
         """Ends all workers at once."""
-        for worker in self.workers.values():
-            worker.process.kill()
-        for worker in self.workers.values():
-            worker.process.wait()
-            worker.connection.close()
-        self.workers.clear()
+        workers, self._workers = self._workers, None
+        if workers is not None:
+            workers.kill_workers()
+        self.lanes.clear()
         self.jobs.clear()
+
+
+def _put(done: SimpleQueue[GivenWork], given: GivenWork, future: object) -> None:
+    done.put(given)
+
+
+def _cannot_build(error: BaseException) -> BurgError:
+    if isinstance(error, BurgError) and not isinstance(error, WorkerDied):
+        return error
+    why = str(error) if isinstance(error, WorkerDied) else one_line(error)
+    return SimulationError(f"cannot build the simulation: {why}")

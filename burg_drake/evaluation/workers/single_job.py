@@ -6,12 +6,13 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Judge, Verdict
+from burg_drake.evaluation.stages import Judge
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.pool import Pool
+from burg_drake.evaluation.workers.pool import JudgePool
 
 
 def judge_all(
@@ -43,7 +44,7 @@ def judge_all(
     count = default_workers() if workers is None else workers
     if count < 1:
         raise InvalidInputError(f"workers is {count}; give 1 or more")
-    pool = Pool(count, limits or WorkerLimits())
+    pool = JudgePool(count, limits or WorkerLimits())
     with closing(pool.run([Job("", make_judge, candidates)])) as answers:
         for _, candidate, verdict in answers:
             yield candidate, verdict

@@ -1,7 +1,15 @@
+from .comparing import compare as compare
 from .comparison import (
     Comparison as Comparison,
-    compare as compare,
+    Coverage as Coverage,
 )
+from .disagreement import Disagreement as Disagreement
+from .groups import (
+    FactorGroup as FactorGroup,
+    Stopped as Stopped,
+)
+from .judge_assessment import Judgement as Judgement
+from .placement_error import PlacementAgreement as PlacementAgreement
 from .record import (
     comparison_json as comparison_json,
     plain as plain,

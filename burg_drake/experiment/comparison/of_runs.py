@@ -39,7 +39,7 @@ def compare_runs(
     robustness: str | Path | None = None,
     seed: int = 0,
 ) -> Comparison:
-    """Compares the verdicts of two runs; see `comparison.compare`."""
+    """Compares the verdicts of two runs; see `compare`."""
     sides = JudgedRuns.load(first), JudgedRuns.load(second)
     require_common_scene(*sides)
     with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone

@@ -47,7 +47,7 @@ def compare_trials(
     robustness: str | Path | None = None,
     seed: int = 0,
 ) -> Comparison:
-    """Compares one or two runs with the trials of a sheet; see `comparison.compare`."""
+    """Compares one or two runs with the trials of a sheet; see `compare`."""
     sheet = load_trials(path)
     success = success or sheet.selection.success
     sides = [JudgedRuns.load(run) for run in runs]

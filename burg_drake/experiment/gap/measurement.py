@@ -24,7 +24,7 @@ import numpy as np
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import writable_folder
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import MODES, GraspSet, Mode
 from burg_drake.core.paths import portable_reference
 from burg_drake.core.terminal import Listener
 from burg_drake.evaluation import evaluate
@@ -41,7 +41,7 @@ from burg_drake.evaluation.records import (
     run_hash,
     software_versions,
 )
-from burg_drake.evaluation.stages import MODES, Mode, arm_settings, mode_for
+from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.evaluation.store import (
     RUN_FILE,
     Run,
@@ -54,8 +54,8 @@ from burg_drake.experiment.gap.displacement import commanded_candidates
 from burg_drake.experiment.gap.placement_noise import NoisyScene, PlacementNoise, noisy_scene
 from burg_drake.experiment.gap.reach_step import reach_verdicts
 from burg_drake.experiment.gap.steps import GapDocument, GapStep, GapSteps
-from burg_drake.scene.document import Scene, load_scene, save_scene
-from burg_drake.station.document import Station, load_station
+from burg_drake.scene.document import Scene, SceneLike, as_scene, load_scene, save_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 DOCUMENT_FILE = "gap.yaml"
 LOCK_FILE = ".gap.lock"
@@ -65,10 +65,10 @@ USUAL_NOISE = PlacementNoise()
 
 
 def measure_gap(
-    source: Run | Scene | str | Path,
+    source: Run | SceneLike,
     out: str | Path,
     *,
-    station: Station | str | Path = "panda_tabletop",
+    station: StationLike = "panda_tabletop",
     last: Mode | None = None,
     noise: PlacementNoise = USUAL_NOISE,
     samples: int = DEFAULT_SAMPLES,
@@ -105,8 +105,8 @@ def measure_gap(
             )
     else:
         assert not isinstance(source, Run)
-        scene = source if isinstance(source, Scene) else load_scene(source)
-        station = station if isinstance(station, Station) else load_station(station)
+        scene = as_scene(source)
+        station = as_station(station)
     if last is None:
         last = "hand" if station.document.arm is None else "arm"
     mode_for(station, last)

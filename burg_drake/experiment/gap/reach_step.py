@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import LIFT_HEIGHT, Outcome, Stage, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import origin_of
-from burg_drake.evaluation.stages import LIFT_HEIGHT, Decision, Judge, StationJudge, Verdict
+from burg_drake.evaluation.stages import Decision, Judge, StationJudge
 from burg_drake.evaluation.store import Run
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
@@ -50,15 +50,7 @@ class ReachOfHandFactory:
 
 def as_decision(verdict: Verdict) -> Decision:
     """The answer of a trial, from the verdict that it ended in."""
-    return Decision(
-        verdict.outcome,
-        verdict.blocker,
-        verdict.reason,
-        margins=verdict.margins,
-        displacements=verdict.displacements,
-        pushed=verdict.pushed,
-        touched=verdict.touched,
-    )
+    return Decision(verdict.outcome, **verdict.of_trial())
 
 
 def reach_verdicts(

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Literal
 
 from burg_drake.core import wilson_interval
-from burg_drake.core.grasps import Outcome, RealOutcome
+from burg_drake.core.grasps import Outcome, RealOutcome, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import TrialOrigin
-from burg_drake.evaluation.stages import Verdict
 from burg_drake.evaluation.store import Run
 from burg_drake.experiment.statistics import Paired, paired_counts
 from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.core import content_hash
 from burg_drake.core.files import remove_unfinished, writable_folder
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import (
@@ -26,7 +27,7 @@ from burg_drake.evaluation.records import (
     read_journal,
     software_versions,
 )
-from burg_drake.evaluation.stages import Verdict, one_line
+from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.store import Run
 from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecutor
 from burg_drake.experiment.gap.displacement import commanded

@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from burg_drake.core import content_hash
-from burg_drake.evaluation.stages import Mode, StationJudge, StationJudgeFactory
+from burg_drake.core.grasps import Mode
+from burg_drake.evaluation.stages import StationJudge, StationJudgeFactory, build_judge
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, Station
 
@@ -21,7 +22,7 @@ class SceneJudgeFactory:
 
     Attributes:
         scene, station: what to build.
-        engine, mode, settings: see `StationJudge`.
+        engine, mode, settings: see `build_judge`.
     """
 
     scene: Scene
@@ -31,7 +32,7 @@ class SceneJudgeFactory:
     settings: TrialSettings
 
     def __call__(self) -> StationJudge:
-        return StationJudge(
+        return build_judge(
             self.scene,
             self.station,
             engine=self.engine,

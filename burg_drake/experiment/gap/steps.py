@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.evaluation.stages import Mode
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.store import Run
 
 StepName = Literal["hand", "reach", "arm", "placed"]

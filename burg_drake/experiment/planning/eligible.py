@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, listing
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import MODES, Outcome, Stage
 from burg_drake.core.paths import name_from
-from burg_drake.evaluation.stages import MODES
 from burg_drake.evaluation.store import Campaign, Run, load_runs
 from burg_drake.experiment.trials import Among, grasp_content
 

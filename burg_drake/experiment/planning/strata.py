@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, nearest, quoted
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import MARGINS, Outcome
 from burg_drake.core.terminal import format_number
 from burg_drake.evaluation.robustness import TABLE_FILES, lifted_shares, own_table
-from burg_drake.evaluation.stages import MARGINS
 from burg_drake.evaluation.store import Run
 from burg_drake.experiment.planning.eligible import EligibleGrasps
 from burg_drake.experiment.trials import Selection, succeeded

@@ -20,6 +20,7 @@ from .margin_calibration import (
     MARGINS as MARGINS,
     PROBABILITY as PROBABILITY,
     Bin as Bin,
+    IsotonicStep as IsotonicStep,
     MarginCalibration as MarginCalibration,
     calibration as calibration,
     calibrations as calibrations,

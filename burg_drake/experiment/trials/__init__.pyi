@@ -3,6 +3,7 @@ from .book import (
     TrialChanged as TrialChanged,
 )
 from .entries import (
+    Entry as Entry,
     MissingValues as MissingValues,
     entered as entered,
     journal_path as journal_path,
@@ -28,6 +29,7 @@ from .sheet import (
     RealTrial as RealTrial,
     RobotReport as RobotReport,
     Selection as Selection,
+    SourceRun as SourceRun,
     Stratum as Stratum,
     Success as Success,
     TrialSheet as TrialSheet,
@@ -41,4 +43,5 @@ from .sources import (
     load_run_of as load_run_of,
     load_sources as load_sources,
     source_of as source_of,
+    trial_rows as trial_rows,
 )

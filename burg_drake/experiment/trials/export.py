@@ -1,6 +1,6 @@
 """The timed motions of trials, for the robot: one file a trial, named by its number.
 
-017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plan_file`
+017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `plans.grasp_plan`
 index.csv                    all trials, with their files, or what hinders the arm
 runs/KEY/                    what was asked of each run's grasps, and the answers: the same call
                              goes on from there
@@ -19,19 +19,19 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write, remove_unfinished, writable_folder
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation import ReachJudgeFactory
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records import input_of, motion_in, numbers
-from burg_drake.evaluation.stages import Verdict, arm_settings
+from burg_drake.evaluation.stages import arm_settings
 from burg_drake.evaluation.store import PlanFolder, PlanFormat, Run, plans_document
 from burg_drake.evaluation.workers import judge_all
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 from burg_drake.experiment.trials.sources import Moved, load_sources
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import StationLike, as_station
 
 INDEX_FILE = "index.csv"
 RUNS = "runs"
@@ -85,7 +85,7 @@ def export_trials(
     out: str | Path,
     *,
     format: PlanFormat = "json",
-    station: Station | str | Path | None = None,
+    station: StationLike | None = None,
     moved: Moved | None = None,
     retry_failed: bool = False,
     workers: int | None = None,
@@ -145,16 +145,13 @@ def _factory(
     folder: Path,
     out: Path,
     format: PlanFormat,
-    station: Station | str | Path | None,
+    station: StationLike | None,
 ) -> tuple[ReachJudgeFactory, Candidates]:
     """What judges the grasps of one run, and these."""
     from burg_drake.motion.workspace import require_usable_arm
 
     scene = run.scene()
-    if station is None:
-        station = run.station()
-    elif not isinstance(station, Station):
-        station = load_station(station)
+    station = run.station() if station is None else as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
             f"station {station.name!r} of {run.path} has no arm, of which one could have motions;"

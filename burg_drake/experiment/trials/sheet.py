@@ -12,10 +12,9 @@ from typing import ClassVar, Literal
 
 from burg_drake.core import FieldError, InvalidInputError
 from burg_drake.core.documents import Pose, load_document, save_document
-from burg_drake.core.grasps import Outcome, RealOutcome
+from burg_drake.core.grasps import Mode, Outcome, RealOutcome
 from burg_drake.core.paths import require_names
 from burg_drake.evaluation.records import Input
-from burg_drake.evaluation.stages import Mode
 from burg_drake.experiment.trials.checks import require_known, require_least, require_time
 
 SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the

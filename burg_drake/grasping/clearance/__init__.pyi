@@ -12,4 +12,5 @@ from .hand_clearance import (
 from .verdict import (
     CLEARANCE_VERSION as CLEARANCE_VERSION,
     Clearance as Clearance,
+    ClearanceBatch as ClearanceBatch,
 )

@@ -26,8 +26,7 @@ from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.geometry import Body, Shape
-from burg_drake.station.diagram import StationDiagram
-from burg_drake.station.world import mesh_by_pieces
+from burg_drake.station.diagram import StationDiagram, mesh_by_pieces
 
 
 def screened_bodies(station_diagram: StationDiagram) -> dict[BodyIndex, str]:

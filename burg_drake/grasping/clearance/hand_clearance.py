@@ -27,7 +27,7 @@ from burg_drake.grasping.clearance.verdict import Clearance, ClearanceBatch
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Instance, Scene, SceneDocument
 from burg_drake.station.diagram import FloatingHand, StationDiagram, build_station_diagram
-from burg_drake.station.document import Station
+from burg_drake.station.document import StationLike, as_station
 
 Mode = Literal["exact", "conservative"]
 
@@ -227,7 +227,9 @@ class HandClearance:
         return Outcome.COLLISION_BACKGROUND
 
 
-def hand_clearance_alone(library: ObjectLibrary, object: str, station: Station) -> HandClearance:
+def hand_clearance_alone(
+    library: ObjectLibrary, object: str, station: StationLike
+) -> HandClearance:
     """The screen of a station's hand against one object alone, without table and clutter.
 
     Its world is the object's frame O: `hand_clearance_alone(...).check_all(object, X_OG)`.
@@ -241,6 +243,7 @@ def hand_clearance_alone(library: ObjectLibrary, object: str, station: Station) 
         UnknownNameError: the library has no such object.
         InvalidInputError: see `HandClearance`.
     """
+    station = as_station(station)
     library.entry(object)
     document = SceneDocument(
         name=object, library=str(library.root), instances=(Instance(object=object),)

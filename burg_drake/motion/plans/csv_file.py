@@ -29,7 +29,7 @@ from burg_drake.motion.plans.plan_record import (
     require_writable,
     spans_of,
 )
-from burg_drake.motion.plans.trajectory import PHASES, Plan
+from burg_drake.motion.plans.planned_motion import PHASES, PlannedMotion
 
 Rows = Sequence[tuple[int, list[str]]]
 """Cells of samples, with the line of the file that they are on."""
@@ -43,7 +43,7 @@ KINDS = {
 """Unit and meaning of a joint's columns, by what begins their names."""
 
 
-def write_csv(plan: Plan, path: str | Path) -> None:
+def write_csv(plan: PlannedMotion, path: str | Path) -> None:
     """Writes the samples of all phases as a table, and what they are for beside it.
 
     Raises:
@@ -64,7 +64,7 @@ def write_csv(plan: Plan, path: str | Path) -> None:
     atomic_write_all({metadata_path(path): described + "\n", path: "\n".join(lines) + "\n"})
 
 
-def read_csv(path: Path) -> Plan:
+def read_csv(path: Path) -> PlannedMotion:
     """Reads what `write_csv` has written; the table alone is a plan that does not tell what it is
     for.
 
@@ -102,7 +102,7 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
     return dict(data)
 
 
-def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> Plan:
+def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
     n = len(joints)
     for line, row in rows:
         if len(row) != 3 * n + 3:
@@ -127,7 +127,7 @@ def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> Plan:
     return plan
 
 
-def _require_widths(plan: Plan, rows: Rows) -> None:
+def _require_widths(plan: PlannedMotion, rows: Rows) -> None:
     """The hand is open until it closes, and then as wide as the target in all rows."""
     for line, (_, phase, *_, text) in rows:
         wanted = _width(plan, phase)
@@ -173,7 +173,7 @@ def _number(text: str, name: str, line: int) -> float:
         raise InvalidInputError(f"{name} in line {line} is {quoted(text)}, no number") from error
 
 
-def _width(plan: Plan, phase: str) -> str:
+def _width(plan: PlannedMotion, phase: str) -> str:
     """Commanded distance between the pads [m]; empty if nobody knows how wide an open hand is."""
     width = plan.width if closed(phase) else plan.opening
     if np.isnan(width):

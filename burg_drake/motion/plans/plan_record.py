@@ -14,8 +14,8 @@ import numpy as np
 import burg_drake
 from burg_drake.core import Array, BurgError, InvalidInputError, check_pose, quoted
 from burg_drake.core.files import READ_ERRORS, without_warnings
-from burg_drake.motion.ik import ArmLimits
-from burg_drake.motion.plans.trajectory import PHASES, Plan, PlanOrigin, Trajectory
+from burg_drake.motion.plans.planned_motion import PHASES, PlannedMotion, PlanOrigin
+from burg_drake.motion.plans.trajectory import Trajectory
 
 FORMAT, VERSION = "burg_drake plan", 1
 NANO = 1_000_000_000
@@ -44,14 +44,14 @@ def closed(phase: str) -> bool:
     return PHASES.index(phase) >= PHASES.index("close")
 
 
-def joint_names(plan: Plan) -> tuple[str, ...]:
+def joint_names(plan: PlannedMotion) -> tuple[str, ...]:
     """Names of the joints, made up if nobody has said them."""
     if plan.origin is not None:
         return plan.origin.joints
     return tuple(f"joint{i + 1}" for i in range(plan.approach.q.shape[1]))
 
 
-def spans_of(plan: Plan) -> Spans:
+def spans_of(plan: PlannedMotion) -> Spans:
     """Where the phases are among the samples of the whole plan."""
     spans, first = {}, 0
     for name, phase in plan.phases.items():
@@ -60,7 +60,7 @@ def spans_of(plan: Plan) -> Spans:
     return spans
 
 
-def require_writable(plan: Plan) -> None:
+def require_writable(plan: PlannedMotion) -> None:
     """Refuses a plan that could not be read again.
 
     Raises:
@@ -74,7 +74,7 @@ def require_writable(plan: Plan) -> None:
             raise InvalidInputError(f"phase {name!r} does not have {rate:g} samples a second")
 
 
-def plan_data(plan: Plan) -> dict[str, Any]:
+def plan_data(plan: PlannedMotion) -> dict[str, Any]:
     """JSON values of all of a plan but its samples."""
     return {
         "format": FORMAT,
@@ -134,7 +134,9 @@ def read_data(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescr
     return PlanDescription(rate, opening, width, close_time, origin)
 
 
-def assembled(description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]) -> Plan:
+def assembled(
+    description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
+) -> PlannedMotion:
     """A plan of its samples.
 
     Args:
@@ -160,7 +162,7 @@ def assembled(description: PlanDescription, t: Array, spans: Spans, rows: Sequen
         name: Trajectory(exact[: last - first + 1], *(x[first : last + 1] for x in rows))
         for name, (first, last) in spans.items()
     }
-    plan = Plan(
+    plan = PlannedMotion(
         **{name: trajectory for name, trajectory in parts.items() if name != "close"},
         close_time=description.close_time,
         opening=description.opening,
@@ -191,7 +193,7 @@ def _require_spans(spans: Spans, count: int) -> None:
         end = last
 
 
-def _require_rest(parts: Mapping[str, Trajectory], plan: Plan) -> None:
+def _require_rest(parts: Mapping[str, Trajectory], plan: PlannedMotion) -> None:
     """The arm rests between the phases, and for as long as the hand closes."""
     for name, trajectory in parts.items():
         if np.any([trajectory.v[[0, -1]], trajectory.a[[0, -1]]]):
@@ -248,6 +250,8 @@ def _numbers(values: Array) -> list[float | None]:
 
 
 def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
+    from burg_drake.motion.ik import ArmLimits  # imports Drake
+
     given = {
         name: np.array([none if value is None else value for value in values], dtype=float)
         for name, values in data["limits"].items()

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,9 +32,9 @@ from burg_drake.motion.reach.lift_height import lift_heights, raise_lifts
 from burg_drake.motion.reach.verdict import Reach
 from burg_drake.motion.sweep import HandSweep
 from burg_drake.motion.transit import HomeTree, postures_over_objects
-from burg_drake.scene.document import Scene, load_scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import StationLike, as_station
 
 BATCH = 128
 """Grasps whose motions are looked for together: enough that more would hardly be cheaper each ...
@@ -63,8 +62,8 @@ class ArmReach:
 
     def __init__(
         self,
-        scene: Scene | str | Path,
-        station: Station | str | Path,
+        scene: SceneLike,
+        station: StationLike,
         *,
         settings: ReachSettings | None = None,
         ik: IkRoutine | None = None,
@@ -81,8 +80,7 @@ class ArmReach:
             InvalidInputError: the station has no arm, or in its home posture something collides.
         """
         self.settings = settings or ReachSettings()
-        scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        station = station if isinstance(station, Station) else load_station(station)
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         self.motion = self.settings.motion or station.document.motion
         arm = station.document.arm

@@ -27,7 +27,7 @@ from burg_drake.motion.reach import ArmReach
 from burg_drake.motion.workspace.reachability import board_cells, grasps_over_board
 from burg_drake.motion.workspace.station_check import empty_scene
 from burg_drake.scene.document import Board
-from burg_drake.station.document import Station, world_content
+from burg_drake.station.document import Station, StationLike, as_station, world_content
 
 Indices = NDArray[np.intp]
 
@@ -80,7 +80,7 @@ class ReachLayer:
 
 
 def reach_from_above(
-    station: Station,
+    station: StationLike,
     board: Board | None = None,
     *,
     height: float = 0.05,
@@ -101,6 +101,7 @@ def reach_from_above(
         InvalidInputError: the station has no arm, or one that collides at home; or a number is out
             of its range.
     """
+    station = as_station(station)
     if not (0.0 < spacing < np.inf and 0.0 <= height < np.inf and yaws >= 1):
         raise InvalidInputError(
             f"spacing {spacing:g} m must be above 0, height {height:g} m at least 0, and yaws"

@@ -28,9 +28,9 @@ from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.collision import ArmCollision
 from burg_drake.motion.ik import ArmKinematics, arm_solutions
 from burg_drake.motion.proximity import ArmProximity
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.document import Station, world_content
+from burg_drake.station.document import Station, StationLike, as_station, world_content
 
 Indices = NDArray[np.intp]
 
@@ -151,7 +151,7 @@ class ReachabilityMap:
 
 
 def map_reachability(
-    scene: Scene, station: Station, *, settings: ReachabilitySettings | None = None
+    scene: SceneLike, station: StationLike, *, settings: ReachabilitySettings | None = None
 ) -> ReachabilityMap:
     """Maps what an arm reaches over the board of a scene, in between the scene's objects; what was
     mapped before comes from the user's cache.
@@ -165,6 +165,7 @@ def map_reachability(
     Raises:
         InvalidInputError: the station has no arm.
     """
+    scene, station = as_scene(scene), as_station(station)
     settings = settings or ReachabilitySettings()
     if station.document.arm is None:
         raise InvalidInputError(

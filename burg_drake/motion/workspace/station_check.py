@@ -23,10 +23,17 @@ from burg_drake.motion.workspace.reachability import (
     map_reachability,
 )
 from burg_drake.objects.library import load_library
-from burg_drake.scene.document import Board, Scene, SceneDocument, placed_vertices
+from burg_drake.scene.document import (
+    Board,
+    Scene,
+    SceneDocument,
+    SceneLike,
+    as_scene,
+    placed_vertices,
+)
 from burg_drake.station.checks import require_valid_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.document import Station, seen_share
+from burg_drake.station.document import Station, StationLike, as_station, seen_share
 from burg_drake.station.world import HandFigures, check_hand
 
 
@@ -75,7 +82,10 @@ def empty_scene(board: Board | None = None) -> Scene:
 
 
 def inspect_station(
-    station: Station, scene: Scene | None = None, *, settings: ReachabilitySettings | None = None
+    station: StationLike,
+    scene: SceneLike | None = None,
+    *,
+    settings: ReachabilitySettings | None = None,
 ) -> StationReport:
     """Runs all checks of a station.
 
@@ -87,6 +97,8 @@ def inspect_station(
     Raises:
         InvalidInputError: it cannot be used; one line says why.
     """
+    station = as_station(station)
+    scene = None if scene is None else as_scene(scene)
     hand = check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     if scene is not None:
         require_valid_scene(scene, station)

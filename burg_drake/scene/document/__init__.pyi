@@ -21,6 +21,8 @@ from .scene import (
     Instance as Instance,
     Scene as Scene,
     SceneDocument as SceneDocument,
+    SceneLike as SceneLike,
+    as_scene as as_scene,
     load_scene as load_scene,
     save_scene as save_scene,
 )

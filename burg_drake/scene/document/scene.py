@@ -195,6 +195,19 @@ def load_scene(
     return Scene(document, objects, path)
 
 
+SceneLike = Scene | str | Path
+"""A scene, loaded or by what `load_scene` takes: a path, or the name of a built-in one."""
+
+
+def as_scene(scene: SceneLike) -> Scene:
+    """A scene, loaded if it is given by name.
+
+    Raises:
+        UnknownNameError, DocumentError: see `load_scene`.
+    """
+    return scene if isinstance(scene, Scene) else load_scene(scene)
+
+
 def save_scene(document: SceneDocument, path: str | Path) -> None:
     """Writes a scene file; see `core.schema.save_document`."""
     save_document(document, path)

@@ -15,7 +15,7 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.document.scene import Scene
+from burg_drake.scene.document.scene import Scene, SceneLike, as_scene
 
 IN_BOUNDS_TOLERANCE = 1e-4
 """How far an object may stick out over the board's edge [m]: rounding of documents."""
@@ -79,7 +79,7 @@ class Extent:
 
 
 def validate_scene(
-    scene: Scene, extents: Mapping[str, Extent] | None = None
+    scene: SceneLike, extents: Mapping[str, Extent] | None = None
 ) -> tuple[SceneIssue, ...]:
     """Checks where the instances of a scene stand on the board.
 
@@ -91,6 +91,7 @@ def validate_scene(
     Returns:
         What was found, in the order of the document; nothing if all is well.
     """
+    scene = as_scene(scene)
     if extents is None:
         names = (*scene.instances, *scene.background)
         extents = {name: Extent.of(placed_vertices(scene, name)) for name in names}

@@ -13,3 +13,7 @@ from .relaxation import (
     RELAXING as RELAXING,
     relax as relax,
 )
+from .still_check import (
+    is_still as is_still,
+    stillness as stillness,
+)

@@ -9,10 +9,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, SimulationError
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.rest.displacement import Displacement, displacement_from_document
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
 STILL_DISTANCE = 5e-4
 """A settled scene moves by less than this [m] ..."""
@@ -23,8 +23,8 @@ STILL_DURATION = 5.0
 
 
 def stillness(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     duration: float = STILL_DURATION,
     engine: Engine = ENGINES["reference"],
@@ -49,6 +49,7 @@ def stillness(
     """
     if not 0.0 < duration < np.inf:
         raise InvalidInputError(f"duration is {duration:g} s; give more than 0")
+    scene, station = as_scene(scene), as_station(station)
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     simulator = Simulator(built.diagram)
     try:

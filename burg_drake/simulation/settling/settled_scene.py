@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import InvalidInputError, SimulationError
-from burg_drake.scene.document import TOUCH_TOLERANCE, Scene
+from burg_drake.scene.document import TOUCH_TOLERANCE, Scene, SceneLike, as_scene
 from burg_drake.simulation.rest import (
     RELAXING,
     BodySpeed,
@@ -28,7 +28,7 @@ from burg_drake.station.diagram import (
     instance_pose,
     touching,
 )
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, Station, StationLike, as_station
 
 DEFAULT_TIME_LIMIT = 10.0
 """Simulated time allowed [s]."""
@@ -69,8 +69,8 @@ class SettledScene:
 
 
 def settle_scene(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     engine: Engine = ENGINES[DEFAULT_ENGINE],
     time_limit: float = DEFAULT_TIME_LIMIT,
@@ -99,6 +99,7 @@ def settle_scene(
             limit is not above 0.
         SimulationError: Drake cannot step the scene.
     """
+    scene, station = as_scene(scene), as_station(station)
     if not 0.0 < time_limit < np.inf:
         raise InvalidInputError(f"time limit is {time_limit:g} s; give more than 0")
     built = build_station_diagram(scene, station, robot="none", engine=engine)

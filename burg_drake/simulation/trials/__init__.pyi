@@ -5,10 +5,7 @@ from .execution import (
     motion_in_hand as motion_in_hand,
 )
 from .hand_trial import HandTrial as HandTrial
-from .result import (
-    Margins as Margins,
-    TrialResult as TrialResult,
-)
+from .result import TrialResult as TrialResult
 from .trial_settings import (
     DEFAULT_TRIAL as DEFAULT_TRIAL,
     TrialSettings as TrialSettings,

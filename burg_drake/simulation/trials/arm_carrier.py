@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
@@ -13,10 +12,10 @@ from burg_drake.core import Array
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.contacts import BodyContact
+from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
-
-if TYPE_CHECKING:
-    from burg_drake.simulation.trials.arm_trial import ArmTrial
+from burg_drake.station.diagram import MountedHand
 
 SPACING = 0.01
 """Hand's way between two looks along the rest of the lift [m]."""
@@ -34,30 +33,36 @@ class ArmCarrier:
     wanted at its end.
 
     Args:
-        trial: a trial that has been brought to its start.
+        trial: a trial with an arm that has been brought to its start.
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
         ways: from there on, at least one; the hand goes straight on each.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
     def __init__(
         self,
-        trial: ArmTrial,
+        trial: GraspTrial,
         target: BodyIndex,
         approach: CommandSequence,
         segments: Sequence[CommandSequence],
+        lift_clearance: Callable[[], ArmLiftClearance],
     ) -> None:
+        assert isinstance(trial.hand, MountedHand)
         diagram = trial.diagram
         self._trial = trial
-        self._target = target
+        self._mounted = trial.hand
+        self._lift_clearance = lift_clearance
         self._step = diagram.engine.time_step
         self._plant_context = diagram.plant.GetMyMutableContextFromRoot(trial.context)
         self._port = diagram.diagram.GetInputPort("arm.desired_state")
         self._approach, self._commands = approach, tuple(segments)
-        self._loads = _loads(segments[-1].p_WG, trial.check_period, trial.gravity)
+        self._gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
+        interval = segments[-1].steps_per_check * self._step
+        self._loads = _loads(segments[-1].p_WG, interval, self._gravity)
         speed = np.linalg.norm(np.diff(segments[-1].p_WG, axis=0), axis=1)
         self._fastest = int(speed.argmax())
-        self._touches = RobotContactWatch(trial.diagram, trial.hand.links, target)
+        self._touches = RobotContactWatch(diagram, trial.hand.links, target)
         self._current: CommandSequence | None = None
         self._number = 0
         self._start = 0
@@ -65,7 +70,7 @@ class ArmCarrier:
         self.approach_checks = approach.checks
         self.approach_steps = approach.steps_per_check
         self.segments = tuple(_segment(segment) for segment in segments)
-        self.lift_time = sum(way.checks for way in segments) * trial.check_period
+        self.lift_time = sum(segment.checks for segment in segments) * interval
         self.tracking_error = self.tracking_distance = math.nan
 
     @property
@@ -83,10 +88,10 @@ class ArmCarrier:
         self._arrived = True
         self._follow(None)
         trial = self._trial
-        trial.command("hand", trial.hand.closing_command())
+        trial.command("hand", self._mounted.closing_command())
         if not self.touched:
-            X_WG = trial.hand.X_WG(self._plant_context)
-            trial.hand.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
+            X_WG = self._mounted.X_WG(self._plant_context)
+            self._mounted.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
             trial.simulator.Initialize()
 
     def lift(self, number: int, check: int) -> None:
@@ -118,7 +123,7 @@ class ArmCarrier:
 
     def travelled(self) -> float:
         """Of the grasp frame since the beginning of a way as it was commanded [m]."""
-        p_WG = self._trial.hand.X_WG(self._plant_context)[:3, 3]
+        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
         p_GG_W = p_WG - self._commands[self._number].p_WG[0]
         return float(p_GG_W @ self.segments[self._number].direction_W)
 
@@ -130,7 +135,7 @@ class ArmCarrier:
         """
         polls = self._trial.settings.steady_polls
         window = self._loads[max(0, check + 1 - polls) : check + 1]
-        ahead = np.append(self._loads[check + 1 :], self._trial.gravity).max()
+        ahead = np.append(self._loads[check + 1 :], self._gravity).max()
         brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
         return bool(brakes and ahead <= (1.0 + NEGLIGIBLE_LOAD) * window.max())
 
@@ -144,7 +149,7 @@ class ArmCarrier:
         rows = check + np.searchsorted(gone, marks - 1e-9)
         q = np.array([commands.q_at_check(row) for row in rows])
         positions = self._trial.diagram.plant.GetPositions(self._plant_context)
-        return self._trial.lift_clearance(self._target).is_free(positions, q)
+        return self._lift_clearance().is_free(positions, q)
 
     def _follow(self, commands: CommandSequence | None) -> None:
         """Follows a course from now on; without one the last command stays."""
@@ -161,8 +166,8 @@ class ArmCarrier:
 
     def _track(self, commands: CommandSequence) -> None:
         check = self._checks_done(commands)
-        q = self._trial.hand.q(self._plant_context)
-        p_WG = self._trial.hand.X_WG(self._plant_context)[:3, 3]
+        q = self._mounted.q(self._plant_context)
+        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
         error = float(np.abs(q - commands.q_at_check(check)).max())
         distance = float(np.linalg.norm(p_WG - commands.p_WG[check]))
         self.tracking_error = float(np.fmax(self.tracking_error, error))

@@ -8,7 +8,7 @@ before the hand closed.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,16 +19,17 @@ from burg_drake.core import Array, InvalidInputError, inverse, rotation_angle, s
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.plans import Plan, Trajectory
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
-from burg_drake.simulation.trials.arm_lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.result import TrialResult, collision, failure
-from burg_drake.simulation.trials.scene_trial import SceneTrial, check_overrides
+from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import MountedHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
 REST = 0.05
 """Time between arrival and closing, in which the arm comes to rest [s]."""
@@ -38,7 +39,7 @@ APART = 1e-6
 """Ends of trajectories that are meant to meet [rad]."""
 
 
-class ArmTrial(SceneTrial):
+class ArmTrial(GraspTrial):
     """Executes plans in one scene with the whole robot.
 
     Args:
@@ -57,8 +58,6 @@ class ArmTrial(SceneTrial):
         clearance: the screen of the open hand.
         hand: hand and arm.
         contacts, neighbours, simulator, settings: see `SceneTrial`.
-        check_period: time from one look at the contacts to the next [s].
-        gravity: [m/s^2].
 
     Raises:
         InvalidInputError: the station has no arm.
@@ -68,8 +67,8 @@ class ArmTrial(SceneTrial):
 
     def __init__(
         self,
-        scene: Scene,
-        station: Station,
+        scene: SceneLike,
+        station: StationLike,
         *,
         engine: Engine = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
@@ -77,19 +76,17 @@ class ArmTrial(SceneTrial):
         clearance: HandClearance | None = None,
         meshcat: Meshcat | None = None,
     ) -> None:
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
-        super().__init__(diagram, MountedHand(diagram), settings)
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
-        self.clearance = clearance
+        super().__init__(diagram, MountedHand(diagram), settings, clearance)
         self._transfer = transfer
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(diagram)
         self.steps_per_check = max(1, round(settings.poll / engine.time_step))
-        self.check_period = self.steps_per_check * engine.time_step
-        self.gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
         self._lift_clearances: dict[BodyIndex, ArmLiftClearance] = {}
 
     def run(
@@ -125,15 +122,8 @@ class ArmTrial(SceneTrial):
         as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
         if rotation_angle(X_WG[:3, :3].T @ as_planned) > OFF_ANGLE:
             X_WG = swap_fingers(X_WG)
-        screen = self.clearance.check(instance, X_WG)
-        if screen.outcome is not None:
-            return collision(screen)
-        try:
-            found = self.begin(instance, plan, friction=friction, mass=mass).run()
-            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
-        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.invalidate()
-            return failure(error, screen, self.context.get_time())
+        begin = partial(self.begin, instance, plan, friction=friction, mass=mass)
+        return self.execute(instance, X_WG, begin)
 
     def begin(
         self,
@@ -169,7 +159,9 @@ class ArmTrial(SceneTrial):
         self.command("arm", approach.at(0))
         self.command("hand", self.hand.opening_command())
         self.simulator.Initialize()
-        return Execution(self, target, moving, ArmCarrier(self, target, approach, segments))
+        lift_clearance = partial(self.lift_clearance, target)
+        carrier = ArmCarrier(self, target, approach, segments, lift_clearance)
+        return Execution(self, target, moving, carrier)
 
     def lift_clearance(self, target: BodyIndex) -> ArmLiftClearance:
         """Looks along the way up with a target in the hand."""

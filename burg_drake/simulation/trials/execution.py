@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, inverse, rotation_angle
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import Margins, Outcome
 from burg_drake.simulation.trials.carrier import Carrier, HandSegment
 from burg_drake.simulation.trials.contacts import (
     NO_CONTACT,
@@ -20,7 +20,7 @@ from burg_drake.simulation.trials.contacts import (
     touched_from_outside,
 )
 from burg_drake.simulation.trials.mass_centers import MassCenterTracker, center_of_mass
-from burg_drake.simulation.trials.result import Margins, TrialResult
+from burg_drake.simulation.trials.result import TrialResult
 
 if TYPE_CHECKING:
     from burg_drake.simulation.trials.scene_trial import SceneTrial

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -18,18 +18,25 @@ from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.grasping.clearance import HandClearance
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
+from burg_drake.simulation.trials.grasp_trial import GraspTrial
 from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
-from burg_drake.simulation.trials.result import TrialResult, collision, failure
-from burg_drake.simulation.trials.scene_trial import SceneTrial, check_overrides
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.station.diagram import FloatingHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, GraspMotion, Station
+from burg_drake.station.document import (
+    ENGINES,
+    Engine,
+    GraspMotion,
+    StationLike,
+    as_station,
+)
 
 
-class HandTrial(SceneTrial):
+class HandTrial(GraspTrial):
     """Executes grasps of one scene with the hand alone.
 
     Args:
@@ -54,8 +61,8 @@ class HandTrial(SceneTrial):
 
     def __init__(
         self,
-        scene: Scene,
-        station: Station,
+        scene: SceneLike,
+        station: StationLike,
         *,
         engine: Engine = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
@@ -63,11 +70,12 @@ class HandTrial(SceneTrial):
         lock: bool = True,
         meshcat: Meshcat | None = None,
     ) -> None:
+        scene, station = as_scene(scene), as_station(station)
         diagram = build_station_diagram(
             scene, station, robot="hand", engine=engine, meshcat=meshcat
         )
-        self.clearance = HandClearance(diagram)
-        super().__init__(diagram, FloatingHand(diagram), settings, motion)
+        clearance = HandClearance(diagram)
+        super().__init__(diagram, FloatingHand(diagram), settings, clearance, motion)
         self._lock = lock
         self._lift_clearances: dict[BodyIndex, HandLiftClearance] = {}
 
@@ -99,15 +107,8 @@ class HandTrial(SceneTrial):
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
         paths = self.lift_paths(X_WG, lift)
-        screen = self.clearance.check(instance, X_WG)
-        if screen.outcome is not None:
-            return collision(screen)
-        try:
-            found = self.begin(instance, X_WG, paths, friction=friction, mass=mass).run()
-            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
-        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.invalidate()
-            return failure(error, screen, self.context.get_time())
+        begin = partial(self.begin, instance, X_WG, paths, friction=friction, mass=mass)
+        return self.execute(instance, X_WG, begin)
 
     def begin(
         self,
@@ -142,7 +143,8 @@ class HandTrial(SceneTrial):
         self.command("lift", np.zeros(2))
         self.command("hand", self.hand.closing_command())
         self.simulator.Initialize()
-        return Execution(self, target, moving, LiftCarrier(self, target, paths))
+        lift_clearance = partial(self.lift_clearance, target)
+        return Execution(self, target, moving, LiftCarrier(self, paths, lift_clearance))
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
         """Straight ways of the hand with the target.

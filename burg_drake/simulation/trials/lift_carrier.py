@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.contacts import BodyContact, reached
+from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
+from burg_drake.simulation.trials.scene_trial import SceneTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
-
-if TYPE_CHECKING:
-    from burg_drake.simulation.trials.hand_trial import HandTrial
-
+from burg_drake.station.diagram import FloatingHand
 
 DOWN = -1e-6
 """Upward part of a direction (unit vector) that goes down by more than rounding."""
@@ -41,20 +39,27 @@ class LiftCarrier:
     the new direction.
 
     Args:
-        trial: a trial that has been brought to its start, with the hand at the grasp and the joint
-            along the first of the ways.
-        target: the grasped body.
+        trial: a trial that has been brought to its start, with the floating hand at the grasp and
+            the joint along the first of the ways.
         ways: of the hand, at least one.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
     approach_checks = approach_steps = 0
     tracking_error = tracking_distance = math.nan
     touched = ""
 
-    def __init__(self, trial: HandTrial, target: BodyIndex, paths: Sequence[LiftPath]) -> None:
+    def __init__(
+        self,
+        trial: SceneTrial,
+        paths: Sequence[LiftPath],
+        lift_clearance: Callable[[], HandLiftClearance],
+    ) -> None:
+        assert isinstance(trial.hand, FloatingHand)
         settings = trial.settings
         self._trial = trial
-        self._target = target
+        self._floating = trial.hand
+        self._lift_clearance = lift_clearance
         self._plant = trial.diagram.plant
         self._plant_context = self._plant.GetMyMutableContextFromRoot(trial.context)
         self._names = trial.diagram.body_names
@@ -66,7 +71,7 @@ class LiftCarrier:
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._number = 0
         self._start_time = False
-        self._X_WG_start = trial.hand.X_WG(self._plant_context)
+        self._X_WG_start = self._floating.X_WG(self._plant_context)
 
     def approach(self) -> None:
         """The hand stands at the grasp."""
@@ -81,8 +86,8 @@ class LiftCarrier:
         self._start_time = True
         if number != self._number:
             self._number = number
-            self._X_WG_start = self._trial.hand.X_WG(self._plant_context)
-            self._trial.hand.turn_lift(self._plant_context, segment.direction_W)
+            self._X_WG_start = self._floating.X_WG(self._plant_context)
+            self._floating.turn_lift(self._plant_context, segment.direction_W)
             self._trial.simulator.Initialize()
         checks = _check_count(segment.length, settings)
         top_speed = 2 * segment.length / (checks * settings.poll)
@@ -108,7 +113,7 @@ class LiftCarrier:
 
     def travelled(self) -> float:
         """Position of the joint [m]."""
-        return self._trial.hand.travelled(self._plant_context)
+        return self._floating.travelled(self._plant_context)
 
     def carries_full_load(self, check: int) -> bool:
         """The hand accelerates in the first half of a segment and brakes in the second. Straight
@@ -123,8 +128,7 @@ class LiftCarrier:
         """Looks along the joint's axis."""
         positions = self._plant.GetPositions(self._plant_context)
         last = self.segments[-1]
-        rise = self._trial.lift_clearance(self._target)
-        return rise.is_free(
+        return self._lift_clearance().is_free(
             self._X_WG_start, positions, last.length - self.travelled(), last.direction_W
         )
 

@@ -25,9 +25,8 @@ from burg_drake.core import Array, InvalidInputError, check_pose
 from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
 from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.diagram import HandHandle, StationDiagram
+from burg_drake.station.diagram import HandHandle, StationDiagram, separate_ball_contact
 from burg_drake.station.document import GraspMotion
-from burg_drake.station.world import part_rolling
 
 
 class SceneTrial:
@@ -127,7 +126,7 @@ class SceneTrial:
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
         declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
         self._filter(declaration)
-        part_rolling(self.diagram, self.context)
+        separate_ball_contact(self.diagram, self.context)
         self.simulator.Initialize()
 
     def isolate(self, target: BodyIndex) -> None:

@@ -25,6 +25,8 @@ from burg_drake.scene.document import (
     Scene,
     SceneDocument,
     SceneIssue,
+    SceneLike,
+    as_scene,
     length_text,
     surface_vertices,
     validate_scene,
@@ -33,9 +35,9 @@ from burg_drake.station.checks.body_shapes import object_shapes, surrounding_sha
 from burg_drake.station.checks.collision_world import CollisionWorld
 from burg_drake.station.checks.sinking import push_up
 from burg_drake.station.checks.travel import Travel
-from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
-from burg_drake.station.document import Station
-from burg_drake.station.world import ROBOT_MODELS, name_taken_error, obstacle_name_error
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.document import Station, StationLike, as_station
+from burg_drake.station.world import ROBOT_MODELS, Robot, name_taken_error, obstacle_name_error
 
 GRAVITY = 9.81
 """[m/s^2]."""
@@ -73,7 +75,8 @@ class SceneCheck:
         InvalidInputError, UnknownNameError: the station's robot cannot be built.
     """
 
-    def __init__(self, station: Station, library: ObjectLibrary) -> None:
+    def __init__(self, station: StationLike, library: ObjectLibrary) -> None:
+        station = as_station(station)
         self._station, self._library = station, library
         self._X_WS = station.document.X_WS.matrix()
         self._around = _empty_station(station, library)
@@ -85,7 +88,7 @@ class SceneCheck:
         self._surfaces: dict[str, Array] = {}
         self._placed: dict[str, _PlacedInstance] = {}
 
-    def issues(self, scene: Scene) -> tuple[SceneIssue, ...]:
+    def issues(self, scene: SceneLike) -> tuple[SceneIssue, ...]:
         """What is wrong with a scene: objects out of bounds, in the ground, hovering, beside the
         table, or overlapping.
 
@@ -101,6 +104,7 @@ class SceneCheck:
             InvalidInputError: the scene is of another library, a pose is not of finite numbers, a
                 name is taken by the station, or a model cannot be loaded.
         """
+        scene = as_scene(scene)
         self._place(scene)
         placed = self._placed
         issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
@@ -118,7 +122,7 @@ class SceneCheck:
         return tuple(issues)
 
     def travel(
-        self, scene: Scene, names: Iterable[str], direction_S: ArrayLike, limit: float
+        self, scene: SceneLike, names: Iterable[str], direction_S: ArrayLike, limit: float
     ) -> float:
         """How far instances can be moved together along a straight line until they touch something
         else: another object, the table, an obstacle, or the arm in its home posture.
@@ -141,6 +145,7 @@ class SceneCheck:
             InvalidInputError: no names, no direction, or a limit that is negative or no number;
                 and see `issues`.
         """
+        scene = as_scene(scene)
         chosen = list(dict.fromkeys(names))
         if not chosen:
             raise InvalidInputError("no instance is named; name those to move")

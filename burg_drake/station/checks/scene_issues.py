@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.scene.document import Scene, SceneIssue
+from burg_drake.scene.document import SceneIssue, SceneLike, as_scene
 from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.valid_scene import require_valid_scene as require_valid_scene
-from burg_drake.station.diagram import StationDiagram
-from burg_drake.station.document import Station
-from burg_drake.station.world import mesh_by_pieces
+from burg_drake.station.diagram import StationDiagram, mesh_by_pieces
+from burg_drake.station.document import StationLike, as_station
 
 
-def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
+def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...]:
     """All that `validate_scene` checks, and overlaps with other objects and with the station.
 
     Args:
@@ -22,6 +20,7 @@ def check_scene(scene: Scene, station: Station) -> tuple[SceneIssue, ...]:
     Returns:
         What was found; nothing if all is well.
     """
+    scene, station = as_scene(scene), as_station(station)
     return SceneCheck(station, scene.library).issues(scene)
 
 

@@ -15,7 +15,7 @@ def require_valid_scene(scene: Scene, station: Station) -> None:
     """
 
     def check() -> Arrays:
-        from burg_drake.station.checks.scene_issues import check_scene  # which builds a diagram
+        from burg_drake.station.checks.scene_issues import check_scene  # imports Drake
 
         require_no_errors(scene, check_scene(scene, station))
         return {}

@@ -1,13 +1,14 @@
-from .builder import (
-    Robot as Robot,
-    StationDiagram as StationDiagram,
-    build_station_diagram as build_station_diagram,
-    instance_pose as instance_pose,
-)
+from .ball_contact import separate_ball_contact as separate_ball_contact
+from .builder import build_station_diagram as build_station_diagram
 from .floating_hand import FloatingHand as FloatingHand
 from .hand_handle import HandHandle as HandHandle
 from .leaning import (
     soften as soften,
     touching as touching,
 )
+from .mesh_replacement import mesh_by_pieces as mesh_by_pieces
 from .mounted_hand import MountedHand as MountedHand
+from .station_diagram import (
+    StationDiagram as StationDiagram,
+    instance_pose as instance_pose,
+)

@@ -34,26 +34,22 @@ gives its arm an inverse-dynamics controller (`ArmControl`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, get_args
 
 from pydrake.geometry import HydroelasticContactRepresentation, MeshcatVisualizer
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
-from pydrake.multibody.tree import (
-    BodyIndex,
-    Joint,
-)
-from pydrake.planning import RobotDiagram, RobotDiagramBuilder
+from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
-from burg_drake.scene.document import Scene
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.control import export_driven_ports, export_ports
+from burg_drake.station.diagram.ball_contact import separate_ball_contact
 from burg_drake.station.diagram.leaning import soften_touching
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.station.diagram.station_diagram import StationDiagram, instance_pose
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 from burg_drake.station.world import (
-    RISE as RISE,
     Robot,
     add_board,
     add_cameras,
@@ -62,77 +58,17 @@ from burg_drake.station.world import (
     add_robot,
     add_table,
     add_vertical_joint,
-    joint_actuators,
-    part_rolling,
     set_default_posture,
     set_packages,
 )
 
 if TYPE_CHECKING:
-    from pydrake.geometry import Meshcat, SceneGraph
-
-
-@dataclass(frozen=True, eq=False)
-class StationDiagram:
-    """A built diagram and the names to find things in it.
-
-    Attributes:
-        diagram: the Drake diagram; keep it alive while its plant is used.
-        scene, station, robot, engine: what it was built from.
-        free: body of each instance that is not background, by name.
-        fixed: bodies of background instances and obstacles, by name.
-        table: the table's body.
-        robot_bodies: all bodies of hand and arm.
-    """
-
-    diagram: RobotDiagram
-    scene: Scene
-    station: Station
-    robot: Robot
-    engine: Engine
-    free: dict[str, BodyIndex]
-    fixed: dict[str, BodyIndex]
-    table: BodyIndex
-    robot_bodies: tuple[BodyIndex, ...]
-
-    @property
-    def plant(self) -> MultibodyPlant:
-        """The plant, finalized."""
-        return self.diagram.plant()
-
-    @property
-    def scene_graph(self) -> SceneGraph:
-        """The scene graph."""
-        return self.diagram.scene_graph()
-
-    @property
-    def arm_joints(self) -> tuple[Joint, ...]:
-        """The arm's joints in the order of the station's home posture; none without an arm."""
-        if self.robot != "arm":
-            return ()
-        model = self.plant.GetModelInstanceByName("arm")
-        return tuple(actuator.joint() for actuator in joint_actuators(self.plant, model))
-
-    @property
-    def body_names(self) -> dict[BodyIndex, str]:
-        """What people call a body: the names of instances and obstacles, `table`, robot links."""
-        names = {index: name for name, index in {**self.free, **self.fixed}.items()}
-        links = {i: self.plant.get_body(i).name() for i in self.robot_bodies}
-        return names | links | {self.table: "table"}
-
-    def X_WO(self, instance: str) -> Array:
-        """(4, 4) pose at which the document places an instance."""
-        return instance_pose(self.scene, self.station, instance)
-
-
-def instance_pose(scene: Scene, station: Station, instance: str) -> Array:
-    """`X_WO` (4, 4) of an instance as the documents place it."""
-    return station.document.X_WS.matrix() @ scene.X_SO(instance)
+    from pydrake.geometry import Meshcat
 
 
 def build_station_diagram(
-    scene: Scene,
-    station: Station,
+    scene: SceneLike,
+    station: StationLike,
     *,
     robot: Robot = "arm",
     engine: Engine = ENGINES["standard"],
@@ -143,7 +79,7 @@ def build_station_diagram(
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
-    Objects are rigid, but those that touch other objects are compliant (see `station.touching`).
+    Objects are rigid, but those that touch other objects are compliant (see `diagram.leaning`).
 
     Args:
         scene: what stands on the board.
@@ -162,7 +98,7 @@ def build_station_diagram(
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
             stands where it is placed, and can be lifted off by a joint `RISE` of its model along
             world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
-            (see `station.hollow`).
+            (see `world.mesh_pieces`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -174,6 +110,7 @@ def build_station_diagram(
             a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
+    scene, station = as_scene(scene), as_station(station)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if robot not in get_args(Robot):
@@ -224,7 +161,7 @@ def build_station_diagram(
         robot_bodies=tuple(i for m in models.values() for i in plant.GetBodyIndices(m)),
     )
     if not weld_objects:
-        part_rolling(built)
+        separate_ball_contact(built)
         soften_touching(built)
     return built
 

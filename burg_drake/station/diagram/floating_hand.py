@@ -7,8 +7,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError
-from burg_drake.station.diagram.builder import StationDiagram
 from burg_drake.station.diagram.hand_handle import HandHandle
+from burg_drake.station.diagram.station_diagram import StationDiagram
 
 UP = np.array((0.0, 0.0, 1.0))
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, inverse
-from burg_drake.station.diagram.builder import StationDiagram
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.world import find_hand
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import (
@@ -23,10 +22,8 @@ from pydrake.geometry import (
 )
 from pydrake.multibody.tree import BodyIndex
 
+from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.world import DISSIPATION, is_ball, is_mesh
-
-if TYPE_CHECKING:
-    from burg_drake.station.diagram.builder import StationDiagram
 
 GAP = 0.001
 """Objects that are closer than this may lean on each other [m]; a scene's poses are rounded."""

@@ -6,8 +6,8 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError
-from burg_drake.station.diagram.builder import StationDiagram
 from burg_drake.station.diagram.hand_handle import HandHandle
+from burg_drake.station.diagram.station_diagram import StationDiagram
 
 
 class MountedHand(HandHandle):

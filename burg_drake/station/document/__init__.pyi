@@ -1,3 +1,4 @@
+from .arm_control import ArmControl as ArmControl
 from .board_visibility import (
     frustum as frustum,
     seen_share as seen_share,
@@ -24,6 +25,8 @@ from .station_document import (
     Obstacle as Obstacle,
     Station as Station,
     StationDocument as StationDocument,
+    StationLike as StationLike,
     Table as Table,
+    as_station as as_station,
     load_station as load_station,
 )

@@ -284,6 +284,19 @@ def load_station(reference: str | Path) -> Station:
     return Station(document, hand, hand_model, arm_model, path, hand_path, packages)
 
 
+StationLike = Station | str | Path
+"""A station, loaded or by what `load_station` takes: a path, or the name of a built-in one."""
+
+
+def as_station(station: StationLike) -> Station:
+    """A station, loaded if it is given by name.
+
+    Raises:
+        UnknownNameError, DocumentError: see `load_station`.
+    """
+    return station if isinstance(station, Station) else load_station(station)
+
+
 def _stated(document: StationDocument, path: Path) -> dict[str, Path]:
     """The folders that a station states, by the names of packages."""
     found = {}

@@ -26,10 +26,7 @@ from .instances import (
     add_vertical_joint as add_vertical_joint,
     name_taken_error as name_taken_error,
 )
-from .mesh_pieces import (
-    is_mesh as is_mesh,
-    mesh_by_pieces as mesh_by_pieces,
-)
+from .mesh_pieces import is_mesh as is_mesh
 from .model_file import (
     add_models as add_models,
     buffered_remarks as buffered_remarks,
@@ -44,8 +41,8 @@ from .robot import (
     set_default_posture as set_default_posture,
 )
 from .rolling import (
+    ROLLING as ROLLING,
     is_ball as is_ball,
-    part_rolling as part_rolling,
 )
 from .surroundings import (
     DISSIPATION as DISSIPATION,

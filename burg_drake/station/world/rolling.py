@@ -7,25 +7,12 @@ grips it needs the patch, which a point does not replace: it bears no torque.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from pydrake.geometry import (
-    AddContactMaterial,
-    CollisionFilterDeclaration,
-    GeometryId,
-    GeometrySet,
-    ProximityProperties,
-    Sphere,
-)
+from pydrake.geometry import AddContactMaterial, ProximityProperties, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 from pydrake.planning import RobotDiagramBuilder
-from pydrake.systems.framework import Context
 
 from burg_drake.scene.document import Scene
-
-if TYPE_CHECKING:
-    from burg_drake.station.diagram import StationDiagram
 
 ROLLING = "rolling"
 """Name of the geometry of a ball that meets things at points."""
@@ -44,7 +31,7 @@ def is_ball(scene: Scene, name: str) -> bool:
 
 
 def add_rolling(builder: RobotDiagramBuilder, scene: Scene, name: str, body: RigidBody) -> None:
-    """Adds the sphere by which a ball rolls; `part_rolling` says what it meets."""
+    """Adds the sphere by which a ball rolls; `separate_ball_contact` says what it meets."""
     primitive = scene.entry(name).contact.primitive
     assert primitive is not None
     plant = builder.plant()
@@ -58,41 +45,3 @@ def add_rolling(builder: RobotDiagramBuilder, scene: Scene, name: str, body: Rig
     )
     X_OP = RigidTransform(primitive.X_OP.matrix())
     plant.RegisterCollisionGeometry(body, X_OP, Sphere(primitive.size[0]), ROLLING, properties)
-
-
-def part_rolling(station_diagram: StationDiagram, context: Context | None = None) -> None:
-    """Has the robot meet the patches of balls, and everything else the spheres they roll by.
-
-    Args:
-        station_diagram: a built diagram.
-        context: in this Context of the diagram alone; by default in all that are created from now
-            on.
-    """
-    plant, graph = station_diagram.plant, station_diagram.diagram.mutable_scene_graph()
-    inspector = graph.model_inspector()
-    patches: list[GeometryId] = []
-    rolling: list[GeometryId] = []
-    robot: list[GeometryId] = []
-    others: list[GeometryId] = []
-    objects = {**station_diagram.free, **station_diagram.fixed}
-    for name, index in objects.items():
-        geometries = plant.GetCollisionGeometriesForBody(plant.get_body(index))
-        others += geometries
-        if is_ball(station_diagram.scene, name):
-            for geometry in geometries:
-                by_point = inspector.GetName(geometry).endswith(ROLLING)
-                (rolling if by_point else patches).append(geometry)
-    if not rolling:
-        return
-    for index in station_diagram.robot_bodies:
-        robot += plant.GetCollisionGeometriesForBody(plant.get_body(index))
-    others += plant.GetCollisionGeometriesForBody(plant.get_body(station_diagram.table))
-    declaration = CollisionFilterDeclaration()
-    declaration.ExcludeBetween(GeometrySet(patches), GeometrySet(others))
-    declaration.ExcludeBetween(GeometrySet(rolling), GeometrySet(robot))
-    manager = (
-        graph.collision_filter_manager()
-        if context is None
-        else graph.collision_filter_manager(graph.GetMyMutableContextFromRoot(context))
-    )
-    manager.Apply(declaration)

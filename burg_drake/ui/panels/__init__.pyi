@@ -10,8 +10,5 @@ from .library import LibraryPanel as LibraryPanel
 from .object import ObjectPanel as ObjectPanel
 from .pose import PosePanel as PosePanel
 from .reach import ReachPanel as ReachPanel
-from .settle import (
-    SettlePanel as SettlePanel,
-    moved_names as moved_names,
-)
+from .settle import SettlePanel as SettlePanel
 from .summary import SummaryPanel as SummaryPanel

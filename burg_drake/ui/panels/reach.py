@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import viser
 
-from burg_drake.compose.background import BackgroundJob, BackgroundWorker, Cancelled
+from burg_drake.compose.background import BackgroundJob, BackgroundWorker
 from burg_drake.compose.editing import SessionView
+from burg_drake.core import TaskCancelled
 from burg_drake.scene.document import Board
 from burg_drake.ui.panels.reach_task import ReachTask
 from burg_drake.ui.view import BoardLayers, BoardOverlay
@@ -92,7 +93,7 @@ class ReachPanel:
         if job is not self._job:
             return
         if job.error is not None:
-            if not isinstance(job.error, Cancelled):
+            if not isinstance(job.error, TaskCancelled):
                 self._show_line(str(job.error))
             return
         from burg_drake.visualization.pictures import reach_image, reachability_key

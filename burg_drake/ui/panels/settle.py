@@ -6,7 +6,7 @@ from math import degrees
 
 import viser
 
-from burg_drake.compose.background import SettlingProposal
+from burg_drake.compose.background import SettlingProposal, moved_names
 from burg_drake.compose.editing import SessionView
 from burg_drake.ui.widgets import (
     PageActions,
@@ -20,9 +20,6 @@ from burg_drake.ui.widgets import (
 )
 from burg_drake.visualization.style import Child
 
-STAYS = 5e-4
-"""What moves by less stays, for people [m]."""
-STAYS_DEG = 0.1
 MOST = 20
 """Rows that are shown."""
 
@@ -90,14 +87,3 @@ def _outcome(proposal: SettlingProposal, *, outdated: bool) -> list[Child]:
         lines.append("Everything stays where it is.")
     lines.append(quiet(f"{proposal.duration:.1f} s were simulated."))
     return lines
-
-
-def moved_names(
-    proposal: SettlingProposal, distance: float = STAYS, angle_deg: float = STAYS_DEG
-) -> list[str]:
-    """Instances that would move further, or turn by more, than given [m, degrees]."""
-    return [
-        name
-        for name, d in proposal.displacements.items()
-        if d.distance > distance or degrees(d.angle) > angle_deg
-    ]

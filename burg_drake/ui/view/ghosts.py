@@ -6,10 +6,9 @@ from typing import Any
 
 import viser
 
-from burg_drake.compose.background import SettlingProposal
+from burg_drake.compose.background import SettlingProposal, moved_names
 from burg_drake.compose.document import name_of
 from burg_drake.core import BurgError, quaternion_from_rotation
-from burg_drake.ui.panels import moved_names
 from burg_drake.ui.view.object_meshes import ObjectMeshes
 from burg_drake.ui.widgets import Rgb
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import logging
-import subprocess
 import threading
 from collections.abc import Callable
-from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
-from burg_drake.core import BurgError, MissingDependencyError, cached, content_hash
-from burg_drake.core.workers import cause_of_death, start_worker
+from burg_drake.core import BurgError, MissingDependencyError, WorkerDied, cached, content_hash
+from burg_drake.core.workers import WorkerPool
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
+from burg_drake.ui.view.picture_worker import render_picture
 
 SIZE = (176, 132)
 """Width and height [pixel]; shown at half of that where the screen is fine enough."""
@@ -43,7 +42,7 @@ class ObjectPictures:
         self._wanted: list[Wanted] = []
         self._condition = threading.Condition()
         self._closed = False
-        self._worker: tuple[subprocess.Popen[bytes], Connection[Any, Any]] | None = None
+        self._worker = WorkerPool(1, retries=0)
         self._thread = threading.Thread(target=self._run, name="object-pictures", daemon=True)
         self._thread.start()
 
@@ -64,17 +63,10 @@ class ObjectPictures:
         with self._condition:
             self._closed = True
             self._condition.notify()
-            if self._worker is not None:
-                self._worker[0].kill()
+        self._worker.kill_workers()
         self._thread.join()
 
     def _run(self) -> None:
-        try:
-            self._make_all()
-        finally:
-            self._end_worker()
-
-    def _make_all(self) -> None:
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: bool(self._wanted) or self._closed)
@@ -107,27 +99,14 @@ class ObjectPictures:
         missing = missing_render_libraries()
         if missing:
             raise MissingDependencyError(describe_missing(missing))
-        with self._condition:
-            if self._closed:
-                raise BurgError("the page was closed")
-            if self._worker is None:
-                self._worker = start_worker("burg_drake.ui.view.picture_worker")
-            process, connection = self._worker
         try:
-            connection.send((str(self.library.root), *wanted, SIZE))
-            png, why = connection.recv()
-        except (EOFError, OSError) as error:
+            png = self._worker.submit(
+                render_picture, str(self.library.root), *wanted, SIZE
+            ).result()
+        except Exception as error:
             if self._closed:
                 raise BurgError("the page was closed") from error
-            self._worker = None
-            raise MissingDependencyError(cause_of_death(process)) from error
-        if png is None:
-            raise BurgError(why)
+            if isinstance(error, BurgError) and not isinstance(error, WorkerDied):
+                raise BurgError(str(error)) from error
+            raise MissingDependencyError(str(error)) from error
         return np.frombuffer(png, dtype=np.uint8)
-
-    def _end_worker(self) -> None:
-        if self._worker is not None:
-            process, connection = self._worker
-            connection.close()
-            process.kill()
-            process.wait()

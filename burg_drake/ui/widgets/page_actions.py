@@ -89,7 +89,7 @@ class PageActions:
         self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING
     ) -> TypedField:
         """The same of a field that is typed in: `after` the last key, or when typing ends."""
-        return TypedField(field, self, action, after)
+        return TypedField(field, self.submit, action, after)
 
     def show_message(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what was done; every page if `client` is None."""

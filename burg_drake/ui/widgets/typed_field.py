@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    from burg_drake.ui.widgets.page_actions import PageActions
+import viser
 
 TYPING, NAMING = 0.8, 2.0
 """After the last key in a field before it counts [s], unless Enter or another action ends the
@@ -17,12 +16,25 @@ CROSSING = 2.0
 """What is typed so soon after the field was set may have crossed that on its way [s]."""
 
 
+class AskForAction(Protocol):
+    """Has something done; see `ActionQueue.ask`."""
+
+    def __call__(
+        self,
+        action: Callable[[], Any],
+        client: viser.ClientHandle | None = None,
+        *,
+        key: str = "",
+        after: float = 0.0,
+    ) -> None: ...
+
+
 class TypedField:
     """A field that is typed in.
 
     Args:
         handle: of viser; it sends each key.
-        actions: of the page.
+        ask: has an action done; that of `PageActions`.
         action: done with what was typed.
         after: the last key [s].
 
@@ -31,7 +43,7 @@ class TypedField:
     """
 
     def __init__(
-        self, handle: Any, actions: PageActions, action: Callable[[Any], Any], after: float
+        self, handle: Any, ask: AskForAction, action: Callable[[Any], Any], after: float
     ) -> None:
         self.handle = handle
         self._action = action
@@ -46,7 +58,7 @@ class TypedField:
             self._typed += 1
             self._crossed |= time.monotonic() - self._set_at < CROSSING
             number, value = self._typed, event.target.value
-            actions.submit(
+            ask(
                 lambda: self._take(number, value),
                 event.client,
                 key=f"typed {id(self)}",

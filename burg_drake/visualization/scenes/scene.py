@@ -10,8 +10,9 @@ from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.scene.document import Scene, placed_vertices
-from burg_drake.station.diagram import Robot, StationDiagram, build_station_diagram
+from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import Station
+from burg_drake.station.world import Robot
 from burg_drake.visualization.meshcat import aim_at, text_triangles
 
 SKY_COLOR = (0.93, 0.95, 0.97)

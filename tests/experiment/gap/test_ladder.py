@@ -16,11 +16,12 @@ import pytest
 from burg_drake.apps.cli import main
 from burg_drake.apps.comparison import gap as gap_verb
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
 from burg_drake.evaluation.records.run_document import run_hash
 from burg_drake.evaluation.replay import differences
-from burg_drake.evaluation.stages.judge import Verdict, judge_grasp
-from burg_drake.evaluation.stages.station_judge import StationJudge
+from burg_drake.evaluation.stages.judge import judge_grasp
+from burg_drake.evaluation.stages.station_judge import build_judge
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.evaluation.workers.executor import Job
 from burg_drake.experiment.gap.changes import gap_changes
@@ -66,7 +67,7 @@ def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: GapSt
 def test_reach_has_the_bits_of_a_run_of_its_own(ladder: GapSteps) -> None:
     """The oracle is the judge that nobody has shortened."""
     hand, reach = (step.runs[0] for step in ladder.steps[:2])
-    judge = StationJudge(hand.scene(), hand.station(), engine=hand.document.engine, mode="reach")
+    judge = build_judge(hand.scene(), hand.station(), engine=hand.document.engine, mode="reach")
     for candidate in hand.candidates:
         plain = judge_grasp(judge, candidate)
         assert differences(plain, reach.verdicts[candidate.id]) == []

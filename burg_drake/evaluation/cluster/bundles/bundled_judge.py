@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.cluster.bundles.bundle import (
     Bundle,
     load_bundle,
@@ -16,7 +17,7 @@ from burg_drake.evaluation.cluster.bundles.bundle import (
     require_content,
 )
 from burg_drake.evaluation.cluster.bundles.judge_recipe import JudgeRecipe
-from burg_drake.evaluation.stages import Judge, Mode, StationJudge, StationJudgeFactory
+from burg_drake.evaluation.stages import Judge, StationJudge, StationJudgeFactory
 from burg_drake.station.document import Engine, GraspMotion
 
 

@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
-from burg_drake.core.grasps import Outcome
-from burg_drake.evaluation.records import MOVED, Columns
+from burg_drake.core.grasps import MOVED, Outcome
+from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import Html, element, folded, table
 
 NOTICEABLE = 1e-3

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import PUSHED, Outcome
 from burg_drake.core.terminal import format_percent
-from burg_drake.evaluation.records import PUSHED
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,

@@ -1,22 +1,21 @@
-"""Files of plans.
+"""Plans as JSON.
 
-JSON: `joint_trajectory` is laid out as ROS's message `trajectory_msgs/JointTrajectory`; beside it
+`joint_trajectory` is laid out as ROS's message `trajectory_msgs/JointTrajectory`; beside it
 there is what the plan is for, the limits that it keeps, the samples a second, and where its phases
-are among the points. `motion.plan_csv` has the same as a table.
+are among the points. `csv_file` has the same as a table.
 """
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from burg_drake.core import Array, DocumentError, InvalidInputError
 from burg_drake.core.documents import load_json
 from burg_drake.core.files import GRASP_FILE, atomic_write, format_rows
-from burg_drake.motion.plans.csv_file import read_csv
 from burg_drake.motion.plans.plan_record import (
     NANO,
     Spans,
@@ -29,14 +28,10 @@ from burg_drake.motion.plans.plan_record import (
     require_writable,
     spans_of,
 )
-from burg_drake.motion.plans.trajectory import PHASES, Plan
-
-if TYPE_CHECKING:
-    from burg_drake.scene.document import Scene
-    from burg_drake.station.document import Station
+from burg_drake.motion.plans.planned_motion import PHASES, PlannedMotion
 
 
-def write_json(plan: Plan, path: str | Path) -> None:
+def write_json(plan: PlannedMotion, path: str | Path) -> None:
     """Writes a plan whole, for `load_plan` and others.
 
     Raises:
@@ -60,27 +55,12 @@ def write_json(plan: Plan, path: str | Path) -> None:
     atomic_write(path, text.removesuffix("]}}") + points + "]}}\n")
 
 
-def load_plan(
-    path: str | Path, *, scene: Scene | None = None, station: Station | None = None
-) -> Plan:
-    """Reads what `Plan.to_json` or `Plan.to_csv` has written.
-
-    Args:
-        path: the file; a name that ends in .csv is that of a table.
-        scene, station: what the plan has to be for, if given.
+def read_json(path: Path) -> PlannedMotion:
+    """Reads what `write_json` has written.
 
     Raises:
-        InvalidInputError: there is no such file, it is no plan, or one that is damaged: with times,
-            phases or positions that do not belong together, or beyond its own limits; or it is for
-            another scene or station, or does not tell.
+        InvalidInputError: see `load_plan`.
     """
-    path = Path(path)
-    plan = read_csv(path) if path.suffix.lower() == ".csv" else _read_json(path)
-    plan.require_for(scene, station, name=str(path))
-    return plan
-
-
-def _read_json(path: Path) -> Plan:
     try:
         document = load_json(path, GRASP_FILE)
     except DocumentError as error:
@@ -92,7 +72,7 @@ def _read_json(path: Path) -> Plan:
         raise InvalidInputError(f"{path}: the plan is damaged: {error}; write it again") from error
 
 
-def _plan(document: dict[str, Any]) -> Plan:
+def _plan(document: dict[str, Any]) -> PlannedMotion:
     with part(document, "joint_trajectory") as motion:
         joints = tuple(str(name) for name in motion["joint_names"])
         rows = _rows(motion["points"], len(joints))

@@ -1,0 +1,74 @@
+from .calibration.estimation import (
+    CalibratedView as CalibratedView,
+    Calibration as Calibration,
+    calibrate as calibrate,
+)
+from .calibration.target import (
+    CharucoTarget as CharucoTarget,
+    CharucoView as CharucoView,
+)
+from .live.event_log import (
+    Event as Event,
+    EventLog as EventLog,
+)
+from .live.frame_processing import (
+    FrameProcessor as FrameProcessor,
+    LocatedFrame as LocatedFrame,
+    ViewSettings as ViewSettings,
+)
+from .live.picture import Picture as Picture
+from .live.session import LiveSession as LiveSession
+from .live.snapshot import (
+    SeenBoard as SeenBoard,
+    Snapshot as Snapshot,
+    SnapshotDocument as SnapshotDocument,
+    load_snapshot as load_snapshot,
+)
+from .optics.intrinsics import Intrinsics as Intrinsics
+from .optics.intrinsics_file import load_intrinsics as load_intrinsics
+from .overlay.renderer import Overlay as Overlay
+from .overlay.style import OverlayStyle as OverlayStyle
+from .placement.check import check_placement as check_placement
+from .placement.document import (
+    CameraPlace as CameraPlace,
+    CheckedImage as CheckedImage,
+    CheckedScene as CheckedScene,
+    Placement as Placement,
+    PlacementCheck as PlacementCheck,
+    load_placement as load_placement,
+)
+from .pose.camera_location import (
+    LocatedCamera as LocatedCamera,
+    locate_camera as locate_camera,
+)
+from .pose.estimate import BoardEstimate as BoardEstimate
+from .pose.estimator import (
+    BoardPose as BoardPose,
+    estimate_board as estimate_board,
+)
+from .projection.visibility import visible_from as visible_from
+from .rectification.stream import (
+    BoardView as BoardView,
+    board_views as board_views,
+)
+from .rectification.top_view import (
+    BoardPicture as BoardPicture,
+    BoardRectifier as BoardRectifier,
+    board_picture as board_picture,
+)
+from .sources.frame import (
+    CameraLost as CameraLost,
+    Frame as Frame,
+    FrameSource as FrameSource,
+)
+from .sources.opening import open_source as open_source
+from .systems.board_loop import (
+    BoardLoop as BoardLoop,
+    build_board_loop as build_board_loop,
+)
+from .systems.pose_estimator import BoardPoseEstimator as BoardPoseEstimator
+from .systems.pose_filter import (
+    PoseFilter as PoseFilter,
+    Track as Track,
+)
+from .systems.scene_overlay import SceneOverlay as SceneOverlay

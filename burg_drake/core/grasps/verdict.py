@@ -1,0 +1,210 @@
+"""What became of a grasp: the verdict, its fields and its margins, declared once.
+
+Each field says what it means, in which unit, and of which kind it is (`verdict_field`). All that
+writes or reads verdicts goes by this declaration: journals, tables and the units and meanings in
+them, rows that are executed again, replays and docs/results.md. A new margin is one line of
+`Margins`, and one more where it is measured. What is measured more often than once a grasp is a
+field of its own.
+
+`Verdict` is the record. What leads to it has some of its fields: `TrialFindings` those that a trial
+in simulation finds (`simulation.trials.TrialResult`), `Findings` those of any stage
+(`evaluation.stages.Decision`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from burg_drake.core.grasps.mode import Mode
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.grasps.verdict_field import (
+    MEASURED,
+    by_instance,
+    by_joint,
+    by_margin,
+    by_stage,
+    margin,
+    text,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """Continuous slack behind an outcome, SI units; NaN where it was not measured."""
+
+    overlap: float = margin(
+        "m", "how deep the open hand overlaps what it collides with; 0 if clear"
+    )
+    clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
+    slip: float = margin("m", "way of the target in the hand since the grip, at the origin of G")
+    tilt: float = margin("rad", "turn of the target in the hand since the grip")
+    pad_force: float = margin("N", "normal force of the weaker pad along the closing direction")
+    patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
+    lift: float = margin(
+        "m",
+        "how far the target's centre of mass rose, or went along the straight ways of another"
+        " motion; of a trial decided on the way with the rest of it, which is free by geometry",
+    )
+    lift_height: float = margin(
+        "m",
+        "length of the lift: as asked, or as far as there is room where less is allowed",
+        by_trial=False,
+    )
+    others_moved: float = margin("m", "largest displacement of any other object's centre of mass")
+    end_time: float = margin(
+        "s",
+        "simulated time at which the outcome was decided, which ends the trial, often before"
+        " the hand is all the way up",
+    )
+    arm_clearance: float = margin(
+        "m",
+        "least distance that the robot keeps on its way, or signed distance of what is in it",
+        mode="reach",
+        by_trial=False,
+    )
+    joint_excess: float = margin(
+        "rad",
+        "how far the closest configuration is beyond a joint limit",
+        mode="reach",
+        by_trial=False,
+    )
+    duration: float = margin("s", "of the planned motion", mode="arm", by_trial=False)
+    tracking_error: float = margin(
+        "rad", "largest deviation of a joint from its command", mode="arm"
+    )
+    tracking_distance: float = margin(
+        "m", "largest deviation of the origin of G from where commanded", mode="arm"
+    )
+    pushed: float = margin(
+        "m",
+        "largest displacement of any free object before the hand closed; of one that hovers, its"
+        " fall once it is touched",
+        mode="arm",
+    )
+
+    def of_trial(self) -> dict[str, float]:
+        """Those that a trial measures, by name; NaN where it ended before."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.metadata["by_trial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialFindings:
+    """What a trial finds beside its outcome.
+
+    Attributes:
+        blocker: the body in the way at the start or met on the way, if any; what a link of the arm
+            met is written as "panda_link5 vs shelf".
+        reason: for people, where the outcome alone does not say enough: the message of what failed.
+        margins: continuous slack.
+        displacements: by instance, how far the centre of mass of every other free object was moved
+            at most from where it stood at the start [m]; 0 of what nothing touched or stood close
+            to. Empty if no trial started or it failed.
+        pushed: the same when the hand began to close, and of the target, too: what the approach
+            moved [m]. Empty without an arm.
+        touched: the first touch that was not planned, as "panda_link5 vs can": of the robot with
+            anything before the hand began to close; from then on of a link of the arm with
+            anything, and of the hand with anything but target and table. Empty if there was none,
+            or without an arm.
+    """
+
+    blocker: str = field(default="", metadata=text("the body that was in the way"))
+    reason: str = field(
+        default="",
+        metadata=text(
+            "why there is no outcome, or no plan: the message of what failed", replayed=False
+        ),
+    )
+    margins: Margins | Mapping[str, float] = field(
+        default_factory=dict, metadata=by_margin(Margins)
+    )
+    displacements: Mapping[str, float] = field(
+        default_factory=dict,
+        metadata=by_instance(
+            "moved_", "m", "largest displacement of the centre of mass of an object"
+        ),
+    )
+    pushed: Mapping[str, float] = field(
+        default_factory=dict,
+        metadata=by_instance(
+            "pushed_", "m", "displacement of an object before the hand closed", mode="arm"
+        ),
+    )
+    touched: str = field(
+        default="",
+        metadata=text(
+            "what the arm touched first against its plan, as LINK vs BODY",
+            mode="arm",
+            part=MEASURED,
+        ),
+    )
+
+    def of_trial(self) -> dict[str, Any]:
+        """The fields that are declared here, by name."""
+        return {one.name: getattr(self, one.name) for one in fields(TrialFindings)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings(TrialFindings):
+    """What the stages of a judge find beside the outcome, each alone or all together.
+
+    Attributes:
+        margins: those that were measured, by the names of `Margins`.
+        q_grasp, q_pregrasp: positions of the arm's joints [rad]; empty if none were found.
+    """
+
+    margins: Mapping[str, float] = field(default_factory=dict, metadata=by_margin(Margins))
+    q_grasp: tuple[float, ...] = field(
+        default=(),
+        metadata=by_joint("q_grasp_", "rad", "position of a joint of the arm at the grasp, from 1"),
+    )
+    q_pregrasp: tuple[float, ...] = field(
+        default=(),
+        metadata=by_joint(
+            "q_pregrasp_", "rad", "position of a joint of the arm at the pregrasp, from 1"
+        ),
+    )
+
+
+CPU_TIMES: Mapping[Stage, tuple[str, str, Mode]] = {
+    Stage.CLEAR: ("cpu_clear", "CPU time of the hand's screen", "hand"),
+    Stage.REACHABLE: (
+        "cpu_reach",
+        "CPU time of the arm's screen and the search for motions",
+        "hand",
+    ),
+    Stage.PLANNED: ("cpu_plan", "CPU time of the motion's timing", "arm"),
+    Stage.EXECUTED: ("cpu_trial", "CPU time of the trial", "hand"),
+}
+"""Column of each stage's CPU time, what it means, and the first mode whose tables have it."""
+
+
+@dataclass(frozen=True)
+class Verdict(Findings):
+    """What became of a grasp.
+
+    Attributes:
+        outcome: the one outcome.
+        stage: the stage that decided; for `simulation_failed` the stage that failed.
+        cpu: CPU time by stage [s].
+        interrupted: whether it failed because its worker process was ended from outside, so that
+            another try may give an answer.
+    """
+
+    outcome: Outcome = field(metadata=text("what became of the grasp", of=Outcome))
+    stage: Stage = field(
+        metadata=text("the stage that decided the outcome", of=Stage, replayed=False)
+    )
+    cpu: Mapping[Stage, float] = field(
+        default_factory=dict, metadata=by_stage(CPU_TIMES), kw_only=True
+    )
+    interrupted: bool = field(default=False, kw_only=True)
+
+    def is_open(self, *, retry_failed: bool = False) -> bool:
+        """Whether a later call asks again.
+
+        Args:
+            retry_failed: not only where it was interrupted, but wherever the simulation failed.
+        """
+        return self.interrupted or (retry_failed and self.outcome is Outcome.SIMULATION_FAILED)

@@ -1,0 +1,49 @@
+"""What follows from the declaration of a verdict: its fields in the order of files, and the names
+of their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+from burg_drake.core.grasps.mode import Mode, asks
+from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
+from burg_drake.core.grasps.verdict_field import (
+    InstancesField,
+    VerdictField,
+    declared,
+)
+
+TRIAL_FINDINGS = declared(TrialFindings)
+"""What rows of tables tell of a trial."""
+FINDINGS = declared(Findings)
+"""What stages find."""
+_ENDING = {"outcome", "stage"}
+VERDICT_FIELDS = (
+    *(one for one in declared(Verdict) if one.name in _ENDING),
+    *(one for one in declared(Verdict) if one.name not in _ENDING),
+)
+"""All fields that are written, in the order of files: how it ended, then why."""
+
+MARGINS = tuple(one.name for one in fields(Margins))
+"""Names of all margins, in the order of tables."""
+LIFT_HEIGHT = "lift_height"
+"""Margin: length of the lift that was asked for, or for which there is room."""
+ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess", LIFT_HEIGHT)
+"""Margins that the arm's screen measures."""
+CPU_COLUMNS = {stage: name for stage, (name, _, _) in CPU_TIMES.items()}
+"""Columns of the CPU time of each stage."""
+PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, InstancesField)}
+"""What columns of displacements begin with; the instance's name follows."""
+MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
+
+
+def fields_in(mode: Mode, part: str) -> list[VerdictField]:
+    """The fields that a part of a row has in tables of a mode."""
+    return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
+
+
+def joined_findings(stages: Sequence[Findings]) -> dict[str, Any]:
+    """What several stages found together, by field; see `VerdictField.joined`."""
+    return {one.name: one.joined([getattr(s, one.name) for s in stages]) for one in FINDINGS}

@@ -1,0 +1,310 @@
+"""The kinds of fields that a verdict has, and how each is written and read.
+
+A field of a verdict carries one of these as metadata. Whoever writes or reads verdicts asks it for
+columns, cells, JSON and what else differs between kinds, and need not know the fields.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final
+
+from burg_drake.core.errors import quoted
+from burg_drake.core.grasps.column import TEXT, Column
+from burg_drake.core.grasps.mode import Mode, asks
+from burg_drake.core.grasps.outcome import Stage
+
+KIND: Final = "kind"
+"""Key of the metadata of a dataclass's field."""
+DECIDED: Final = "decided"
+MEASURED: Final = "measured"
+POSTURE: Final = "posture"
+COST: Final = "cost"
+"""Parts of a row that fields of a verdict lie in; other columns stand between them."""
+
+
+@dataclass(frozen=True)
+class TableShape:
+    """What decides which columns a table has.
+
+    Attributes:
+        mode: of the run.
+        instances: names of the scene's free objects.
+        joints: number of the arm's joints; 0 where no arm is asked.
+    """
+
+    mode: Mode
+    instances: Sequence[str] = ()
+    joints: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerdictField(ABC):
+    """A field of a verdict: what it means and how it is written.
+
+    Attributes:
+        name: of the field.
+        column: unit and meaning of its columns.
+        mode: the first mode whose tables have it.
+        part: of a row, in which its columns lie.
+    """
+
+    name: str = ""
+    column: Column
+    mode: Mode = "hand"
+    part: str = MEASURED
+
+    @property
+    def is_text(self) -> bool:
+        """Whether its cells are texts; else they are numbers."""
+        return False
+
+    @abstractmethod
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        """Names of its columns, with the key under which its values have their cells."""
+
+    def cell(self, value: Any, key: Any) -> Any:
+        """The cell of a value in one of its columns; None if it has none."""
+        return value.get(key)
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        """The value that a row tells; an empty one if it tells nothing."""
+        raise NotImplementedError(f"{self.name} is not read from rows")
+
+    def to_json(self, value: Any) -> Any:
+        """The value in a journal; a number that is not finite is null."""
+        return {key: _finite(number) for key, number in value.items()}
+
+    def from_json(self, data: Any) -> Any:
+        """The value that a journal has.
+
+        Raises:
+            ValueError, TypeError, AttributeError: it was not written by `to_json`.
+        """
+        return {key: _or_nan(number) for key, number in data.items()}
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        """What several stages found together, in their order."""
+        return {key: float(number) for value in values for key, number in value.items()}
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        """What a replay has to find again to the bit, by its name for people."""
+        return {}
+
+    @abstractmethod
+    def meanings(self) -> dict[str, Column]:
+        """Its columns; what differs in their names is in capitals."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextField(VerdictField):
+    """A text in a column of the field's own name. Of several stages the last one counts.
+
+    Attributes:
+        of: its type: any text, or the members of an enumeration.
+        replayed: whether a replay has to find the same text again.
+    """
+
+    of: type[str] = str
+    replayed: bool = True
+
+    @property
+    def is_text(self) -> bool:
+        return True
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.name: None}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return str(value)
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        return row.get(self.name, "")
+
+    def to_json(self, value: Any) -> Any:
+        return str(value)
+
+    def from_json(self, data: Any) -> Any:
+        if not isinstance(data, str):
+            raise TypeError(f"{quoted(data)} is no text")
+        return self.of(data)
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return values[-1]
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {self.name: str(value)} if self.replayed else {}
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.name: self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarginsField(VerdictField):
+    """Numbers by the names of margins, each in a column of its own.
+
+    A later stage does not unsay what an earlier one has measured.
+    """
+
+    of: type[Any]
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {f.name: f.name for f in fields(self.of) if asks(shape.mode, f.metadata["mode"])}
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        return {f.name: row[f.name] for f in fields(self.of) if f.name in row}
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        found: dict[str, float] = {}
+        for name, number in ((k, v) for margins in values for k, v in margins.items()):
+            if name not in found or not math.isnan(number):
+                found[name] = float(number)
+        return found
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {f.name: value[f.name] for f in fields(self.of) if f.name in value}
+
+    def meanings(self) -> dict[str, Column]:
+        return {f.name: f.metadata["column"] for f in fields(self.of)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstancesField(VerdictField):
+    """Numbers by instance of the scene; a column's name is a prefix and the instance's."""
+
+    prefix: str
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.prefix + name: name for name in shape.instances}
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        cells = {k: float(v) for k, v in row.items() if k.startswith(self.prefix)}
+        return {k.removeprefix(self.prefix): v for k, v in cells.items() if math.isfinite(v)}
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {self.prefix.replace("_", " ") + name: number for name, number in value.items()}
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.prefix + "NAME": self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointsField(VerdictField):
+    """A number for each joint of the arm; a column's name is a prefix and the number, from 1.
+
+    Of several stages the first one counts that has some.
+    """
+
+    prefix: str
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {f"{self.prefix}{k + 1}": k for k in range(shape.joints)}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return value[key] if len(value) > key else None
+
+    def to_json(self, value: Any) -> Any:
+        return list(value)
+
+    def from_json(self, data: Any) -> Any:
+        return tuple(map(_number, data))
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return next(filter(None, values), ())
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.prefix + "NUMBER": self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StagesField(VerdictField):
+    """Times by stage, each in a column of its own.
+
+    Attributes:
+        times: column of each stage, what it means, and the first mode whose tables have it.
+    """
+
+    times: Mapping[Stage, tuple[str, str, Mode]]
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {n: stage for stage, (n, _, mode) in self.times.items() if asks(shape.mode, mode)}
+
+    def to_json(self, value: Any) -> Any:
+        return {stage.value: round(seconds, 6) for stage, seconds in value.items()}
+
+    def from_json(self, data: Any) -> Any:
+        return {Stage(stage): _number(seconds) for stage, seconds in data.items()}
+
+    def meanings(self) -> dict[str, Column]:
+        return {name: Column(self.column.unit, says) for name, says, _ in self.times.values()}
+
+
+def margin(unit: str, meaning: str, *, mode: Mode = "hand", by_trial: bool = True) -> Any:
+    """A margin: NaN where it was not measured.
+
+    Args:
+        unit, meaning: see `Column`.
+        mode: the first mode in which it is measured.
+        by_trial: whether the trial measures it, or a stage before.
+    """
+    metadata = {"column": Column(unit, meaning), "mode": mode, "by_trial": by_trial}
+    return field(default=math.nan, metadata=metadata)
+
+
+def text(
+    meaning: str,
+    *,
+    of: type[str] = str,
+    mode: Mode = "hand",
+    part: str = DECIDED,
+    replayed: bool = True,
+) -> dict[str, VerdictField]:
+    """Metadata of a text; see `TextField`."""
+    column = Column(TEXT, meaning)
+    return {KIND: TextField(column=column, mode=mode, part=part, of=of, replayed=replayed)}
+
+
+def by_margin(of: type[Any]) -> dict[str, VerdictField]:
+    """Metadata of numbers by the names of margins that a dataclass declares."""
+    return {KIND: MarginsField(column=Column(TEXT, "continuous slack"), of=of)}
+
+
+def by_instance(
+    prefix: str, unit: str, meaning: str, *, mode: Mode = "hand"
+) -> dict[str, VerdictField]:
+    """Metadata of numbers by instance; see `InstancesField`."""
+    return {KIND: InstancesField(column=Column(unit, meaning), prefix=prefix, mode=mode)}
+
+
+def by_joint(prefix: str, unit: str, meaning: str) -> dict[str, VerdictField]:
+    """Metadata of a number for each joint; see `JointsField`."""
+    return {KIND: JointsField(column=Column(unit, meaning), prefix=prefix, part=POSTURE)}
+
+
+def by_stage(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictField]:
+    """Metadata of times by stage; see `StagesField`."""
+    return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part=COST)}
+
+
+def declared(record: type[Any]) -> tuple[VerdictField, ...]:
+    """The fields of a record that have a kind, in the order of their declaration."""
+    return tuple(
+        replace(one.metadata[KIND], name=one.name) for one in fields(record) if KIND in one.metadata
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _or_nan(value: object) -> float:
+    return math.nan if value is None else _number(value)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError(f"{quoted(value)} is no number")
+    return float(value)

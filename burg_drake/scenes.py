@@ -1,0 +1,54 @@
+"""Scenes: their documents, checks, sampling, settling, printing and export."""
+
+from burg_drake.core.documents import (
+    Pose as Pose,
+)
+from burg_drake.evaluation.stages import (
+    GraspCount as GraspCount,
+    clear_grasp_counts as clear_grasp_counts,
+    count_grasps as count_grasps,
+    within_reach as within_reach,
+)
+from burg_drake.export import (
+    Exported as Exported,
+    Layout as Layout,
+    PlacedObject as PlacedObject,
+)
+from burg_drake.generation import (
+    SampledFolder as SampledFolder,
+    SampledScene as SampledScene,
+    SceneRow as SceneRow,
+)
+from burg_drake.printout import (
+    HeightMap as HeightMap,
+    Paper as Paper,
+    Printout as Printout,
+    PrintSettings as PrintSettings,
+    Tile as Tile,
+    Tiling as Tiling,
+    height_map as height_map,
+)
+from burg_drake.scene.arrangement import ObjectShapes as ObjectShapes
+from burg_drake.scene.document import (
+    Board as Board,
+    Extent as Extent,
+    Instance as Instance,
+    MarkerLayout as MarkerLayout,
+    Markers as Markers,
+    SceneDocument as SceneDocument,
+    SceneIssue as SceneIssue,
+    SceneOrigin as SceneOrigin,
+    validate_scene as validate_scene,
+)
+from burg_drake.simulation.rest import (
+    BodySpeed as BodySpeed,
+    Displacement as Displacement,
+    is_still as is_still,
+    stillness as stillness,
+)
+from burg_drake.simulation.settling import (
+    SettledScene as SettledScene,
+)
+from burg_drake.station.checks import (
+    SceneCheck as SceneCheck,
+)

@@ -1,0 +1,29 @@
+from .robustness.friction_search import (
+    FrictionSettings as FrictionSettings,
+    friction_limit as friction_limit,
+)
+from .robustness.grip import (
+    Grip as Grip,
+    take_grip as take_grip,
+)
+from .robustness.hold_force import (
+    HoldForces as HoldForces,
+    LoadSettings as LoadSettings,
+    shake as shake,
+    tug as tug,
+)
+from .robustness.perturbation import (
+    Noise as Noise,
+    SuccessRate as SuccessRate,
+    success_rate as success_rate,
+)
+from .trials.carrier import Carrier as Carrier
+from .trials.contacts import BodyContact as BodyContact
+from .trials.execution import Execution as Execution
+from .trials.lift_carrier import LiftPath as LiftPath
+from .trials.lift_clearance import (
+    ArmLiftClearance as ArmLiftClearance,
+    HandLiftClearance as HandLiftClearance,
+)
+from .trials.result import Margins as Margins
+from .trials.scene_trial import SceneTrial as SceneTrial

@@ -1,0 +1,90 @@
+"""Declares one more margin and looks for it in all that verdicts are written to; run as a program
+in a process of its own, with a folder for files, by `test_one_record`."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+
+DECLARATION = "burg_drake.core.grasps.verdict"
+LINE = '    wobble: float = margin("rad", "how much it wobbles", mode="reach")\n'
+AFTER = "    def of_trial(self) -> dict[str, float]:\n"
+
+
+def declare() -> None:
+    """The declaration with a line more, in the place of the installed one."""
+    spec = importlib.util.find_spec(DECLARATION)
+    assert spec is not None and spec.origin is not None and DECLARATION not in sys.modules
+    source = Path(spec.origin).read_text(encoding="utf-8")
+    assert source.count(AFTER) == 1
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[DECLARATION] = module
+    source = source.replace(AFTER, LINE + "\n" + AFTER)
+    exec(compile(source, spec.origin, "exec"), vars(module))
+
+
+def look_for_it(folder: Path) -> None:
+    """Fails where the margin is missing."""
+    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
+    from burg_drake.core.grasps.columns import GROUPS, describe
+    from burg_drake.evaluation.records import journal, table, table_file, trial
+    from burg_drake.evaluation.records.origin import TrialOrigin
+    from burg_drake.evaluation.replay import as_result, differences
+    from burg_drake.evaluation.stages.judge import trial_verdict
+    from burg_drake.simulation.trials.result import TrialResult
+    from burg_drake.station.document.engine import ENGINES
+
+    margins = Margins(**{"wobble": 0.25})
+    verdict = trial_verdict(TrialResult(outcome=Outcome.LIFTED, margins=margins))
+    assert verdict.margins["wobble"] == 0.25
+    line = journal.encode("box-1", verdict)
+    assert json.loads(line)["margins"]["wobble"] == 0.25
+    assert journal.decode(line)[1].margins["wobble"] == 0.25
+
+    meaning = describe("wobble")
+    assert meaning is not None and meaning.unit == "rad"
+    assert GROUPS["Margins and cost"]["wobble"] == meaning
+
+    judged = trial.RecordedTrial(id="box-1", instance="box", X_OG=np.eye(4), verdict=verdict)
+    for mode in ("hand", "reach", "arm"):
+        origin = TrialOrigin(
+            scene="a scene",
+            scene_content="0123",
+            station="a station",
+            station_content="4567",
+            mode=mode,
+            engine=ENGINES["standard"],
+            trial={"hold": 0.1},
+            versions={"drake": "1"},
+            seed=0,
+            run="89ab",
+        )
+        columns = table.trial_columns([judged], origin, instances=["box"])
+        assert ("wobble" in columns) == (mode != "hand")
+    names = list(columns)
+    assert names[names.index("pushed") + 1] == "wobble"
+    for suffix in (".csv", ".parquet"):
+        path = (folder / "results").with_suffix(suffix)
+        table_file.write_table(path, columns)
+        back = trial.read_trial(table.table_row(table_file.read_table(path), 0), "here")
+        assert back.verdict is not None and back.verdict.margins["wobble"] == 0.25
+    described = json.loads((folder / "results.csv-metadata.json").read_text(encoding="utf-8"))
+    (column,) = [c for c in described["tableSchema"]["columns"] if c["name"] == "wobble"]
+    assert {"rad", "how much it wobbles"} <= set(json.dumps(column).split('"'))
+    field = pyarrow.parquet.read_schema(folder / "results.parquet").field("wobble")
+    assert field.metadata == {b"unit": b"rad", b"description": b"how much it wobbles"}
+
+    other = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={**verdict.margins, "wobble": 0.5})
+    (found,) = differences(verdict, other)
+    assert str(found) == "wobble: recorded 0.25, now 0.5"
+    assert vars(as_result(other).margins)["wobble"] == 0.5
+
+
+if __name__ == "__main__":
+    declare()
+    look_for_it(Path(sys.argv[1]))

@@ -1,0 +1,58 @@
+"""A verdict is declared once, and what follows from it follows by itself."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core.grasps.verdict import Margins, Verdict
+from burg_drake.core.grasps.verdict_columns import MARGINS, VERDICT_FIELDS
+from burg_drake.core.grasps.verdict_field import TableShape
+from burg_drake.evaluation.records.journal import decode, encode
+
+MADE_UP = Path(__file__).with_name("made_up_margin.py")
+
+
+def test_a_new_margin_is_one_line(tmp_path: Path) -> None:
+    """It is in journals, tables, their units and meanings, rows that are read, and replays."""
+    pytest.importorskip("pyarrow")
+    ran = subprocess.run([sys.executable, str(MADE_UP), str(tmp_path)], capture_output=True)
+    assert ran.returncode == 0, ran.stderr.decode()
+
+
+def test_every_field_is_in_the_journal_and_comes_back() -> None:
+    verdict = Verdict(
+        Outcome.SLIPPED,
+        Stage.EXECUTED,
+        blocker="a",
+        reason="b",
+        margins={name: k / 3 for k, name in enumerate(MARGINS)},
+        displacements={"c": 0.1},
+        pushed={"d": 0.2},
+        touched="e",
+        q_grasp=(1 / 7,),
+        q_pregrasp=(2 / 7,),
+        cpu={Stage.CLEAR: 0.5},
+        interrupted=True,
+    )
+    empty = Verdict(Outcome.LIFTED, Stage.EXECUTED)
+    for one in fields(Verdict):
+        differs = getattr(verdict, one.name) != getattr(empty, one.name)
+        assert differs or one.name == "stage"
+    line = encode("f", verdict)
+    assert decode(line) == ("f", verdict)
+    assert json.loads(line).keys() == {"id", *(one.name for one in fields(Verdict))}
+
+
+def test_every_column_of_a_verdict_has_a_meaning() -> None:
+    shape = TableShape("arm", ["a mug"], 2)
+    for one in VERDICT_FIELDS:
+        assert all(map(describe, one.columns(shape))), one.name
+    assert all(one.metadata["column"].description for one in fields(Margins))
