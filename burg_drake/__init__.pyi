@@ -93,6 +93,7 @@ from .scene.document.recipe import (
 )
 from .scene.document.scene import (
     Scene as Scene,
+    SceneLike as SceneLike,
     load_scene as load_scene,
     save_scene as save_scene,
 )
@@ -127,6 +128,7 @@ from .station.document.grasp_motion import (
 )
 from .station.document.station_document import (
     Station as Station,
+    StationLike as StationLike,
     load_station as load_station,
 )
 

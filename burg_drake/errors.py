@@ -8,6 +8,7 @@ from burg_drake.core import (
     MeshError as MeshError,
     MissingDependencyError as MissingDependencyError,
     SimulationError as SimulationError,
+    TaskCancelled as TaskCancelled,
     UnknownNameError as UnknownNameError,
     WorkerDied as WorkerDied,
 )

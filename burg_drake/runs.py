@@ -4,6 +4,7 @@ from burg_drake.core.grasps import Verdict as Verdict
 from burg_drake.core.terminal import (
     Progress as Progress,
 )
+from burg_drake.core.workers import TimeLimit as TimeLimit
 from burg_drake.evaluation.candidates import (
     Candidate as Candidate,
     Candidates as Candidates,
@@ -34,6 +35,7 @@ from burg_drake.evaluation.results import (
 )
 from burg_drake.evaluation.robustness import (
     GraspRobustness as GraspRobustness,
+    ProbeAnswer as ProbeAnswer,
     Robustness as Robustness,
     RobustnessSettings as RobustnessSettings,
     assess_robustness as assess_robustness,

@@ -1,4 +1,8 @@
-"""Cameras: intrinsics, the board's pose from an image, overlay, placement check, image sources."""
+"""Images in, poses and pictures out: calibration, the board's pose, the overlay, how objects stand.
+
+A camera is described by `optics` and read by `sources`; `pose` finds the board in an image, and
+`projection`, `overlay` and `placement` build on that. `systems` and `live` put it all together.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,8 @@
-"""Composing a scene by hand: document, selection, commands and history, without any page."""
+"""A scene while it is composed by hand: commands, history, journal and status, without any page.
+
+Read `session` first; what is edited is in `document`, how in `commands`, and `editing` carries it
+out.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,8 @@
-"""Ground floor: errors, frames, documents and grasp sets. Nothing here imports pydrake."""
+"""The ground floor: what all rooms need, and nothing that needs Drake.
+
+Read `frames` and `errors` first; then `documents` and `grasps`, which the project's files are made
+of.
+"""
 
 import lazy_loader
 

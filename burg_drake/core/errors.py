@@ -1,6 +1,6 @@
 """The error tree: everything that a user can cause derives from `BurgError`.
 
-A grasp that slips and a pose out of reach are outcomes, not errors; see `core.outcome`.
+A grasp that slips and a pose out of reach are outcomes, not errors; see `core.grasps.outcome`.
 """
 
 from __future__ import annotations

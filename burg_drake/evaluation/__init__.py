@@ -1,4 +1,8 @@
-"""The main job end to end: cascade, workers, run directory and report."""
+"""The main job: grasps on a station are judged stage by stage, and all of it is recorded.
+
+Read `cascade` first; `candidates` go through the `stages` of a judge, `workers` or a `cluster` do
+the work, and `store` has the folder of a run. `report`, `robustness` and `merge` build on runs.
+"""
 
 import lazy_loader
 

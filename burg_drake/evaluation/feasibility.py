@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
-from burg_drake.core.grasps import LIFT_HEIGHT, GraspSet, Outcome, Stage, Verdict
+from burg_drake.core.grasps import (
+    LIFT_HEIGHT,
+    POSTURE,
+    GraspSet,
+    Outcome,
+    Stage,
+    TableShape,
+    Verdict,
+)
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import (
@@ -22,7 +30,7 @@ from burg_drake.evaluation.candidates import (
     given_candidates,
 )
 from burg_drake.evaluation.grasp_sets import by_names, set_documents
-from burg_drake.evaluation.records import Columns, input_of, numbers
+from burg_drake.evaluation.records import Columns, columns_of_verdicts, input_of, numbers
 from burg_drake.evaluation.stages import (
     Decide,
     Decision,
@@ -91,7 +99,7 @@ def reach(
         `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
         is no outcome, or no plan of what is reachable, should a computation fail; `clearance` of
         the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
-        `judge.ARM_SCREEN_MARGINS`; `lift_height` [m], as asked or as far as there is room;
+        `core.grasps.Margins`; `lift_height` [m], as asked or as far as there is room;
         `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there [rad], NaN where there is
         none; and `cpu` [s]. Answers do not depend on the batch, the order or the number of workers.
         The provenance tells documents, versions and settings.
@@ -224,12 +232,7 @@ def _with_columns(
         columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
     if any("duration" in v.margins for v in rows):
         columns["duration"] = np.array([v.margins.get("duration", np.nan) for v in rows])
-    for name in ("q_grasp", "q_pregrasp"):
-        q = np.full((len(rows), len(arm.home)), np.nan)
-        for row, verdict in enumerate(rows):
-            if found := getattr(verdict, name):
-                q[row] = found
-        columns |= {f"{name}_{k + 1}": q[:, k] for k in range(q.shape[1])}
+    columns |= columns_of_verdicts(rows, POSTURE, TableShape("reach", joints=len(arm.home)))
     columns["cpu"] = np.array([sum(v.cpu.values()) for v in rows], dtype=float)
     objects = sorted(set(candidates.grasps.object.tolist()))
     provenance = {

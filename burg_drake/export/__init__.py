@@ -1,4 +1,7 @@
-"""Scenes as documents of simulators: SDFormat, Drake's model directives, MJCF, USD."""
+"""Scenes as documents of simulators: SDFormat, Drake's model directives, MJCF, USD.
+
+Read `scene_export` first, then `layout`, which all formats write.
+"""
 
 import lazy_loader
 

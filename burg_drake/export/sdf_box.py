@@ -12,7 +12,7 @@ from burg_drake.station.world import DISSIPATION, TABLE_MODULUS, FixedBox
 
 
 def box_model(name: str, box: FixedBox) -> Element:
-    """The element `model` of a box; as `station.surroundings` has it in Drake.
+    """The element `model` of a box; as `station.world.surroundings` has it in Drake.
 
     Args:
         name: of the model.

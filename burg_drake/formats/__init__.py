@@ -1,4 +1,8 @@
-"""Documents of other projects, read into plain data; needs nothing but `core`."""
+"""Documents of other projects, read into plain data; needs nothing but `core`.
+
+Read `grasp_files` first; each format is a module of `grasps`, and libraries and scenes are in
+`collections`.
+"""
 
 import lazy_loader
 

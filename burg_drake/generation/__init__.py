@@ -1,4 +1,7 @@
-"""Scenes by the thousand: drawn from a recipe, settled, accepted or not, kept in a folder."""
+"""Scenes by the thousand: drawn from a recipe, settled, accepted or not, kept in a folder.
+
+Read `sample` first, then `many` and `folder`.
+"""
 
 import lazy_loader
 

@@ -42,7 +42,7 @@ def broken_rule(scene: Scene, station: Station, recipe: SceneRecipe) -> str:
 
     Raises:
         BurgError: the arm collides in its home posture, for example; see
-            `evaluation.scene_acceptance`.
+            `evaluation.stages.scene_acceptance`.
     """
     if recipe.visible_from:
         seen = visible_from(scene, station, recipe.visible_from)

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Exact geometry of convex shapes in batches, without Drake: distances, overlaps, rays.
+
+Read `shape` and `convex` first, then `distance` and `penetration`; `hand_screen` puts them to use.
+"""
 
 import lazy_loader
 

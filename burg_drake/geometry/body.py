@@ -4,7 +4,7 @@ From broad to narrow: boxes against boxes around convex pieces, then exact depth
 part and piece first the one whose boxes overlap most, so that little more is measured than what
 decides.
 
-Nothing here depends on what else is in a batch, not in its last bit: see `grasping.convex`.
+Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The open hand against a scene at rest, for many grasps at once: overlaps and distances.
 
 For overlaps bodies are asked in order of priority, spheres about the parts of the hand against
-boxes around bodies first; see `grasping.body` for what follows, and `grasping.nearest` for
+boxes around bodies first; see `geometry.body` for what follows, and `geometry.nearest_body` for
 distances.
 
-Nothing here depends on what else is in a batch, not in its last bit: see `grasping.convex`.
+Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
 
 from __future__ import annotations

@@ -1,1 +1,4 @@
-"""Grasp sampling and the screen of the open hand against the scene."""
+"""Grasps without time stepping: sampled, screened, scored and compared.
+
+`sampling` and `clearance` are on the main road; `similarity` is what `comparison` rests on.
+"""

@@ -1,4 +1,9 @@
-"""Whether the arm can bring the hand to a grasp."""
+"""Whether and how the arm can bring the hand to a grasp, and away with the object.
+
+`reach` says whether, `planner` how fast. On the way, `ik` gives postures, `proximity` and
+`collision` say which are free, `lines` has the straight parts and `transit` the way there from
+home.
+"""
 
 import lazy_loader
 

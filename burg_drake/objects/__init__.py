@@ -1,4 +1,8 @@
-"""Meshes to sim-ready objects: repair, mass properties, convex pieces, SDF, stable poses."""
+"""Meshes to sim-ready objects: repair, mass properties, convex pieces, SDF, stable poses.
+
+Read `library` first, which has what is known of an object in the end; `meshes`, `physics` and
+`collision` compute it.
+"""
 
 import lazy_loader
 

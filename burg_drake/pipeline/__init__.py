@@ -1,4 +1,7 @@
-"""Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked."""
+"""Builds object libraries: repaired, decomposed, confirmed in simulation, cached, checked.
+
+Read `build` first, then `stages`; `recipe` is what is asked for.
+"""
 
 import lazy_loader
 

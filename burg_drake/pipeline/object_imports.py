@@ -35,7 +35,7 @@ def burg_sources(
     listed poses agree with the new ones.
 
     Args:
-        library: from `formats.burg_library.read_burg_library`.
+        library: from `formats.collections.burg_library.read_burg_library`.
         masses: by identifier or object name [kg]; they go before the document's.
         density: for objects that have no mass, which are fixed otherwise [kg/m^3].
         friction: coefficient of objects that have none.
@@ -111,7 +111,7 @@ def ycb_sources(
     """What to build from meshes of the YCB set.
 
     Args:
-        objects: from `formats.ycb.find_ycb`.
+        objects: from `formats.collections.ycb.find_ycb`.
         masses: by YCB name or object name [kg]; they go before the published ones.
         density: for objects that have no mass [kg/m^3]; the pipeline's default if None.
         friction: coefficient of all.
@@ -202,7 +202,7 @@ def _down(X_SO: Pose) -> Array:
 class _SamePose:
     """Whether directions down are near each other, or one pose by the object's symmetry.
 
-    As for `objects.stable_poses`, the centre of mass has to be at one height then.
+    As for `objects.physics.stability`, the centre of mass has to be at one height then.
     """
 
     def __init__(self, surface: trimesh.Trimesh, p_OOcm: Array) -> None:

@@ -32,15 +32,15 @@ def import_burg_scene(
 ) -> ImportedScene:
     """The scene document of a scene of BURG-Toolkit.
 
-    Objects are those that `pipeline.imports.burg_sources` makes of the scene's object library, by
-    `object_name(identifier)`. What has no mass there is background, whichever list it is in.
-    Instances have no names in BURG-Toolkit; they get those of their objects, the second one of an
-    object `NAME_2` and so on. One that would be called as something of every station, such as
+    Objects are those that `pipeline.object_imports.burg_sources` makes of the scene's object
+    library, by `object_name(identifier)`. What has no mass there is background, whichever list it
+    is in. Instances have no names in BURG-Toolkit; they get those of their objects, the second one
+    of an object `NAME_2` and so on. One that would be called as something of every station, such as
     `table`, begins with `NAME_1`. The board is the scene's printout with its markers; without one
     it has the size of the ground area and the markers of this project.
 
     Args:
-        scene: from `formats.burg_scene.read_burg_scene`.
+        scene: from `formats.collections.burg_scene.read_burg_scene`.
         library: has the objects.
         name: of the document; that of the scene's file if empty.
         reference: how the document refers to the library; its folder if empty.

@@ -1,4 +1,7 @@
-"""The printable board: height map of a scene, markers at true scale, pages."""
+"""The printable board: height map of a scene, markers at true scale, pages.
+
+Read `board_printout` first; it goes from `relief` over `sheet` to `tiling`.
+"""
 
 import lazy_loader
 

@@ -1,1 +1,4 @@
-"""Scene documents: which objects stand where on the board, and whether they can."""
+"""Scene documents: which objects stand where on the board, and whether they can.
+
+Read `document` first; `arrangement` finds room for objects.
+"""

@@ -1,4 +1,7 @@
-"""Meshcat views: scenes, grasps coloured by outcome, replays."""
+"""Meshcat views and pictures: scenes, grasps coloured by outcome, replays.
+
+Read `scenes` first; `style` has colours and markup, `meshcat` what all views share.
+"""
 
 import lazy_loader
 

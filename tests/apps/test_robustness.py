@@ -144,7 +144,7 @@ def test_what_is_known_is_not_asked_again(copied: Run, monkeypatch, capsys: Capt
     found = assess_robustness(
         copied, settings=more, out=copied.path / "robustness.csv", workers=1, progress=False
     )
-    assert [probe.test for probe in asked] == ["noise"]
+    assert [trial.id.split(":")[1] for trial in asked] == ["noise"]
     assert found.grasps[0].success is not None and found.grasps[0].success.trials == 4
 
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""`burg-drake camera`: finding, calibrating and placing cameras, and checking photos.
+
+`verbs` comes first and adds the other modules, one a verb.
+"""
 
 import lazy_loader
 

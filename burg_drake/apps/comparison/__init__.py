@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""`burg-drake compare` and `burg-drake gap`: simulated outcomes beside real ones.
+
+`compare` comes first; `rejudge` is an option of it.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,8 @@
-"""TODO: what this room owns."""
+"""`burg-drake grasps`: sampling, scoring, showing, comparing and exchanging files of grasps.
+
+`verbs` comes first and adds the other modules, one a verb; `source` and `shown_grasps` serve
+several.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""`burg-drake library`: building, checking and showing object libraries.
+
+`verbs` has the options; `building` and `viewing` run them.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Options that several verbs have, so that the same ones mean the same everywhere.
+
+`arguments` comes first; each other module has the options of one matter.
+"""
 
 import lazy_loader
 

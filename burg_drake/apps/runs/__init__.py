@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The main job on the command line: `evaluate` and `reach`, and what is done with their runs.
+
+`evaluate` comes first, with `campaign` for several scenes; each other module is a verb.
+"""
 
 import lazy_loader
 

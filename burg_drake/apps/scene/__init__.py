@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""`burg-drake scene`, `printout` and `setup`: scenes made, checked, printed and converted.
+
+`verbs` comes first and adds the other modules, one a verb.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What verbs show in a terminal, and how those end that run until they are interrupted.
+
+The modules stand for themselves.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,8 @@
-"""TODO: what this room owns."""
+"""`burg-drake trials`: grasps tried on the robot, from their choice to the last entry.
+
+`verbs` comes first and adds the other modules, one a verb; the page of `trials serve` is in
+`lab_page`.
+"""
 
 import lazy_loader
 

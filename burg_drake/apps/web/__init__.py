@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What the small servers of the command line share.
+
+`server` has the server and the handler of requests, `requests` reads what browsers send.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Intrinsics of a camera from images of a ChArUco board, and how far they can be trusted.
+
+Read `target`, `estimation` and `lens_fit`, then `lens_uncertainty` and `quality`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,8 @@
-"""TODO: what this room owns."""
+"""A session that looks at every frame of a camera, draws the scene over it and measures.
+
+Read `session` first, then `frame_processing`; `actions` has what viewers can ask for: snapshots and
+recordings.
+"""
 
 import lazy_loader
 

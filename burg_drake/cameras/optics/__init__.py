@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Intrinsics and lens distortion, and the files that hold them.
+
+Read `intrinsics` first, then `intrinsics_file`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""A scene's objects drawn over a camera's image of the board, without a renderer.
+
+Read `renderer` first; `style` says how it looks, and the other modules draw lines, areas and texts.
+"""
 
 import lazy_loader
 

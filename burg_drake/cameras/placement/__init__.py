@@ -1,4 +1,8 @@
-"""TODO: what this room owns."""
+"""The placement check: how far each object of a real scene stands from its place.
+
+Read `check` first; it goes from `search` and `alignment` over `localization` to `assessment`, and
+ends in a `document`.
+"""
 
 import lazy_loader
 

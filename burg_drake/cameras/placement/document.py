@@ -144,12 +144,12 @@ class PlacementCheck:
 
 
 def load_placement(path: str | Path) -> PlacementCheck:
-    """Reads a placement file; see `core.schema.load_document`."""
+    """Reads a placement file; see `core.documents.schema.load_document`."""
     return load_document(path, PlacementCheck)
 
 
 def save_placement(check: PlacementCheck, path: str | Path) -> None:
-    """Writes a placement file; see `core.schema.save_document`.
+    """Writes a placement file; see `core.documents.schema.save_document`.
 
     The scene's path in it starts at the file's folder, so that both can move together.
     """

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What a camera sees of a scene's meshes: contours, creases and hidden parts, by rays.
+
+Read `scene_mesh` and `line_drawing`; `visibility` says how much of each object is seen.
+"""
 
 import lazy_loader
 

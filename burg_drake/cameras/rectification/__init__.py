@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Photos of the board as its top view, true to scale.
+
+Read `top_view` first; `sheet_fit` does without intrinsics, and `stream` goes on.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Where images come from: cameras, videos, photos, streams and simulated cameras.
+
+Read `frame` first, then `opening`, which finds the source for a name.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Estimator, filter, overlay and sources of frames as systems of Drake.
+
+Read `board_loop` first, which connects them.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What goes on beside the editing in a process of its own: settling, counting grasps.
+
+Read `process` first; a task is what it is given, and the newest one replaces the others.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The steps that a session can take, each one undone as a whole.
+
+Read `command` first; the other modules have the commands by what they change.
+"""
 
 import lazy_loader
 

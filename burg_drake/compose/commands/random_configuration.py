@@ -25,7 +25,7 @@ class RandomConfiguration:
         seed: the same one gives the same configuration.
         count: so many objects of the library take the place of the free ones; those that are there
             stay, elsewhere, if None.
-        layout: how they stand to one another; see `scene.layout.Layout`.
+        layout: how they stand to one another; see `scene.document.layout.Layout`.
         poses: how stable poses are drawn.
         repeat: an object of the library may come several times.
     """

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What a session holds: scene, library and selection, their history, and what is wrong with them.
+
+Read `state` first, then `history` and `checker`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Commands carried out on a scene, and what one sees of it meanwhile.
+
+Read `editor` first, then `view`; `drag` moves objects live.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""A session's scene on the disk: its file, its lock and the journal that survives a crash.
+
+Read `scene_storage` first, then `opening`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Typed, versioned documents in YAML, and JSON; whatever is wrong is named with file and line.
+
+Read `schema` first, then `reader`; the other modules read text within bounds.
+"""
 
 import lazy_loader
 

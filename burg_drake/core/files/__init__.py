@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Files read within bounds, whoever wrote them, and written whole or not at all.
+
+Read `atomic` and `read_errors`; the other modules read arrays and numbers.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Sets of grasps, what their columns mean, and what can become of a grasp.
+
+Read `grasp_set` and `outcome` first, then `columns`; `storage` has the files.
+"""
 
 import lazy_loader
 

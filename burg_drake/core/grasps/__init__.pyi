@@ -43,6 +43,7 @@ from .verdict_columns import (
     MOVED as MOVED,
     PREFIXES as PREFIXES,
     PUSHED as PUSHED,
+    SMALLER_IS_BETTER as SMALLER_IS_BETTER,
     TRIAL_FINDINGS as TRIAL_FINDINGS,
     VERDICT_FIELDS as VERDICT_FIELDS,
     fields_in as fields_in,
@@ -54,4 +55,5 @@ from .verdict_field import (
     MEASURED as MEASURED,
     POSTURE as POSTURE,
     TableShape as TableShape,
+    TextField as TextField,
 )

@@ -3,8 +3,8 @@
 Both hold the same: a header (format, version, provenance as JSON), the columns that every set has,
 and further columns. In HDF5 these are attributes of the root (`format`, `version`, `provenance`),
 datasets `X_OG`, `width`, `id`, `object`, `score`, and datasets of the group `columns`. A dataset's
-attributes say its `unit` and `description`, see `core.columns`. Paths in the provenance are told
-from where the file is, and are absolute again once it is read.
+attributes say its `unit` and `description`, see `core.grasps.columns`. Paths in the provenance are
+told from where the file is, and are absolute again once it is read.
 """
 
 from __future__ import annotations

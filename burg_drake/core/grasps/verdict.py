@@ -35,11 +35,17 @@ class Margins:
     """Continuous slack behind an outcome, SI units; NaN where it was not measured."""
 
     overlap: float = margin(
-        "m", "how deep the open hand overlaps what it collides with; 0 if clear"
+        "m",
+        "how deep the open hand overlaps what it collides with; 0 if clear",
+        less_is_better=True,
     )
     clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
-    slip: float = margin("m", "way of the target in the hand since the grip, at the origin of G")
-    tilt: float = margin("rad", "turn of the target in the hand since the grip")
+    slip: float = margin(
+        "m", "way of the target in the hand since the grip, at the origin of G", less_is_better=True
+    )
+    tilt: float = margin(
+        "rad", "turn of the target in the hand since the grip", less_is_better=True
+    )
     pad_force: float = margin("N", "normal force of the weaker pad along the closing direction")
     patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
     lift: float = margin(
@@ -52,7 +58,9 @@ class Margins:
         "length of the lift: as asked, or as far as there is room where less is allowed",
         by_trial=False,
     )
-    others_moved: float = margin("m", "largest displacement of any other object's centre of mass")
+    others_moved: float = margin(
+        "m", "largest displacement of any other object's centre of mass", less_is_better=True
+    )
     end_time: float = margin(
         "s",
         "simulated time at which the outcome was decided, which ends the trial, often before"
@@ -69,19 +77,24 @@ class Margins:
         "how far the closest configuration is beyond a joint limit",
         mode="reach",
         by_trial=False,
+        less_is_better=True,
     )
     duration: float = margin("s", "of the planned motion", mode="arm", by_trial=False)
     tracking_error: float = margin(
-        "rad", "largest deviation of a joint from its command", mode="arm"
+        "rad", "largest deviation of a joint from its command", mode="arm", less_is_better=True
     )
     tracking_distance: float = margin(
-        "m", "largest deviation of the origin of G from where commanded", mode="arm"
+        "m",
+        "largest deviation of the origin of G from where commanded",
+        mode="arm",
+        less_is_better=True,
     )
     pushed: float = margin(
         "m",
         "largest displacement of any free object before the hand closed; of one that hovers, its"
         " fall once it is touched",
         mode="arm",
+        less_is_better=True,
     )
 
     def of_trial(self) -> dict[str, float]:

@@ -28,6 +28,8 @@ VERDICT_FIELDS = (
 
 MARGINS = tuple(one.name for one in fields(Margins))
 """Names of all margins, in the order of tables."""
+SMALLER_IS_BETTER = frozenset(one.name for one in fields(Margins) if one.metadata["less_is_better"])
+"""Of these margins."""
 LIFT_HEIGHT = "lift_height"
 """Margin: length of the lift that was asked for, or for which there is room."""
 ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess", LIFT_HEIGHT)

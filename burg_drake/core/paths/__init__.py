@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Where installed data and the files of others are, and how files refer to each other.
+
+Read `resources` first, then `references`.
+"""
 
 import lazy_loader
 

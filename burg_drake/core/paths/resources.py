@@ -2,7 +2,7 @@
 
 A wheel carries them inside the package, a checkout beside it; both are found by the same
 references: `package://burg_drake/models/...` or a bare name such as `panda_tabletop`. Other
-packages are found by `core.packages`.
+packages are found by `core.paths.packages`.
 """
 
 from __future__ import annotations

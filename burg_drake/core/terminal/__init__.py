@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What terminals show: tables, numbers, colours, and how far a job is.
+
+Read `progress` first.
+"""
 
 import lazy_loader
 

@@ -14,7 +14,14 @@ from multiprocessing.connection import Pipe, wait
 from typing import Any
 
 from burg_drake.core.errors import TaskCancelled
-from burg_drake.core.workers.messages import Done, Ending, Interrupt, Message, Opened, Progress
+from burg_drake.core.workers.messages import (
+    Done,
+    Ending,
+    Interrupt,
+    Message,
+    ProgressMessage,
+    SessionOpened,
+)
 from burg_drake.core.workers.shared_queue import SharedQueue
 from burg_drake.core.workers.worker_process import Batch, PendingTask, Worker
 
@@ -173,16 +180,16 @@ class Dispatcher:
         task = worker.tasks[0] if worker.tasks else None
         if isinstance(message, Ending):
             worker.reason = message.reason
-        elif isinstance(message, Opened):
+        elif isinstance(message, SessionOpened):
             self._opened(worker, message)
         elif task is None or task.number != message.number:
             pass
-        elif isinstance(message, Progress):
+        elif isinstance(message, ProgressMessage):
             _progress(task, message.message)
         else:
             _finish(worker.tasks.popleft(), message)
 
-    def _opened(self, worker: Worker, message: Opened) -> None:
+    def _opened(self, worker: Worker, message: SessionOpened) -> None:
         session, worker.opening = worker.opening, None
         assert session is not None
         if message.error is None:

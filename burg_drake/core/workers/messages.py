@@ -63,7 +63,7 @@ class Interrupt:
 
 
 @dataclass(frozen=True)
-class Opened:
+class SessionOpened:
     """From a worker: a session is built, or cannot be, which no other worker could either.
 
     Attributes:
@@ -76,7 +76,7 @@ class Opened:
 
 
 @dataclass(frozen=True)
-class Progress:
+class ProgressMessage:
     """From a worker: what its task reports."""
 
     number: int
@@ -111,4 +111,4 @@ class Ending:
     reason: str
 
 
-Message = Opened | Progress | Done | Ending
+Message = SessionOpened | ProgressMessage | Done | Ending

@@ -18,9 +18,9 @@ from burg_drake.core.workers.messages import (
     Ending,
     Interrupt,
     Message,
-    Opened,
     OpenSession,
-    Progress,
+    ProgressMessage,
+    SessionOpened,
 )
 
 
@@ -81,7 +81,7 @@ class _WorkerLoop:
             told = self._connection.recv()
             if isinstance(told, Interrupt) and told.number == self._number:
                 raise TaskCancelled("this was cancelled")
-        self._connection.send(Progress(self._number, message))
+        self._connection.send(ProgressMessage(self._number, message))
 
     def _open(self, opening: OpenSession) -> bool:
         for key in opening.drop:
@@ -91,9 +91,9 @@ class _WorkerLoop:
                 build: Callable[[], Any] = pickle.loads(opening.build)
                 self._sessions[opening.key] = build()
         except Exception as error:
-            self._send(Opened(*_portable(error)))
+            self._send(SessionOpened(*_portable(error)))
             return False
-        self._send(Opened())
+        self._send(SessionOpened())
         return True
 
     def _do(self, call: Call) -> None:

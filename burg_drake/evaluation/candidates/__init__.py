@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The grasps that a run judges: sampled here, or given, each with an id.
+
+Read `candidates` first, then `sampling`.
+"""
 
 import lazy_loader
 

@@ -24,7 +24,7 @@ the two points do that the grasp was made of: a pad covers more than a point."""
 
 
 class ClearTest:
-    """Keeps grasps of one object, see `grasping.antipodal.Accept`.
+    """Keeps grasps of one object, see `grasping.sampling.antipodal.Accept`.
 
     Args:
         screen: of the open hand.

@@ -15,7 +15,7 @@ friction up to tan(15 deg) = 0.27: one of the two fingers would be below the tab
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingSettings:
-    """How grasps are sampled on each object; more on these in `grasping.antipodal`.
+    """How grasps are sampled on each object; more on these in `grasping.sampling.antipodal`.
 
     Attributes:
         friction: coefficient; the object's own if None.

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Grasps from files and runs as sets to work on, and what sets say of their origin.
+
+Read `input` first, then `candidate_files`; `sampled` and `scored` make sets.
+"""
 
 import lazy_loader
 

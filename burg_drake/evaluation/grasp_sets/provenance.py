@@ -43,7 +43,7 @@ def hand_entry(hand: Hand, document: Path | None) -> dict[str, str]:
 
 
 def object_files(library: ObjectLibrary, objects: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Mesh and physics of objects, under the names that `formats.one_object` knows."""
+    """Mesh and physics of objects, under the names that `formats.common.one_object` knows."""
     return {name: _described(library, name) for name in objects}
 
 

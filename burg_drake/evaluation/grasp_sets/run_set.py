@@ -28,9 +28,10 @@ def run_grasps(run: Run) -> GraspSet:
 
     Returns:
         The grasps with the column `instance` and those of the results table, see
-        `evaluation.table`; NaN or empty for grasps that are not judged yet. What came with the
-        grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column of
-        that name. The identifier of a grasp is the run's without the instance. The provenance names
+        `evaluation.records.table`; NaN or empty for grasps that are not judged yet. What came with
+        the grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column
+        of that name. The identifier of a grasp is the run's without the instance. The provenance
+        names
         the run, its copies of scene and station, and the hand, and describes the objects.
     """
     candidates, results = run.candidates, run.results

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""One run of several: shards, or copies that were interrupted.
+
+Read `runs` first, then `campaigns` for many scenes; `journals` chooses among verdicts.
+"""
 
 import lazy_loader
 

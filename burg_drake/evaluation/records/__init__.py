@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What runs write down: their documents, a journal of verdicts, and the table of results.
+
+Read `run_document`, `journal` and `table` first.
+"""
 
 import lazy_loader
 

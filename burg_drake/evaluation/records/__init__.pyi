@@ -70,6 +70,7 @@ from .table import (
     INPUT_PREFIX as INPUT_PREFIX,
     TEXT as TEXT,
     Columns as Columns,
+    columns_of_verdicts as columns_of_verdicts,
     make_columns as make_columns,
     table_row as table_row,
     trial_columns as trial_columns,

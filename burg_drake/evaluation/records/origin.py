@@ -46,7 +46,7 @@ class TrialOrigin:
         scene_content, station_content: first digits of their content hashes.
         mode: what was asked about each grasp.
         engine: how time was stepped.
-        trial: settings of the trial's phases; see `simulation.trial_settings.TrialSettings`.
+        trial: settings of the trial's phases; see `simulation.trials.trial_settings.TrialSettings`.
         versions: of the software and the machine.
         seed: of the run.
         run: hash of the run.

@@ -1,38 +1,20 @@
 """The results table: its columns, one row a trial, in the order of the candidates.
 
-    id, instance, object      which grasp on what; the id is what `burg-drake replay` takes
-    outcome, stage            the one outcome, and the stage that decided it
-    blocker, reason           the body in the way; the simulator's message if it failed
-    width, score              distance of the contacts [m]; the sampler's score
-    x, y, z, qw, qx, qy, qz   grasp frame in the object frame [m; quaternion]
-    overlap ... end_time      margins, see `core.grasps.Margins` (SI units)
-    moved_NAME                peak displacement of each object that was not the target [m]
-    arm_clearance ... pushed  in the modes `reach` and `arm`: see `core.grasps.Margins`
-    pushed_NAME, touched      in mode `arm`: displacement of each object before the hand closed [m];
-                              what the arm touched first against its plan
-    friction, mass            of the target, where the trial had others than the library's [-; kg]
-    q_grasp_1 ...             arm configuration at the grasp [rad]; not in mode `hand`
-    q_pregrasp_1 ...          and at the pregrasp
-    seed, engine              of the run; an engine that is no preset is marked
-    run                       short hash of all that decides about the results; `hash` in run.yaml
-    cpu_clear, cpu_reach, cpu_trial   CPU time of each stage [s]: hand, arm, trial; in mode `arm`
-                              there is cpu_plan, of the motion's timing
+docs/results.md has unit and meaning of every column. A row tells, from left to right:
 
-and what makes any row, wherever it is copied to, a trial that can be executed again:
+    which grasp it is, and how it ended      id, instance, object; outcome, stage, blocker, reason
+    where the grasp is on its object         width, score, x ... qz
+    what was measured                        margins, displacements, what was touched
+    with which object                        friction, mass, where they were not the library's
+    where the arm was                        q_grasp_1 ..., q_pregrasp_1 ...
+    which run it is of, and what it cost     seed, engine, run, cpu_clear ...
+    what executes it again, wherever         scene, station, their content, mode, settings,
+    the row is copied to                     versions; X_OG to the bit, which a quaternion is not
+    what came with grasps that were given    given_NAME for column NAME of their file
 
-    scene, station            where the documents were, or names of built-in ones
-    scene_content, station_content   their content hashes; objects and robot models count
-    mode                      what was asked, see `mode`
-    engine_settings, trial_settings, versions   as name=value pairs
-    X_OG                      grasp frame in the object frame: the upper three rows of the matrix,
-                              bit for bit, which a quaternion is not
-
-and, for grasps that were given, whatever else came with them:
-
-    given_NAME                column NAME of their file, such as the label or confidence of others
-
-The column `run` leads from a results file on its own to the run.yaml with the same `hash`, which
-has the hashes of objects and grasps, too. Parquet files carry it along.
+What is said of the verdict follows from its declaration, `core.grasps.verdict`; what a mode does
+not ask has no column. The column `run` leads from a results file on its own to the run.yaml with
+the same `hash`, which has the hashes of objects and grasps, too. Parquet files carry it along.
 
 What is not defined for a trial is an empty cell in CSV and null in Parquet, NaN in memory. Tables
 of several scenes can be put one below the other; each row then lacks the objects of the others.
@@ -128,27 +110,27 @@ def trial_columns(
         "id": _texts([t.id for t in trials]),
         "instance": _texts([t.instance for t in trials]),
         "object": _texts([t.object for t in trials]),
-        **verdict_columns(rows, DECIDED, shape),
+        **columns_of_verdicts(rows, DECIDED, shape),
         "width": _numbers([t.width for t in trials]),
         "score": _numbers([t.score for t in trials]),
         **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
         **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        **verdict_columns(rows, MEASURED, shape),
+        **columns_of_verdicts(rows, MEASURED, shape),
         "friction": _numbers([t.friction for t in trials]),
         "mass": _numbers([t.mass for t in trials]),
-        **verdict_columns(rows, POSTURE, shape),
+        **columns_of_verdicts(rows, POSTURE, shape),
     }
     columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
     columns["engine"] = _same(engine_label(origin.engine), len(rows))
     columns["run"] = _same(origin.run, len(rows))
-    columns |= verdict_columns(rows, COST, shape)
+    columns |= columns_of_verdicts(rows, COST, shape)
     for name, text in origin.cells().items():
         columns[name] = _same(text, len(rows))
     columns["X_OG"] = _texts([pose_text(t.X_OG) for t in trials])
     return columns
 
 
-def verdict_columns(rows: Sequence[Verdict], part: str, shape: TableShape) -> Columns:
+def columns_of_verdicts(rows: Sequence[Verdict], part: str, shape: TableShape) -> Columns:
     """The columns of verdicts that lie in a part of a row, see `core.grasps.verdict_field`."""
     columns: Columns = {}
     for one in fields_in(shape.mode, part):

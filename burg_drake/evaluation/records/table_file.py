@@ -29,7 +29,7 @@ from burg_drake.core.files import (
     short_message,
     text_array,
 )
-from burg_drake.core.grasps import MARGINS, MOVED, PUSHED, csv_metadata, describe, metadata_path
+from burg_drake.core.grasps import MARGINS, PREFIXES, csv_metadata, describe, metadata_path
 from burg_drake.evaluation.records.table import INTEGER, TEXT, Columns
 
 T = TypeVar("T", int, float)
@@ -79,7 +79,7 @@ def require_table(path: Path) -> None:
 def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
     """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
 
-    Beside a CSV file what its columns are goes to a file, see `core.csv_web`.
+    Beside a CSV file what its columns are goes to a file, see `core.grasps.csv_metadata_file`.
 
     Args:
         path: the file.
@@ -248,7 +248,7 @@ def _typed(name: str, values: Sequence[Any], allowance: ReadBudget) -> NDArray[A
             ]
         )
     except ValueError:
-        if name in (*MARGINS, "friction", "mass") or name.startswith((MOVED, PUSHED)):
+        if name in (*MARGINS, "friction", "mass") or name.startswith(tuple(PREFIXES.values())):
             raise
         return text_array(f"{allowance.path}: {name}", texts, allowance)
 

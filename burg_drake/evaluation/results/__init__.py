@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What a run found, in numbers: counts and shares, its best grasps, how far it is.
+
+Read `summary` first, then `counts`.
+"""
 
 import lazy_loader
 

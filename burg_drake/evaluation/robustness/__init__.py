@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""How robust the grasps are that a run found to lift.
+
+Read `assessment` first, then `probes` and `table`.
+"""
 
 import lazy_loader
 

@@ -2,6 +2,7 @@ from .assessment import (
     Robustness as Robustness,
     assess_robustness as assess_robustness,
 )
+from .probe_answer import ProbeAnswer as ProbeAnswer
 from .probes import RobustnessSettings as RobustnessSettings
 from .shares import (
     TABLE_FILES as TABLE_FILES,

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""How scenes become runs: prepared, judged and finished, one or many at a time.
+
+Read `request` and `preparation` first, then `many_scenes`.
+"""
 
 import lazy_loader
 

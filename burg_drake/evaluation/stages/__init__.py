@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""How one grasp is judged: by the hand's clearance, the arm's reach, a trial.
+
+Read `judge` first, then `station_judge`, whose first stages are in `screening`.
+"""
 
 import lazy_loader
 

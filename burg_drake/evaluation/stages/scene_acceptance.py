@@ -1,5 +1,5 @@
 """Whether a composed or sampled scene is of use: every object within the arm's reach, and enough
-clear grasps of each. What a camera sees of them is in `cameras.visibility`."""
+clear grasps of each. What a camera sees of them is in `cameras.projection.visibility`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Runs on disk and how to read them: their folders, and the columns of many scenes in parts.
+
+Read `run_folder` and `campaign_folder` first, then `part_store`.
+"""
 
 import lazy_loader
 

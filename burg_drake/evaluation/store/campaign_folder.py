@@ -1,7 +1,7 @@
 """A run over many scenes on disk, and how to read it back.
 
 campaign.yaml                which scenes were judged, how, with which versions, and when
-scenes/NAME/                 a run for each scene, as `run_store` has it
+scenes/NAME/                 a run for each scene, as `run_folder` has it
 scenes.jsonl                 how far each scene is, and why some could not be judged
 parts/                       the table of all scenes in Parquet files, made from the journals
 report.html                  the report for people
@@ -98,7 +98,7 @@ class Campaign:
         return read_rows(self.path, self.places, names, self.document.instances)
 
     def columns(self, names: Sequence[str] | None = None) -> Columns:
-        """Columns of all judged grasps, scene by scene; see `evaluation.table`.
+        """Columns of all judged grasps, scene by scene; see `evaluation.records.table`.
 
         Args:
             names: of the columns; all if None, which takes much memory where there are many
@@ -116,7 +116,7 @@ class Campaign:
         return self.columns()
 
     def frame(self, names: Sequence[str] | None = None) -> pandas.DataFrame:
-        """Judged grasps as a data frame; see `evaluation.frame`.
+        """Judged grasps as a data frame; see `evaluation.store.frame`.
 
         Raises:
             MissingDependencyError: pandas or pyarrow is not installed.

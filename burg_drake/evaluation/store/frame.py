@@ -4,12 +4,13 @@ that there are, in their order."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from burg_drake.core import MissingDependencyError
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import VERDICT_FIELDS, TextField
 from burg_drake.evaluation.records import TEXT, Columns
 from burg_drake.evaluation.store.part_file import PLAIN_TEXT
 
@@ -19,9 +20,11 @@ if TYPE_CHECKING:
     from burg_drake.evaluation.store.stored_rows import StoredRows
 
 MEMBERS: Mapping[str, Sequence[str]] = {
-    "outcome": [outcome.value for outcome in Outcome],
-    "stage": [stage.value for stage in Stage],
+    one.name: [member.value for member in one.of]
+    for one in VERDICT_FIELDS
+    if isinstance(one, TextField) and issubclass(one.of, StrEnum)
 }
+"""Texts of columns that have no others."""
 
 
 def frame_of_columns(columns: Columns, names: Sequence[str] | None = None) -> pandas.DataFrame:

@@ -35,8 +35,8 @@ def load_runs(path: str | Path) -> list[Run]:
 
 
 def read_results(path: str | Path, names: Sequence[str] | None = None) -> Columns:
-    """Columns of all judged grasps in a folder, see `evaluation.table`; `run` and `id` together
-    name a row.
+    """Columns of all judged grasps in a folder, see `evaluation.records.table`; `run` and `id`
+    together name a row.
 
     Args:
         path: folder of a run, of one scene or of many.

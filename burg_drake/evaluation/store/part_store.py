@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.grasps import MOVED, PUSHED
+from burg_drake.core.grasps import PREFIXES
 from burg_drake.evaluation.records import JOURNAL_FILE, read_journal
 from burg_drake.evaluation.store.part_file import (
     CANDIDATE,
@@ -237,7 +237,7 @@ def with_instances(table: Any, instances: Sequence[str]) -> Any:
     arrow = require_arrow("a columnar table")
     columns: dict[str, Any] = {}
     for name in table.column_names:
-        for prefix in (MOVED, PUSHED):
+        for prefix in PREFIXES.values():
             if name.startswith(prefix) and name.removeprefix(prefix) in instances:
                 for instance in instances:
                     columns.setdefault(prefix + instance, None)

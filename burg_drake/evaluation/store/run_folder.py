@@ -103,7 +103,8 @@ class Run:
 
     @cached_property
     def results(self) -> Columns:
-        """Judged grasps as columns, see `evaluation.table`, in the order of the candidates."""
+        """Judged grasps as columns, see `evaluation.records.table`, in the order of the
+        candidates."""
         return make_columns(
             self.candidates,
             self.verdicts,
@@ -113,7 +114,7 @@ class Run:
         )
 
     def frame(self, names: Sequence[str] | None = None) -> pandas.DataFrame:
-        """Judged grasps as a data frame; see `evaluation.frame`.
+        """Judged grasps as a data frame; see `evaluation.store.frame`.
 
         Args:
             names: of the columns; all if None.

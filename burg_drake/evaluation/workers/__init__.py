@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Judging in the processes of this machine; what executors are, and jobs.
+
+Read `executor` and `job` first, then `pool`; `worker` is the other side.
+"""
 
 import lazy_loader
 

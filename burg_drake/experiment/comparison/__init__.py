@@ -1,4 +1,8 @@
-"""Simulated and real outcomes held against each other."""
+"""Simulated and real outcomes held against each other.
+
+Read `comparing` and `comparison` first, then `of_trials` and `of_runs`; `judge_assessment` has the
+figures.
+"""
 
 import lazy_loader
 

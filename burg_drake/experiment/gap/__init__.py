@@ -1,4 +1,7 @@
-"""Where simulation and reality part: real trials judged again, and one cause after the other."""
+"""Where simulation and reality part: real trials judged again, and one cause after the other.
+
+Read `measurement` and `steps` first, then `rejudging`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""Pages for the lab: the protocol of trials on paper, and pictures of their grasps."""
+"""Pages for the lab: the protocol of trials on paper, and pictures of their grasps.
+
+Read `protocol` first, then `trial_pictures`, which has two painters.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Pairs of verdicts and of what happened, which comparisons are made of.
+
+Read `side` first, then `matching`, `tried` and `pairs`.
+"""
 
 import lazy_loader
 

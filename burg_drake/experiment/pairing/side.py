@@ -95,7 +95,7 @@ class JudgedRuns:
         return {run.document.scene.content: run.instances for run in self.runs_of(contents)}
 
     def table(self, names: Sequence[str]) -> ResultTable:
-        """Columns of all judged grasps; `evaluation.table` says which there are."""
+        """Columns of all judged grasps; `evaluation.records.table` says which there are."""
         if isinstance(self.found, Campaign):
             return ResultTable.of_rows(self.found.rows(names), names)
         return ResultTable.of_columns(read_results(self.path, names), names)

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Grasps of runs chosen for trials on the robot, and what these trials will tell.
+
+Read `plan` first, then `selection` and `power`.
+"""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
 """Chooses grasps of runs for trials on the robot, and puts them into an order.
 
 Chance comes from hashes of the seed and of the grasp, never from a position; see
-`experiment.trials.selection`.
+`experiment.planning.selection`.
 """
 
 from __future__ import annotations

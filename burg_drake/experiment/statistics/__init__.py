@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Statistics of judges: agreement with what happened, intervals, ranking, paired tests.
+
+Read `confusion` and `estimates` first.
+"""
 
 import lazy_loader
 

@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from burg_drake.core import Array
+from burg_drake.core.grasps import SMALLER_IS_BETTER
 from burg_drake.experiment.statistics.arrays import Flags
 from burg_drake.experiment.statistics.estimates import Estimate, share
 from burg_drake.experiment.statistics.ordered import Ordered
@@ -20,12 +21,6 @@ T = TypeVar("T")
 MOST_BINS, TRIALS_A_BIN = 10, 10
 FINEST = 2000
 """Rows that an isotonic fit is made of; more are put together first."""
-SMALLER_IS_BETTER: Final = frozenset(
-    {
-        *("overlap", "slip", "tilt", "others_moved", "joint_excess"),
-        *("tracking_error", "tracking_distance", "pushed"),
-    }
-)
 PROBABILITY: Final = "probability"
 """Name of the predicted probability of success, from a table of robustness."""
 MARGINS: Final = (

@@ -115,7 +115,7 @@ class Stratum:
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectPlace:
-    """Where an object stood before a trial; see `cameras.placement_document.Placement`.
+    """Where an object stood before a trial; see `cameras.placement.document.Placement`.
 
     Attributes:
         status: `measured`, `uncertain` or `not_seen`.
@@ -292,10 +292,10 @@ def succeeded(outcome: Outcome | RealOutcome, success: Success) -> bool:
 
 
 def load_trials(path: str | Path) -> TrialSheet:
-    """Reads a trials file; see `core.schema.load_document`."""
+    """Reads a trials file; see `core.documents.schema.load_document`."""
     return load_document(path, TrialSheet)
 
 
 def save_trials(sheet: TrialSheet, path: str | Path) -> None:
-    """Writes a trials file anew; see `core.schema.save_document`."""
+    """Writes a trials file anew; see `core.documents.schema.save_document`."""
     save_document(sheet, path, SHEET_HEADER)

@@ -87,8 +87,8 @@ def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
         runs: what `load_sources` returned.
 
     Returns:
-        Columns as in `evaluation.table`; what a run does not have is NaN, or an empty text. `run`
-        is the hash of the run, as in the table.
+        Columns as in `evaluation.records.table`; what a run does not have is NaN, or an empty text.
+        `run` is the hash of the run, as in the table.
     """
     names = list(dict.fromkeys(name for run in runs.values() for name in run.results))
     rows = {key: _row_of(run) for key, run in runs.items()}

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Libraries and scenes of other projects: BURG-Toolkit's, and the YCB object set.
+
+The modules stand for themselves.
+"""
 
 import lazy_loader
 

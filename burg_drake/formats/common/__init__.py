@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What grasp files of other projects have in common.
+
+Read `grasp_format` and `convention` first, then `conversion`.
+"""
 
 import lazy_loader
 

@@ -1,1 +1,4 @@
-"""TODO: what this room owns."""
+"""One module a format of grasps; its `FORMAT` is listed in `formats.grasp_files`.
+
+Read `acronym` as an example.
+"""

@@ -1,4 +1,4 @@
-"""Our own files of grasps, as one format among the others; see `core.grasp_storage`."""
+"""Our own files of grasps, as one format among the others; see `core.grasps.storage`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ FORMAT = GraspFormat(
     title="burg_drake",
     suffixes=(".h5", ".npz", ".hdf5"),
     frame="object",
-    source="core/grasp_storage.py of this project",
+    source="core/grasps/storage.py of this project",
     carries=("everything",),
     cannot_carry=(),
     X_GF=_X_GF,

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The screen of the open hand against a scene, with the geometry that Drake has.
+
+Read `hand_clearance` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Sets of grasps compared: coverage, rankings, average precision.
+
+Read `matching` and `summary` first.
+"""
 
 import lazy_loader
 

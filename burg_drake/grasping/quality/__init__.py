@@ -1,4 +1,8 @@
-"""TODO: what this room owns."""
+"""Analytic quality of grasps: what two compliant pads with friction can bear.
+
+Read `metrics` first; it goes from `contacts` over `pad_indentation` and `wrench_space` to
+`wrench_margins`.
+"""
 
 import lazy_loader
 

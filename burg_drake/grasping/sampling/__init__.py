@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Antipodal grasps on meshes.
+
+Read `antipodal` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""How far apart grasps are, the nearest ones of a set, and diverse subsets.
+
+Read `pose_distance` first.
+"""
 
 import lazy_loader
 

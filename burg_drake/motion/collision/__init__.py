@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Whether postures and motions of the arm are free, by Drake's collision checker.
+
+Read `checker` first, then `edge_checker`.
+"""
 
 import lazy_loader
 

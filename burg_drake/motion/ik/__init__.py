@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Inverse kinematics: closed form for the Panda, numeric for others, or one's own.
+
+Read `routine` and `solutions` first; `limits` says how fast joints may move.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The straight parts of a grasp's motion as chains of postures.
+
+Read `line_search` and `line_poses` first, then `closed_form` and `numeric_search`.
+"""
 
 import lazy_loader
 

@@ -21,7 +21,7 @@ Single = NDArray[np.float32]
 FAR = np.float32(np.inf)
 CROSSINGS = np.arange(BRANCHES) ^ np.array([[2], [1]])
 """(2, 8) the branches that branches can go over into: those with the other sign in problem 2 of
-`motion.panda_ik`, which meet in a fold, and those with the other sign in problem 3, which meet
+`motion.ik.panda`, which meet in a fold, and those with the other sign in problem 3, which meet
 where the upper arm is upright."""
 
 

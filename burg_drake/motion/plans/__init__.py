@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Timed motions of an arm, and the files that hold them.
+
+Read `trajectory` and `planned_motion` first, then `grasp_plan`; JSON and CSV share `plan_record`.
+"""
 
 import lazy_loader
 

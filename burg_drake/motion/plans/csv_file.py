@@ -1,5 +1,5 @@
 """Plans as tables: CSV with a row a sample, and beside it a file by the standard of CSV on the Web
-that has the units of its columns and what the plan is for; see `core.csv_web`.
+that has the units of its columns and what the plan is for; see `core.grasps.csv_metadata_file`.
 
 Columns are `t` [s], `phase`, `q_JOINT`, `v_JOINT` and `a_JOINT` of each joint, and `width`, the
 wanted distance between the pads [m]: from when the hand closes that of the target, on which it

@@ -1,6 +1,6 @@
 """The distance between bodies of the robot, at many configurations of the joints between them.
 
-By the project's own search (`grasping.distance`), as Drake's is wrong by centimetres for some boxes
+By the project's own search (`geometry.distance`), as Drake's is wrong by centimetres for some boxes
 with parallel edges (drake 1.51), and a table is trusted for all that lies around its entries.
 """
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Whether the arm can execute a grasp all the way, and what hinders it if it cannot.
+
+Read `arm_reach` and `verdict` first, then `attempt`.
+"""
 
 import lazy_loader
 

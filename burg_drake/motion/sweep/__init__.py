@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What hand and target meet on their straight paths, before any arm is asked.
+
+Read `hand_sweep` first, then `target_sweep`.
+"""
 
 import lazy_loader
 

@@ -2,10 +2,10 @@
 without the arm.
 
 A way is judged as a whole, not at samples: what a convex part sweeps along a straight way is convex
-(`motion.swept_shapes`), so that one overlap and one distance tell whether the way is free, and how
+(`geometry.swept`), so that one overlap and one distance tell whether the way is free, and how
 far from everything it stays.
 
-Nothing here depends on what else is in a batch, not in its last bit: see `grasping.convex`.
+Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 At rest it lies on the table or leans on others, and shapes overlap a little where they touch: what
 it touches counts where it gets deeper than that. All else may not be overlapped at all.
 
-Nothing here depends on what else is in a batch, not in its last bit: see `grasping.convex`.
+Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Time for paths, within the limits of joints, and straight where the hand goes straight.
+
+Read `grasp_timing` first; it rests on `cubics`.
+"""
 
 import lazy_loader
 

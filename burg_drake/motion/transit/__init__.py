@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Free motions from home to the postures in which the straight parts begin.
+
+Read `home_tree` first, then `roadmap`; `goal_search` is the last resort.
+"""
 
 import lazy_loader
 

@@ -113,5 +113,5 @@ class HomeTree:
         return paths
 
     def shortcut(self, path: Array) -> Array:
-        """A way with the same ends that is no longer; see `motion.shortcut`."""
+        """A way with the same ends that is no longer; see `motion.transit.shortcutting`."""
         return shortcut(self.edges, path, self.roadmap.scale)

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What an arm reaches of a board, and what a station can do.
+
+Read `reachability` first, then `station_check`.
+"""
 
 import lazy_loader
 

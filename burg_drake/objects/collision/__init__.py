@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What of an object touches others in simulation: a primitive, convex pieces, or the mesh.
+
+Read `contact` first; `fit` says how well it stands for the object.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The object library: its document, its entries and the files that it writes.
+
+Read `entry` and `document` first.
+"""
 
 import lazy_loader
 

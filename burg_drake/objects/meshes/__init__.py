@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Meshes read, scaled, repaired and closed.
+
+Read `surface` first, which puts the others to use.
+"""
 
 import lazy_loader
 

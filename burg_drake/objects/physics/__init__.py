@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Mass properties of objects and how they come to rest.
+
+Read `mass` and `stability` first.
+"""
 
 import lazy_loader
 

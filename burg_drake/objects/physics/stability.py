@@ -1,7 +1,7 @@
 """How an object comes to rest on a horizontal plane, and how often.
 
-Quasi-static: the minima of the landscape (see `objects.landscape`) are the stable poses. Two minima
-are one pose
+Quasi-static: the minima of the landscape (see `objects.physics.landscape`) are the stable poses.
+Two minima are one pose
 
 - when a tilt of a few degrees leads from one to the other (facets of a rolling surface, dents of a
   scan), and

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Room for objects: laid out at random, packed, or hung above a heap.
+
+Read `arranging` first; it asks `occupancy`, which moves shapes by `sweep` and `polygons`.
+"""
 
 import lazy_loader
 

@@ -3,7 +3,7 @@
 Only geometry, without physics. But for what touches, objects are held apart by what their convex
 pieces cover of the board, which is quick, and on the safe side: nothing overlaps, and nothing
 stands under another one's overhang. What touches is pushed together until pieces of both are in
-contact (see `scene.sweep`).
+contact (see `scene.arrangement.sweep`).
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def arrange(
         layout: how they stand to one another.
         poses: how stable poses are drawn.
         obstacles: points (N, 3) of convex bodies in S that are in the way [m], such as those of
-            `scene.arrangement.corners` and boxes of a station.
+            `scene.arrangement.occupancy.corners` and boxes of a station.
         tries: places to look at for each object.
         needs_all: stop at the first object that finds no place.
 

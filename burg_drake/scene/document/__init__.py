@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The scene document with its board and markers, and the recipe of sampled scenes.
+
+Read `scene`, `board` and `markers` first, then `validation`.
+"""
 
 import lazy_loader
 

@@ -33,7 +33,7 @@ class Board:
 
     @cached_property
     def layout(self) -> MarkerLayout:
-        """Where its markers lie; see `scene.markers.marker_layout`.
+        """Where its markers lie; see `scene.document.markers.marker_layout`.
 
         Raises:
             InvalidInputError: they do not fit.

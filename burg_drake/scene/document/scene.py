@@ -110,7 +110,8 @@ class Scene:
         """Refuses a board whose markers cannot be, before anything is done with them.
 
         Raises:
-            InvalidInputError: see `scene.markers.marker_layout`; it names the file and the key.
+            InvalidInputError: see `scene.document.markers.marker_layout`; it names the file and the
+            key.
         """
         try:
             _ = self.board.layout
@@ -209,5 +210,5 @@ def as_scene(scene: SceneLike) -> Scene:
 
 
 def save_scene(document: SceneDocument, path: str | Path) -> None:
-    """Writes a scene file; see `core.schema.save_document`."""
+    """Writes a scene file; see `core.documents.schema.save_document`."""
     save_document(document, path)

@@ -1,7 +1,7 @@
 """Whether a scene can be built as its document says: bounds of the board, contact with the ground.
 
 Only geometry is looked at here. Overlaps of bodies depend on the contact geometry that the station
-diagram holds; `station.check` finds those.
+diagram holds; `station.checks.scene_issues` finds those.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Whether and where objects come to rest, and how close to each other they stand.
+
+Read `criterion` first, then `relaxation` and `drift`.
+"""
 
 import lazy_loader
 

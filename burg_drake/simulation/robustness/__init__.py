@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""How much a grip bears: tugs, less friction, poses that are not quite right.
+
+Read `hold_force` and `perturbation` first.
+"""
 
 import lazy_loader
 

@@ -1,7 +1,7 @@
 """How hard a held target can be tugged and shaken until it leaves the hand.
 
-The loads are those of `simulation.grip`: forces on the target's centre of mass, in units of its
-weight, which is what it feels when the hand is accelerated the other way. The inertia of the
+The loads are those of `simulation.robustness.grip`: forces on the target's centre of mass, in units
+of its weight, which is what it feels when the hand is accelerated the other way. The inertia of the
 fingers is left out.
 """
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Scenes and single objects brought to rest, on the board.
+
+Read `settled_scene` first, then `drop_test` and `resting_poses`.
+"""
 
 import lazy_loader
 

@@ -1,10 +1,10 @@
 """Confirms the resting poses of an object: dropped on a table with small tilts, it comes to rest
 near the pose, or the pose is not kept.
 
-The quasi-static poses (see `objects.stable_poses`) know neither momentum nor what of the object
-touches in simulation. Each is dropped from just above the table, tilted to several sides; the
-first tilt is to the side on which it topples most easily. All drops use one compiled diagram with
-one instance of the object, one after the other through the Context: a drop can neither touch
+The quasi-static poses (see `objects.physics.stability`) know neither momentum nor what of the
+object touches in simulation. Each is dropped from just above the table, tilted to several sides;
+the first tilt is to the side on which it topples most easily. All drops use one compiled diagram
+with one instance of the object, one after the other through the Context: a drop can neither touch
 another object nor wait for it, and the result of each is that of the drop alone.
 
 The figures of the world in which objects are dropped are constants, and so are the object's density

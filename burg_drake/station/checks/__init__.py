@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Whether scenes can stand on a station, and how far objects can be moved there.
+
+Read `scene_issues` first; `scene_check` answers again and again while a scene changes.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Drivers, controllers and measurements of a robot as systems of Drake.
+
+Read `ports` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The one builder of Drake diagrams, and handles of the robot in them.
+
+Read `builder` and `station_diagram` first, then `floating_hand` and `mounted_hand`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Documents of stations and hands, and presets of engines.
+
+Read `station_document` and `gripper_document` first, then `engine` and `grasp_motion`.
+"""
 
 import lazy_loader
 

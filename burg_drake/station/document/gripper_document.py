@@ -1,6 +1,6 @@
 """The gripper document: a parallel hand as data.
 
-Whether it fits its model is the matter of `station.hand_check`.
+Whether it fits its model is the matter of `station.world.hand_check`.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class Arm:
         X_WA: arm base in the world.
         home: joint positions of the home posture [rad].
         velocity, acceleration, jerk: limits of each joint [rad/s, rad/s^2, rad/s^3], in place of
-            those that `motion.limits` finds in the model or knows of the Panda.
+            those that `motion.ik.limits` finds in the model or knows of the Panda.
         stands_in: `table` and fixed boxes that the base's own collision shapes may be in, as a
             base plate is in the table that it is let into; links that move still collide with them.
         control: how it follows its command.
@@ -165,7 +165,7 @@ class StationDocument:
         background: fixed boxes by name.
         motion: how the hand goes to a grasp and away from it, where nothing else is asked for.
         packages: folders of packages, by name, that models name in `package://NAME/...`, where
-            `core.packages` does not find them by itself.
+            `core.paths.packages` does not find them by itself.
     """
 
     version: int = 1

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What stands in a plant: robot, objects, table, board, obstacles and cameras.
+
+Read `robot`, `instances` and `surroundings` first.
+"""
 
 import lazy_loader
 

@@ -35,7 +35,7 @@ PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
 def add_models(
     parser: Parser, path: Path, packages: Packages = NO_PACKAGES
 ) -> list[ModelInstanceIndex]:
-    """As `parser.AddModels(path)`, sooner, and with the packages that `core.packages` finds.
+    """As `parser.AddModels(path)`, sooner, and with the packages that `core.paths.packages` finds.
 
     Args:
         parser: from now on it knows the packages that this model names, in place of others of the

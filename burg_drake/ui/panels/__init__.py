@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The panels of the setup page, a module each.
+
+Read `object` as an example.
+"""
 
 import lazy_loader
 

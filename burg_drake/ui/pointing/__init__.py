@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Mouse and keys in the view: selecting, dragging, moving by handles.
+
+Read `picking` and `object_drags` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Who may open a page, and what browsers may send.
+
+Read `door` first, then `guarded_viser` and `admission`.
+"""
 
 import lazy_loader
 

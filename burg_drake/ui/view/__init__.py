@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What the page shows of a scene in three dimensions.
+
+Read `board` and `objects` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What panels are made of, and the one queue that all actions go through.
+
+Read `action_queue` and `page_actions` first.
+"""
 
 import lazy_loader
 

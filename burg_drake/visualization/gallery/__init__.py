@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Libraries and grasp frames laid out side by side.
+
+Read `library` first, then `layout`.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Grasps drawn in groups of one colour each.
+
+Read `groups` and `mesh` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""What goes into Meshcat: meshes, text, hands, and where its eye is.
+
+The modules stand for themselves.
+"""
 
 import lazy_loader
 

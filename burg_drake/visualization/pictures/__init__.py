@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Still pictures and pages of pictures, without a browser that steps a scene.
+
+The modules stand for themselves.
+"""
 
 import lazy_loader
 

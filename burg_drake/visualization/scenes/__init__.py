@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""A scene, a station or a trial in Meshcat.
+
+Read `scene` first, then `replay`.
+"""
 
 import lazy_loader
 

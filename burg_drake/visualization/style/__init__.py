@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Colours, legends and HTML elements of pages.
+
+Read `palette` and `markup` first.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The page of `burg-drake trials serve`, on which trials are entered as they are carried out.
+
+`server` comes first; `entry_requests` reads what browsers send.
+"""
 
 import lazy_loader
 

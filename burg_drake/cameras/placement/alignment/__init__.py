@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""One object aligned with an image: by its outline in a photo, or by its surface in a depth image.
+
+Read `aligner`, then `silhouette_aligner` and `depth_aligner`; `least_squares` fits.
+"""
 
 import lazy_loader
 

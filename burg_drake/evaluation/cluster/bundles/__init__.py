@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""Judges on their way to other machines, with all files that Drake reads.
+
+Read `bundle` first, then `bundled_judge` and `judge_recipe`.
+"""
 
 import lazy_loader
 

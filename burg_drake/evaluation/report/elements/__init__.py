@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The parts that sections of reports are made of: blocks, charts, drawings.
+
+Read `blocks` first; `page_frame` makes a page of them.
+"""
 
 import lazy_loader
 

@@ -1,4 +1,7 @@
-"""TODO: what this room owns."""
+"""The sections of the report, a module or so each.
+
+`opening` and `cascade` come first in the page, `reproduction` last.
+"""
 
 import lazy_loader
 

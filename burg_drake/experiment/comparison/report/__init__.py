@@ -1,4 +1,7 @@
-"""The page of a comparison, in the style of the report of a run."""
+"""The page of a comparison, in the style of the report of a run.
+
+Read `page` first.
+"""
 
 import lazy_loader
 

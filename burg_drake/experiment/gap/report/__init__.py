@@ -1,4 +1,7 @@
-"""What is said about the gap: a page, sections of pages, tables for terminals."""
+"""What is said about the gap: a page, sections of pages, tables for terminals.
+
+Read `page` first.
+"""
 
 import lazy_loader
 
