@@ -48,7 +48,7 @@ class Figures:
     """What was measured, over all objects.
 
     Attributes:
-        seconds, asked: CPU time [s] and number of grasps of each of `FLIPS`.
+        seconds, asked: CPU time [s] and number of grasps of each of `WAYS`.
         clear, lost: grasps that are clear, and those of them that `conservative` rejects.
         odd: grasps that Drake judges differently: larger depth [m] and a line each.
         judged: grasps that Drake was asked about.

@@ -31,8 +31,7 @@ def run_grasps(run: Run) -> GraspSet:
         `evaluation.records.table`; NaN or empty for grasps that are not judged yet. What came with
         the grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column
         of that name. The identifier of a grasp is the run's without the instance. The provenance
-        names
-        the run, its copies of scene and station, and the hand, and describes the objects.
+        names the run, its copies of scene and station, and the hand, and describes the objects.
     """
     candidates, results = run.candidates, run.results
     row = {id: i for i, id in enumerate(candidates.id)}
