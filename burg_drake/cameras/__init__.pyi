@@ -48,8 +48,8 @@ from .pose.estimator import (
 )
 from .projection.visibility import visible_from as visible_from
 from .rectification.stream import (
-    BoardView as BoardView,
-    board_views as board_views,
+    BoardObservation as BoardObservation,
+    board_observations as board_observations,
 )
 from .rectification.top_view import (
     BoardPicture as BoardPicture,

@@ -139,9 +139,9 @@ def test_the_entries_longest_unused_go_first(folder: Path, monkeypatch: pytest.M
 
 def test_several_processes_at_once(folder: Path) -> None:
     program = (
-        "import numpy as np; from burg_drake.core.cache import kept\n"
+        "import numpy as np; from burg_drake.core.cache import cached\n"
         "for k in range(30):\n"
-        "    x = kept('thing', f'{k % 5}' * 64, lambda: {'x': np.full(20_000, k % 5)})['x']\n"
+        "    x = cached('thing', f'{k % 5}' * 64, lambda: {'x': np.full(20_000, k % 5)})['x']\n"
         "    assert (x == k % 5).all() and len(x) == 20_000"
     )
     running = [
