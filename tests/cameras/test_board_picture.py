@@ -9,7 +9,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.cameras.board_observations import view
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.rectification.stream import board_observations
@@ -19,6 +18,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, transform_points
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
+from tests.cameras.board_views import view
 from tests.cameras.live_views import Pictures
 from tests.cameras.paper_photos import photo, shown_at
 
