@@ -181,8 +181,8 @@ class SceneFolder:
                 stream.write(row.text())
         except OSError as error:
             raise InvalidInputError(
-                f"cannot write {self._table}: {error.strerror}; what is there is kept, and the same"
-                " command goes on from there"
+                f"cannot write {self._table}: {error.strerror}; what is there is kept; run the"
+                " same command to continue"
             ) from error
         self.rows[row.scene] = row
 
@@ -216,7 +216,7 @@ def read_table(path: Path) -> list[SceneRow]:
     """The rows of a table; lines that cannot be read, such as a torn last one, count as not there.
 
     Raises:
-        InvalidInputError: it is no file, or cannot be read.
+        InvalidInputError: it is not a file, or cannot be read.
     """
     if not path.exists():
         return []

@@ -1,4 +1,4 @@
-"""Convex shapes swept along a straight way: all places that a shape passes, as convex shapes.
+"""Convex shapes swept along a straight segment: all places that a shape passes, as convex shapes.
 
 What a shape sweeps when it is moved along a segment is the sum of the two, which is convex. So a
 whole straight motion is judged by one overlap, and by one distance, without samples.

@@ -339,7 +339,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert main(["compare", str(first.path), *wrong]) == 2
         assert capsys.readouterr().err.startswith("burg-drake: error: ")
     assert main(["compare", str(sheet), str(first.path)]) == 2
-    assert "is no run; give the run first" in capsys.readouterr().err
+    assert "is not a run; give the run first" in capsys.readouterr().err
     assert OFFERED == SUCCESSES and DEFAULT_LIMIT_MM == LIMIT_MM
 
 

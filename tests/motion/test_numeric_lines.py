@@ -29,8 +29,8 @@ from burg_drake.station.document.station_document import load_station
 SETTINGS = ReachSettings()
 MOTION = GraspMotion()
 CLEARANCE = 2e-3
-"""Of the hand on its way [m]; lets it be beside the straight way by half of it, but by no more than
-`SETTINGS.deviation[1]`."""
+"""Of the hand on its way [m]; lets it be beside the straight segment by half of it, but by no more
+than `SETTINGS.deviation[1]`."""
 
 
 class Arm:

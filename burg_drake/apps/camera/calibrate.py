@@ -79,7 +79,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
     from burg_drake.core.files import require_writable
 
     if bool(arguments.images) == bool(arguments.camera):
-        raise InvalidInputError("give images of the target, or --camera; one of both")
+        raise InvalidInputError("give images of the target, or --camera; not both")
     for output in (arguments.output, arguments.report):
         if output:
             require_writable(output)

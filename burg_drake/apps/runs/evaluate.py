@@ -112,7 +112,7 @@ def add_to(verbs: Any) -> None:
         " a hundred. burg-drake report RUN/scenes/NAME makes one later",
     )
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_evaluate(arguments: argparse.Namespace) -> int:

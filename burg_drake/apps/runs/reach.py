@@ -54,8 +54,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
         "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
         "",
-        "A grasp is reachable if the open hand is clear, also on the straight way in, and with",
-        "the object in it on the straight ways back and up, the arm can follow them, and it finds",
+        "A grasp is reachable if the open hand is clear, also on the straight approach, and with",
+        "the object in it on the straight retreat and lift, the arm can follow them, and it finds",
         "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
         "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
         "does that.",
@@ -126,7 +126,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
     if arguments.plans:
         require_writable(Path(arguments.plans) / "plan")
-        arguments.after_interrupt = "; the same command goes on from here"
+        arguments.after_interrupt = "; run the same command to continue"
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     require_valid_scene(scene, station)

@@ -84,7 +84,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
     recipe = recipe_of(arguments, library, station, output.parent if single else output)
     if single:
         return _one(arguments, recipe, library, station)
-    arguments.after_interrupt = "; what is done is kept, and the same command goes on from there"
+    arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     return _many(arguments, recipe, library, station)
 
 

@@ -152,7 +152,7 @@ class ViewActions:
             )
         with self._lock:
             if self.checking:
-                raise InvalidInputError("a placement check is at work already")
+                raise InvalidInputError("a placement check is already running")
             self.checking = True
             self._check = threading.Thread(
                 target=self._measure, args=(picture,), name="placement check", daemon=True

@@ -183,7 +183,7 @@ def checked_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
 
     Raises:
         InvalidInputError: an opacity outside 0 to 1.
-        UnknownNameError: `guide` is no instance of the scene.
+        UnknownNameError: `guide` is not an instance of the scene.
     """
     if not 0.0 <= settings.opacity <= 1.0:
         raise InvalidInputError(f"opacity {settings.opacity:g} is not a number from 0 to 1")

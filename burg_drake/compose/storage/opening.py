@@ -177,5 +177,5 @@ def _folder(folder: str | Path | None) -> Path:
     """
     path = Path.cwd() if folder is None else Path(folder)
     if not path.is_dir():
-        raise InvalidInputError(f"{path} is no folder; give one for the scenes")
+        raise InvalidInputError(f"{path} is not a folder; give one for the scenes")
     return path.resolve()

@@ -128,7 +128,7 @@ def require_grasps(where: str, n: int) -> None:
     """
     if n > MOST_GRASPS:
         raise InvalidInputError(
-            f"{where} has {n:,} grasps; a file may have {MOST_GRASPS:,}. Divide it"
+            f"{where} has {n:,} grasps; a file may have {MOST_GRASPS:,}; split it"
         )
 
 

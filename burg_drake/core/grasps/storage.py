@@ -80,7 +80,7 @@ def read_grasp_file(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
     """
     header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
     if not isinstance(header["provenance"], dict):
-        raise ValueError("its provenance is no mapping")
+        raise ValueError("its provenance is not a mapping")
     provenance = with_resolved_references(header["provenance"], path.absolute().parent)
     return provenance, fixed, columns
 

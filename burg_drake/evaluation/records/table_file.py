@@ -69,7 +69,7 @@ def require_table(path: Path) -> None:
     """
     if path.suffix not in (".csv", ".parquet"):
         raise InvalidInputError(
-            f"{path} is no table of a known format; give a file that ends in .csv or .parquet,"
+            f"{path} is not a table of a known format; give a file that ends in .csv or .parquet,"
             f" such as {path.with_suffix('.csv') if path.name else 'table.csv'}"
         )
     require_writer(path.suffix.removeprefix("."))

@@ -141,7 +141,7 @@ class LabCamera:
         self.watch(number)
         with self._lock:
             if self.is_checking:
-                raise InvalidInputError("a placement check is at work already")
+                raise InvalidInputError("a placement check is already running")
             view = self._view
             assert view is not None
             stale = view.live.request_pictures()

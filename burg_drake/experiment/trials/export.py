@@ -154,7 +154,7 @@ def _factory(
     station = run.station() if station is None else as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
-            f"station {station.name!r} of {run.path} has no arm, of which one could have motions;"
+            f"station {station.name!r} of {run.path} has no arm to plan motions for;"
             " give another one by --station"
         )
     require_usable_arm(scene, station)

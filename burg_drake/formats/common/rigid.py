@@ -46,7 +46,7 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
         mirrored = np.linalg.det(R) < 0.0
     off = np.where(np.isnan(off), np.inf, off)
     _refuse(mirrored, where, "is a mirror image, not a rotation")
-    _refuse(off > ROUNDING, where, "is no rotation: not orthonormal by", off)
+    _refuse(off > ROUNDING, where, "is not a rotation: not orthonormal by", off)
     U, _, Vt = np.linalg.svd(R)
     notes: tuple[str, ...] = ()
     if (off > NOTED).any():

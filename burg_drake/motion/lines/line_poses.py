@@ -24,7 +24,7 @@ class LinePoses:
         X_GH: (4, 4) hand body in the grasp frame.
         R_WA: (3, 3) the arm's base in the world.
         direction_W: (3,) unit vector of the lift.
-        standoff, retreat, lift: lengths of the three straight ways [m].
+        standoff, retreat, lift: lengths of the three straight segments [m].
     """
 
     X_GH: Array

@@ -105,6 +105,6 @@ class LineSearch(Protocol):
             X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with the fingers either way; which of
                 the two comes first does not depend on how a grasp was given.
             clearance: (N, 2) of the hand on its way with the fingers either way [m]: the hand may
-                deviate from the straight way by a fraction of it.
+                deviate from the straight segment by a fraction of it.
         """
         ...

@@ -1,9 +1,9 @@
 """Chains of postures from pregrasp over grasp to the top of the lift, for any serial arm.
 
 Postures at the grasp come from whoever solves the arm's inverse kinematics, numerically or in
-closed form. Each is followed along both straight ways, step by step, which makes a chain unless a
-joint gets to its limit or jumps. The best chain is filled in until the hand goes straight, and held
-against bounds of the arm's clearance; what collides is put out, and the next takes its place.
+closed form. Each is followed along both straight segments, step by step, which makes a chain unless
+a joint gets to its limit or jumps. The best chain is filled in until the hand goes straight, and
+held against bounds of the arm's clearance; what collides is put out, and the next takes its place.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ FLIPS = (
     (RETREAT, Outcome.RETREAT_LINE),
     (LIFT, Outcome.LIFT_LINE),
 )
-"""The hand's straight ways in their order."""
+"""The hand's straight segments in their order."""
 
 
 class NumericLineSearch:

@@ -76,7 +76,7 @@ def read_csv(path: Path) -> PlannedMotion:
     joints = tuple(name[2:] for name in header if name.startswith("q_"))
     if not joints or header != list(_meanings(joints)):
         raise InvalidInputError(
-            f"{path} is no plan: its columns are not t, phase, q_JOINT, v_JOINT, a_JOINT, width"
+            f"{path} is not a plan: its columns are not t, phase, q_JOINT, v_JOINT, a_JOINT, width"
         )
     beside = metadata_path(path)
     try:
@@ -118,7 +118,7 @@ def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
             values[k] = [_number(c, m, line) for c, m in zip(row[2:-1], names, strict=True)]
     if not np.isfinite(values).all():
         k, column = np.argwhere(~np.isfinite(values))[0]
-        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is no finite number")
+        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is not a finite number")
     q, v, a = np.hsplit(values, 3)
     if data is None:
         data = _described_by_rows(rows, t, spans)

@@ -87,13 +87,13 @@ def plan_data(plan: PlannedMotion) -> dict[str, Any]:
 
 
 def require_version(data: Any, path: str | Path) -> None:
-    """Refuses what is no plan, or one of another release.
+    """Refuses what is not a plan, or one of another release.
 
     Raises:
         InvalidInputError: it is not.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InvalidInputError(f"{path} is no plan: it lacks format {FORMAT!r}")
+        raise InvalidInputError(f"{path} is not a plan: it lacks format {FORMAT!r}")
     if data.get("version") != VERSION:
         raise InvalidInputError(
             f"{path} has version {quoted(data.get('version'))}; this release reads {VERSION}"

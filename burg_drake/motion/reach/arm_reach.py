@@ -51,7 +51,7 @@ class ArmReach:
 
     Attributes:
         settings: how thoroughly it looks.
-        motion: the hand's straight ways to a grasp and away from it.
+        motion: the hand's straight segments to a grasp and away from it.
         kinematics: the arm on its own.
         diagram: the station diagram of the checks.
         collision: the arm in the scene, by Drake's checker.

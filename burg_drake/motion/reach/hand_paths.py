@@ -1,4 +1,4 @@
-"""What the hand alone decides about grasps: its straight ways with the fingers either way."""
+"""What the hand alone decides about grasps: its straight segments with the fingers either way."""
 
 from __future__ import annotations
 

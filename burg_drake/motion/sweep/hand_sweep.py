@@ -1,9 +1,9 @@
-"""The hand on its straight ways to a grasp, back from it and along the lift, for many grasps,
+"""The hand on its straight segments to a grasp, back from it and along the lift, for many grasps,
 without the arm.
 
-A way is judged as a whole, not at samples: what a convex part sweeps along a straight way is convex
-(`geometry.swept`), so that one overlap and one distance tell whether the way is free, and how
-far from everything it stays.
+A way is judged as a whole, not at samples: what a convex part sweeps along a straight segment is
+convex (`geometry.swept`), so that one overlap and one distance tell whether the way is free, and
+how far from everything it stays.
 
 Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
@@ -176,7 +176,7 @@ class HandSweep:
         u_W: Array,
         length: float,
     ) -> Sweep:
-        """The hand around the target on straight ways from N poses (N, 4, 4).
+        """The hand around the target on straight segments from N poses (N, 4, 4).
 
         Args:
             instance: the target, which does not count.

@@ -60,7 +60,7 @@ def time_motion(
     Args:
         witness: the paths.
         limits: of the joints; none is exceeded.
-        kinematics: the arm, to measure the way of the hand.
+        kinematics: the arm, to measure the path length of the hand.
         settings: how fast, how close to the paths.
         checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
             at each corner; without one for a line, it keeps to a spline through the waypoints.

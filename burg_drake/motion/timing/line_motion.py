@@ -1,5 +1,5 @@
-"""Motions of the hand along a straight line: the joint path is smooth in the way of the hand, and
-the hand has its own limits of speed and acceleration."""
+"""Motions of the hand along a straight line: the joint path is smooth in the path length of the
+hand, and the hand has its own limits of speed and acceleration."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class HandSpeed:
 
 @dataclass(frozen=True, eq=False)
 class PathMotion:
-    """A motion along a path that is given by the way of the hand.
+    """A motion along a path that is given by the path length of the hand.
 
     Attributes:
         path: joint positions (n,) over the way [m], with continuous second derivatives.

@@ -31,7 +31,7 @@ LEVER = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LinePath:
-    """A straight way of the hand, with an arm that does not go straight in joint space.
+    """A straight segment of the hand's path, with an arm that does not go straight in joint space.
 
     Attributes:
         rows: (K, n) joint positions along it.
@@ -63,8 +63,9 @@ class LinePath:
         return float(self.travel[-1])
 
     def paths(self, smoother: bool) -> Iterator[CubicSpline]:
-        """Joint positions by the way of the hand [m]: first a spline that is close to the rows;
-        then, if they are wanted, smoother and smoother ones; last one that is closer to the line.
+        """Joint positions by the path length of the hand [m]: first a spline that is close to the
+        rows; then, if they are wanted, smoother and smoother ones; last one that is closer to the
+        line.
         """
         wanted = [(SPACING, 0.0), *((SPACING, weight) for weight in SMOOTHING if smoother)]
         for spacing, weight in (*wanted, (FINE_SPACING, 0.0)):

@@ -22,7 +22,7 @@ SPACING = 0.01
 NEGLIGIBLE_LOAD = 0.01
 """Relative difference of loads that does not count."""
 DIGITS = 3
-"""Of directions: a plan may leave its straight way by half a millimetre."""
+"""Of directions: a plan may leave its straight segment by half a millimetre."""
 
 
 class ArmCarrier:
@@ -175,7 +175,7 @@ class ArmCarrier:
 
 
 def _segment(commands: CommandSequence) -> HandSegment:
-    """The straight way along which a course leads the hand."""
+    """The straight segment along which a course leads the hand."""
     p_GG_W = commands.p_WG[-1] - commands.p_WG[0]
     direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), DIGITS)
     direction_W /= np.linalg.norm(direction_W)

@@ -11,7 +11,7 @@ from burg_drake.simulation.trials.contacts import BodyContact
 
 @dataclass(frozen=True, eq=False)
 class HandSegment:
-    """A straight way of the hand with the target, from rest to rest.
+    """A straight segment of the hand with the target, from rest to rest.
 
     Attributes:
         direction_W: (3,) unit vector in the world.

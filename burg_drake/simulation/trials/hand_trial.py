@@ -157,13 +157,13 @@ class HandTrial(GraspTrial):
             One or two, each longer than 0.
 
         Raises:
-            InvalidInputError: there is no way at all, or a length is not one.
+            InvalidInputError: the hand would not move, or a length is not one.
         """
         height = self.motion.lift_height if lift is None else lift
         if not 0.0 <= height < math.inf or self.motion.retreat + height <= 0.0:
             raise InvalidInputError(
-                f"lift is {height:g} m; with a retreat of {self.motion.retreat:g} m that is no way"
-                " of the hand; give more than 0"
+                f"lift is {height:g} m and retreat {self.motion.retreat:g} m, with which the hand"
+                " would not move; give more than 0"
             )
         paths = (
             LiftPath(-X_WG[:3, 2], self.motion.retreat),

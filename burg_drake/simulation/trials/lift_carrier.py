@@ -21,7 +21,7 @@ DOWN = -1e-6
 
 
 class LiftPath(NamedTuple):
-    """A straight way of the hand.
+    """A straight segment of the hand's path.
 
     Attributes:
         direction_W: (3,) unit vector in the world.

@@ -19,7 +19,7 @@ GAP = 0.002
 
 
 class HandLiftClearance:
-    """Looks along the straight way ahead of one target in the hand.
+    """Looks along the straight segment ahead of one target in the hand.
 
     Args:
         station_diagram: a diagram built with `robot="hand"`.

@@ -103,8 +103,8 @@ class PlanPlayer:
             it ends.
 
         Raises:
-            InvalidInputError: it is no plan, or one for another arm, scene or station; or the time
-                is no number.
+            InvalidInputError: it is not a plan, or one for another arm, scene or station; or the
+                time is not a number.
         """
         if plan is None:
             return None

@@ -21,7 +21,7 @@ class FloatingHand(HandHandle):
 
     Attributes:
         document, body, fingers, joints, pads: see `HandHandle`.
-        lift: the joint that carries the hand along a straight way.
+        lift: the joint that carries the hand along a straight segment.
 
     Raises:
         InvalidInputError: the diagram has no floating hand.

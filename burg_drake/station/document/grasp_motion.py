@@ -1,4 +1,5 @@
-"""How the hand goes to a grasp and away from it: lengths and directions of the straight ways."""
+"""How the hand goes to a grasp and away from it: lengths and directions of the straight
+segments."""
 
 from __future__ import annotations
 
