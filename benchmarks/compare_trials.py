@@ -24,6 +24,7 @@ import burg_drake as burg
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
@@ -131,9 +132,8 @@ def execute(run: Run, rows: list[int], offsets: np.ndarray, turns: np.ndarray) -
             scene,
             run.station(),
             folder + "/real",
+            settings=EvaluationSettings(engine="screening", mode="hand"),
             grasps=given,
-            engine="screening",
-            mode="hand",
             progress=False,
         )
         outcome = dict(zip(real.results["id"].tolist(), real.results["outcome"], strict=True))

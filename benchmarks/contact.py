@@ -206,8 +206,9 @@ def grasps_of(library: ObjectLibrary, name: str, pose: int, count: int) -> Array
         library.surface(name),
         count,
         rng_from("contact", name, pose),
-        friction=entry.friction,
-        approach_cone=burg.grasps.ApproachCone(down, CONE),
+        burg.grasps.AntipodalSettings(
+            friction=entry.friction, approach_cones=(burg.grasps.ApproachCone(down, CONE),)
+        ),
     ).X_OG
 
 

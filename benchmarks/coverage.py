@@ -25,7 +25,7 @@ import burg_drake as burg
 from burg_drake.core.frames import Array, make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.comparison.matching import coverage, nearest_grasps
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.grasping.similarity.diversity import farthest_points, neighbour_distances
 from burg_drake.grasping.similarity.pose_distance import LEVER
 
@@ -112,7 +112,9 @@ def naive_distances(X_OG: Array, X_OF: Array) -> tuple[Array, Array, Array]:
 def antipodal(name: str, n: int, seed: int) -> GraspSet:
     """Antipodal grasps on an object."""
     surface = burg.load_library("household").surface(name)
-    return sample_antipodal(surface, n, np.random.default_rng(seed), friction=0.5, object=name)
+    return sample_antipodal(
+        surface, n, np.random.default_rng(seed), AntipodalSettings(friction=0.5), object=name
+    )
 
 
 def scattered(name: str, n: int, seed: int) -> GraspSet:

@@ -182,9 +182,13 @@ def scaling(scene: Scene, station: Station, grasps: int) -> None:
         with tempfile.TemporaryDirectory() as out:
             start = time.monotonic()
             run = burg.evaluate(
-                scene, station, Path(out) / "run",
-                grasps_per_object=grasps, workers=workers, mode="hand", progress=False,
-            )  # fmt: skip
+                scene,
+                station,
+                Path(out) / "run",
+                settings=burg.EvaluationSettings(grasps_per_object=grasps, mode="hand"),
+                workers=workers,
+                progress=False,
+            )
             seconds[workers] = time.monotonic() - start
             executed = sum(v.outcome.stage is Stage.EXECUTED for v in run.verdicts.values())
         print(f"  {workers} worker(s): {seconds[workers]:.1f} s, {executed} trials", flush=True)

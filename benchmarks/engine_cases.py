@@ -139,9 +139,11 @@ def clear_grasps(trial: burg.HandTrial, resting: Resting, count: int) -> list[Ar
             scene.library.surface(resting.object),
             BATCH,
             rng_from("engines", resting.id, batch),
-            friction=scene.entry("target").friction,
-            opening=station.hand.opening,
-            approach_cone=cone,
+            burg.grasps.AntipodalSettings(
+                friction=scene.entry("target").friction,
+                opening=station.hand.opening,
+                approach_cones=(cone,),
+            ),
         )
         found = trial.clearance.check_all("target", X_WO @ grasps.X_OG)
         clear += [X for X, c in zip(grasps.X_OG, found, strict=True) if c.outcome is None]

@@ -32,11 +32,11 @@ from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.run.many_scenes import _document
 from burg_drake.evaluation.run.request import Request
 from burg_drake.evaluation.run.scene_list import read_scenes
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign, save_campaign
 from burg_drake.evaluation.store.part_writer import PartWriter
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, create_run
 from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station
 
 T = TypeVar("T")
@@ -82,17 +82,8 @@ def grasps_of(scene: Scene, count: int, rng: np.random.Generator) -> Candidates:
 def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campaign:
     """Writes a run, or the share of it that a shard has."""
     station = load_station("panda_tabletop")
-    request = Request(
-        station=station,
-        engine=ENGINES["standard"],
-        mode="reach",
-        motion=station.document.motion,
-        seed=0,
-        per_object=grasps // 6,
-        approach_angle_deg=75.0,
-        blind=False,
-        shard=shard,
-    )
+    settings = EvaluationSettings(mode="reach", grasps_per_object=grasps // 6, shard=shard)
+    request = Request.of(station, settings)
     loaded = scenes_of(scenes)
     found = read_scenes(loaded)
     folder.mkdir(parents=True)

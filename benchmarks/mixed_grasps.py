@@ -46,9 +46,11 @@ def sampled_set(scene: Scene, station: Station, name: str, count: int) -> burg.G
         scene.library.surface(scene.instance(name).object),
         count,
         rng_from("mixed grasps", name),
-        friction=scene.entry(name).friction,
-        opening=station.hand.opening,
-        approach_cone=burg.grasps.ApproachCone(tuple(down_O), CONE),
+        burg.grasps.AntipodalSettings(
+            friction=scene.entry(name).friction,
+            opening=station.hand.opening,
+            approach_cones=(burg.grasps.ApproachCone(tuple(down_O), CONE),),
+        ),
     )
 
 

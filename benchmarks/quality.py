@@ -25,7 +25,7 @@ from burg_drake.grasping.quality.metrics import Payload, grasp_quality
 from burg_drake.grasping.quality.triangulation import triangulated_ball
 from burg_drake.grasping.quality.wrench_margins import ANY_WRENCH, epsilon_bracket, reaches
 from burg_drake.grasping.quality.wrench_space import WrenchSpace, hull_volume
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 
 FRICTION = 0.4
 TARGET = 5.0
@@ -40,7 +40,9 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=3, help="runs; the best counts")
     arguments = parser.parse_args()
     mesh = lumpy() if arguments.mesh is None else trimesh.load_mesh(arguments.mesh)
-    X_OG = sample_antipodal(mesh, arguments.n, np.random.default_rng(0), friction=FRICTION).X_OG
+    X_OG = sample_antipodal(
+        mesh, arguments.n, np.random.default_rng(0), AntipodalSettings(friction=FRICTION)
+    ).X_OG
     center = mesh.bounds.mean(axis=0)
     payload = Payload(mass=0.3, center_of_mass=tuple(center), friction=FRICTION)
     print(f"{len(mesh.faces):,} faces, {len(X_OG):,} grasps")

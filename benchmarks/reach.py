@@ -29,7 +29,7 @@ from burg_drake.core.content import rng_from
 from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.motion.ik.panda import PandaIk
 from burg_drake.motion.lines.reach_settings import ReachSettings
 from burg_drake.motion.reach.arm_reach import ArmReach, Reach
@@ -150,7 +150,7 @@ def clear_grasps(scene: Scene, station: Station, count: int) -> Grasps:
         entry = scene.entry(name)
         mesh = scene.library.surface(scene.instance(name).object)
         rng = rng_from("benchmark reach", name)
-        sampled = sample_antipodal(mesh, SAMPLED, rng, friction=entry.friction)
+        sampled = sample_antipodal(mesh, SAMPLED, rng, AntipodalSettings(friction=entry.friction))
         X_WG = diagram.X_WO(name) @ sampled.X_OG
         clear = np.flatnonzero(clearance.measure(name, X_WG).clear)
         instance += [name] * len(clear)

@@ -23,7 +23,7 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.frames import Array
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.grasping.sampling.approach import ApproachCone
 from burg_drake.objects.library.document import load_library
 
@@ -35,8 +35,8 @@ DOWN = ApproachCone((0.0, 0.0, -1.0), np.deg2rad(75.0))
 SIDE = ApproachCone((1.0, 0.0, 0.0), np.pi / 2)
 OPTIONS: dict[str, dict[str, Any]] = {
     "plain": {},
-    "from above": {"approach_cone": DOWN},
-    "above, one side": {"approach_cone": (DOWN, SIDE)},
+    "from above": {"approach_cones": (DOWN,)},
+    "above, one side": {"approach_cones": (DOWN, SIDE)},
     "4 approaches": {"approaches": 4},
     "3 standoffs": {"standoffs": (0.0, 0.004, -0.004)},
     "weights": {},
@@ -92,11 +92,13 @@ def print_options(
 def best_rate(mesh: trimesh.Trimesh, n: int, repeat: int, **options: Any) -> float:
     """The best rate [1/s of CPU time] over seeds."""
     sample_antipodal(mesh, 1, np.random.default_rng(0))
+    others = {name: options.pop(name) for name in ("weights", "accept") if name in options}
+    settings = AntipodalSettings(**options)
     rates = []
     for seed in range(repeat):
         fresh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)  # nothing cached
         start = time.process_time()
-        grasps = sample_antipodal(fresh, n, np.random.default_rng(seed), **options)
+        grasps = sample_antipodal(fresh, n, np.random.default_rng(seed), settings, **others)
         rates.append(len(grasps) / (time.process_time() - start))
     return max(rates)
 

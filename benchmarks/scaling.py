@@ -18,6 +18,7 @@ import numpy as np
 
 from burg_drake.core.grasps import CPU_COLUMNS
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.loading import read_results
 
 
@@ -39,8 +40,7 @@ def main() -> None:
             arguments.scenes,
             "panda_tabletop",
             folder,
-            grasps_per_object=arguments.n,
-            mode=arguments.mode,
+            settings=EvaluationSettings(grasps_per_object=arguments.n, mode=arguments.mode),
             workers=workers,
             progress=False,
         )

@@ -168,7 +168,9 @@ def sampled(scene: burg.Scene, name: str, n: int, X_WO: Array) -> Array:
     """(N, 4, 4) antipodal grasps on an instance, in the world."""
     mesh = scene.library.surface(scene.instance(name).object)
     friction = scene.entry(name).friction
-    grasps = burg.grasps.sample_antipodal(mesh, n, rng_from("benchmark", name), friction=friction)
+    grasps = burg.grasps.sample_antipodal(
+        mesh, n, rng_from("benchmark", name), burg.grasps.AntipodalSettings(friction=friction)
+    )
     return X_WO @ grasps.X_OG
 
 

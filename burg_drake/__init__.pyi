@@ -34,6 +34,9 @@ from .evaluation.feasibility import (
 from .evaluation.grasp_sets.sampled import (
     sample_grasps as sample_grasps,
 )
+from .evaluation.run.settings import (
+    EvaluationSettings as EvaluationSettings,
+)
 from .evaluation.store.campaign_folder import (
     Campaign as Campaign,
     load_campaign as load_campaign,
@@ -116,8 +119,10 @@ from .station.checks.scene_issues import (
     check_scene as check_scene,
 )
 from .station.diagram.builder import (
-    StationDiagram as StationDiagram,
     build_station_diagram as build_station_diagram,
+)
+from .station.diagram.station_diagram import (
+    StationDiagram as StationDiagram,
 )
 from .station.document.engine import (
     ENGINES as ENGINES,

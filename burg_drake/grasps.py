@@ -36,6 +36,7 @@ from burg_drake.grasping.comparison import (
     summarize as summarize,
 )
 from burg_drake.grasping.sampling import (
+    AntipodalSettings as AntipodalSettings,
     ApproachCone as ApproachCone,
     sample_antipodal as sample_antipodal,
 )

@@ -6,9 +6,9 @@ import burg_drake as burg
 
 scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
 mesh = scene.library.surface("box")
-grasps = burg.grasps.sample_antipodal(
-    mesh, 500, burg.frames.rng_from("example"), opening=station.hand.opening, object="box"
-)
+settings = burg.grasps.AntipodalSettings(opening=station.hand.opening)
+rng = burg.frames.rng_from("example")
+grasps = burg.grasps.sample_antipodal(mesh, 500, rng, settings, object="box")
 
 trial = burg.HandTrial(scene, station)  # one diagram for all trials of the scene
 X_WG = trial.diagram.X_WO("box") @ grasps.X_OG

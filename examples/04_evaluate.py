@@ -9,7 +9,8 @@ import burg_drake as burg
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run"
-    burg.evaluate("tabletop_six", "panda_tabletop", path, grasps_per_object=5, progress=False)
+    few = burg.EvaluationSettings(grasps_per_object=5)
+    burg.evaluate("tabletop_six", "panda_tabletop", path, settings=few, progress=False)
 
     run = burg.load_run(path)  # as one would at any later time, on any machine
     print(f"{len(run.verdicts)} grasps, judged with Drake {run.document.versions['drake']}")

@@ -16,9 +16,8 @@ with tempfile.TemporaryDirectory() as folder:
     scene, station = burg.load_scene("tabletop_close"), burg.load_station("panda_tabletop")
     grasps = burg.sample_grasps(scene, station, 6, only=["mug", "box"])
     for out, engine in ((simulated, "standard"), (tried, "screening")):
-        burg.evaluate(
-            scene, station, out, grasps=grasps, engine=engine, mode="hand", progress=False
-        )
+        settings = burg.EvaluationSettings(engine=engine, mode="hand")
+        burg.evaluate(scene, station, out, grasps=grasps, settings=settings, progress=False)
 
     sheet = burg.trials.plan_trials(simulated, per_object=4, out=path / "trials.yaml")
     print(f"{len(sheet.trials)} trials, the first one of {sheet.trials[0].grasp}")

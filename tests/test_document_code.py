@@ -18,14 +18,14 @@ from tests.pages import PAGES, blocks
 
 SMALLER = {
     "README": {
-        "grasps_per_object=100)": "grasps_per_object=2, engine='screening', only=['mug'])",
+        '=100, engine="standard")': "=2, engine='screening', only=['mug'])",
         "scene, station, 50, ": "scene, station, 8, ",
         "scene, station, 500)": "scene, station, 1, only=['mug', 'box'])",
         "burg.reach(scene, station, grasps)": "burg.reach(scene, station, grasps, workers=1)",
         "AdvanceTo(plan.duration)": "AdvanceTo(0.1)",
-        '"runs/best", grasps=best)': '"runs/best", grasps=best, engine="screening")',
+        '"runs/best", grasps=best)': '"runs/best", grasps=best, settings=settings)',
     },
-    "reach": {"motion=low)\nrun": "motion=low, grasps_per_object=1, only=['mug'])\nrun"},
+    "reach": {"motion=low))\nrun": "motion=low, grasps_per_object=1, only=['mug']))\nrun"},
     "scenes": {
         '"close", 1000, workers=2)': '"close", 1)',
         "size=(0.594, 0.420)), height": "size=(0.1, 0.1)), height",

@@ -60,7 +60,10 @@ def inverse(X_AB: ArrayLike) -> Array:
 def transform_points(X_AB: ArrayLike, p_BQ: ArrayLike) -> Array:
     """Points (..., N, 3) given in B, expressed in A, for poses `X_AB` (..., 4, 4)."""
     X = np.asarray(X_AB, dtype=float)
-    return np.asarray(p_BQ, dtype=float) @ np.swapaxes(X[..., :3, :3], -1, -2) + X[..., None, :3, 3]
+    p_AQ: Array = (
+        np.asarray(p_BQ, dtype=float) @ np.swapaxes(X[..., :3, :3], -1, -2) + X[..., None, :3, 3]
+    )
+    return p_AQ
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> Array:
@@ -101,7 +104,8 @@ def rotation_angle(R_AB: ArrayLike) -> Array:
     skew = R - np.swapaxes(R, -1, -2)
     x, y, z = skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
-    return np.arctan2(np.sqrt(x * x + y * y + z * z), trace - 1.0)
+    angle: Array = np.arctan2(np.sqrt(x * x + y * y + z * z), trace - 1.0)
+    return angle
 
 
 def rot_z(angle: float) -> Array:

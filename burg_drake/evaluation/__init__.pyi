@@ -17,6 +17,7 @@ from .replay import (
 from .report import write_report as write_report
 from .results.summary import summarize as summarize
 from .results.summary_tables import summary_view as summary_view
+from .run.settings import EvaluationSettings as EvaluationSettings
 from .stages.judge import (
     Decision as Decision,
     Judge as Judge,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -17,29 +17,25 @@ from typing import overload
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import Mode
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
-from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG, given_candidates
+from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
     Journal,
-    Shard,
-    TableFormat,
-    as_shard,
     begun_now,
     require_writer,
 )
 from burg_drake.evaluation.run import (
+    EvaluationSettings,
     Given,
     Request,
     finish_run,
-    names,
     open_grasps,
     open_run,
     require_judged,
     require_sound as _require_sound,
 )
-from burg_drake.evaluation.stages import StationJudgeFactory, mode_for
+from burg_drake.evaluation.stages import StationJudgeFactory
 from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,
@@ -51,14 +47,7 @@ from burg_drake.evaluation.store import (
 )
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 from burg_drake.scene.document import Scene, SceneLike, as_scene
-from burg_drake.station.document import (
-    ENGINES,
-    Engine,
-    GraspMotion,
-    StationLike,
-    as_station,
-    engine_preset,
-)
+from burg_drake.station.document import StationLike, as_station
 
 
 @overload
@@ -67,21 +56,11 @@ def evaluate(  # type: ignore[overload-overlap]  # a text is a sequence of texts
     station: StationLike,
     out: str | Path,
     *,
-    grasps_per_object: int = ...,
-    approach_angle_deg: float = ...,
-    blind: bool = ...,
-    only: Iterable[str] | None = ...,
     grasps: Given | None = ...,
-    engine: Engine | str = ...,
-    seed: int = ...,
+    settings: EvaluationSettings | None = ...,
     workers: int | None = ...,
     executor: Executor | None = ...,
-    shard: Shard | str | None = ...,
-    table: TableFormat = ...,
-    mode: Mode | None = ...,
-    motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
-    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Run: ...
 
@@ -92,21 +71,11 @@ def evaluate(
     station: StationLike,
     out: str | Path,
     *,
-    grasps_per_object: int = ...,
-    approach_angle_deg: float = ...,
-    blind: bool = ...,
-    only: Iterable[str] | None = ...,
     grasps: Given | None = ...,
-    engine: Engine | str = ...,
-    seed: int = ...,
+    settings: EvaluationSettings | None = ...,
     workers: int | None = ...,
     executor: Executor | None = ...,
-    shard: Shard | str | None = ...,
-    table: TableFormat = ...,
-    mode: Mode | None = ...,
-    motion: GraspMotion | None = ...,
     retry_failed: bool = ...,
-    scene_reports: bool | None = ...,
     progress: bool | Listener = ...,
 ) -> Campaign: ...
 
@@ -116,21 +85,11 @@ def evaluate(
     station: StationLike,
     out: str | Path,
     *,
-    grasps_per_object: int = 100,
-    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG,
-    blind: bool = False,
-    only: Iterable[str] | None = None,
     grasps: Given | None = None,
-    engine: Engine | str = ENGINES["standard"],
-    seed: int = 0,
+    settings: EvaluationSettings | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
-    shard: Shard | str | None = None,
-    table: TableFormat = "csv",
-    mode: Mode | None = None,
-    motion: GraspMotion | None = None,
     retry_failed: bool = False,
-    scene_reports: bool | None = None,
     progress: bool | Listener = True,
 ) -> Run | Campaign:
     """Judges grasps and writes a run, or a run over many scenes.
@@ -146,33 +105,15 @@ def evaluate(
             is on its own, in a folder of its own, and all by the same workers.
         station: likewise, for `load_station`.
         out: folder of the run; made if need be.
-        grasps_per_object: antipodal grasps to sample for each free instance; the same ones as
-            those of `sample_grasps` with these settings. Of an object that has fewer,
-            `Summary.notes` says why.
-        approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
-            above 0; 90 is as far as from the side, 180 from anywhere.
-        blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
-            see `SamplingSettings`.
-        only: names of free instances, or of objects for all their instances, to judge grasps of;
-            all if None.
         grasps: the user's own grasps in the object frame; nothing is sampled then. A set goes to
             the instances that its column `instance` names, or else to all instances of its objects;
             a mapping has sets by instance, such as those of `read_grasps`; a function gets the
             scene, and has such a mapping. Of many scenes each gets those of its own objects.
-        engine: how trials are stepped; an engine or the name of a preset.
-        seed: of the sampling.
+        settings: which grasps are sampled, and how all are judged; the usual ones if None: 100 for
+            each object, as far as the station's arm can execute them.
         workers: number of processes; as many as there are processors if None.
         executor: who judges, in place of so many processes of this machine.
-        shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
-            fewer every eighth grasp of each. `merge_runs` unites the shares.
-        table: format of the results file.
-        mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
-            execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
-            the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
-        motion: how the hand goes to a grasp and away from it; as the station says if None.
         retry_failed: try all grasps again that an earlier call could not simulate.
-        scene_reports: whether each of several scenes gets a report of its own; None if they are at
-            most a hundred, as one takes some tenths of a second. `write_report` makes it later.
         progress: True shows a bar on standard error, False nothing; a function gets the events.
 
     Returns:
@@ -188,30 +129,14 @@ def evaluate(
         SimulationError: the simulation of the scene cannot be built, or an executor ends before
             all is judged.
     """
-    if grasps is None and grasps_per_object < 1:
-        raise InvalidInputError(f"grasps_per_object is {grasps_per_object}; give 1 or more")
+    settings = settings or EvaluationSettings()
     station = as_station(station)
     if executor is None:
         executor = LocalExecutor(default_workers() if workers is None else workers)
     elif workers is not None:
         raise InvalidInputError("give workers or an executor, which has its own, not both")
-    request = Request(
-        station=station,
-        engine=engine if isinstance(engine, Engine) else engine_preset(engine),
-        mode=mode_for(station, mode),
-        motion=motion or station.document.motion,
-        seed=seed,
-        per_object=grasps_per_object,
-        approach_angle_deg=float(approach_angle_deg),
-        blind=blind,
-        only=names(only),
-        grasps=grasps,
-        table=table,
-        shard=as_shard(shard),
-        retry_failed=retry_failed,
-        scene_reports=scene_reports,
-    )
-    require_writer(table)
+    request = Request.of(station, settings, grasps, retry_failed=retry_failed)
+    require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
     from burg_drake.evaluation.run import evaluate_scenes
@@ -246,7 +171,7 @@ def _evaluate_one(
         if left:
             run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
             require_judged(run)
-        run = finish_run(run, request.table)
+        run = finish_run(run, request.settings.table)
         keep_parts(run)
         return run
 

@@ -14,7 +14,6 @@ import numpy as np
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
 from burg_drake.core.grasps import (
     LIFT_HEIGHT,
-    POSTURE,
     GraspSet,
     Outcome,
     Stage,
@@ -231,7 +230,7 @@ def _with_columns(
         columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
     if any("duration" in v.margins for v in rows):
         columns["duration"] = np.array([v.margins.get("duration", np.nan) for v in rows])
-    columns |= columns_of_verdicts(rows, POSTURE, TableShape("reach", joints=len(arm.home)))
+    columns |= columns_of_verdicts(rows, "posture", TableShape("reach", joints=len(arm.home)))
     columns["cpu"] = np.array([sum(v.cpu.values()) for v in rows], dtype=float)
     objects = sorted(set(candidates.grasps.object.tolist()))
     provenance = {

@@ -117,7 +117,10 @@ def _writer(to: str) -> Callable[[Layout, Path], tuple[str, ...]]:
             f"exports to {to} need the package {chosen.package[0]}; install it with"
             f" pip install 'burg-drake[{to}]'"
         )
-    return getattr(importlib.import_module(f"burg_drake.export.{chosen.module}"), chosen.writer)
+    writer: Callable[[Layout, Path], tuple[str, ...]] = getattr(
+        importlib.import_module(f"burg_drake.export.{chosen.module}"), chosen.writer
+    )
+    return writer
 
 
 def _contact_notes(layout: Layout, to: str) -> list[str]:

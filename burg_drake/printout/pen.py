@@ -30,7 +30,7 @@ def printable(text: str) -> str:
 
 def text_width(text: str, size: float, font: str = REGULAR) -> float:
     """Length of a line of text [m]; `size` in points."""
-    return stringWidth(printable(text), font, size) * POINT
+    return float(stringWidth(printable(text), font, size) * POINT)
 
 
 class Pen:

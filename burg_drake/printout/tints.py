@@ -64,4 +64,5 @@ def tint(hue: Rgb, luma: ArrayLike) -> Array:
     color, goal = np.asarray(hue), np.asarray(luma, dtype=float)[..., None]
     own = color @ LUMA
     lighter = 1.0 - (1.0 - color) * (1.0 - goal) / (1.0 - own)
-    return np.where(goal >= own, lighter, color * goal / own)
+    tinted: Array = np.where(goal >= own, lighter, color * goal / own)
+    return tinted

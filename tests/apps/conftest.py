@@ -11,6 +11,7 @@ import trimesh
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 
 SCENE = """\
@@ -60,9 +61,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "tabletop_six",
         "panda_tabletop",
         folder,
+        settings=EvaluationSettings(mode="hand", engine="screening"),
         grasps={"box": grasps},
-        engine="screening",
         workers=1,
-        mode="hand",
         progress=False,
     )

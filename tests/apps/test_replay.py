@@ -21,6 +21,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.table import table_row, trial_columns
 from burg_drake.evaluation.records.table_file import read_table, write_table
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES
@@ -55,10 +56,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         folder / "stack.yaml",
         "panda_tabletop",
         folder / "run",
+        settings=EvaluationSettings(engine=ENGINE, mode="hand"),
         grasps={"box": GraspSet.create(grasps, object="box", width=0.06)},
-        engine=ENGINE,
         workers=1,
-        mode="hand",
         progress=False,
     )
 
@@ -195,9 +195,8 @@ def test_a_row_of_an_arm_trial_is_replayed_with_the_arm(tmp_path: Path, capsys: 
         "tabletop_six",
         "panda_tabletop",
         tmp_path / "run",
+        settings=EvaluationSettings(engine="screening", mode="arm"),
         grasps={"box": GraspSet.create(above, object="box", width=0.06)},
-        engine="screening",
-        mode="arm",
         workers=1,
         progress=False,
     )

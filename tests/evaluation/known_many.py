@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from asked import asked
 from inline_executor import Inline
 from known_scene import write_scene
 
@@ -40,7 +41,7 @@ def write_scenes(folder: Path) -> list[Path]:
 def run_all(scenes: list[Path], station: Station, out: Path, **options) -> Campaign:
     """A run over scenes, in this process."""
     executor = options.pop("executor", None) or Inline()
-    return evaluate(scenes, station, out, executor=executor, **{**OPTIONS, **options})
+    return evaluate(scenes, station, out, **asked(executor=executor, **{**OPTIONS, **options}))
 
 
 def same(a: Columns, b: Columns) -> bool:

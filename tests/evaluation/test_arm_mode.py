@@ -20,6 +20,7 @@ from burg_drake.evaluation.replay import as_result, decisive_mode, differences, 
 from burg_drake.evaluation.results.counts import Pushes, pushes
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.results.summary_tables import summary_view
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
@@ -37,9 +38,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "tabletop_six",
         "panda_tabletop",
         tmp_path_factory.mktemp("arm") / "run",
+        settings=EvaluationSettings(engine="screening", mode="arm"),
         grasps={"box": GraspSet.create(GRASPS, object="box", width=0.06)},
-        engine="screening",
-        mode="arm",
         workers=1,
         progress=False,
     )

@@ -21,6 +21,7 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.grasp_sets.candidate_files import NoSceneIdsError, read_grasps
 from burg_drake.evaluation.grasp_sets.run_set import run_grasps
 from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import Scene
@@ -225,7 +226,13 @@ def test_what_came_with_the_grasps_is_in_the_results(
     write_grasp_file(grasps, path, "vgn")
     given = {n: g.with_columns(good=True) for n, g in read_grasps(scene, path).by_instance.items()}
     run = evaluate(
-        scene, station, tmp_path / "run", grasps=given, workers=1, table=table, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(table=table),
+        grasps=given,
+        workers=1,
+        progress=False,
     )
     rows = read_table(run.table_path)
     assert rows["instance"].tolist() == ["left", "right", "bar"]

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from asked import asked
 from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
@@ -24,6 +25,7 @@ from burg_drake.evaluation.records.journal import read_journal
 from burg_drake.evaluation.records.table import TEXT
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report.sections.reproduction import reproduce_command
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
@@ -40,13 +42,13 @@ def test_results_do_not_depend_on_workers(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     options = {"grasps_per_object": 20, "blind": True, "progress": False}
-    one = evaluate(scene, station, tmp_path / "one", workers=1, **options)
-    two = evaluate(scene, station, tmp_path / "two", workers=2, **options)
+    one = evaluate(scene, station, tmp_path / "one", **asked(workers=1, **options))
+    two = evaluate(scene, station, tmp_path / "two", **asked(workers=2, **options))
     assert same_results(one, two)
     assert one.complete and one.failures == []
     assert one.results["id"].tolist() == one.candidates.id
     assert one.results["outcome"].tolist() == [expected(id) for id in one.candidates.id]
-    other = evaluate(scene, station, tmp_path / "other", seed=1, workers=1, **options)
+    other = evaluate(scene, station, tmp_path / "other", **asked(seed=1, workers=1, **options))
     assert not same_results(one, other)
 
 
@@ -54,18 +56,32 @@ def test_a_complete_run_returns_at_once(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
 ) -> None:
     first = evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        progress=False,
     )
     monkeypatch.setattr("burg_drake.evaluation.cascade.Job", None)
     again = evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        progress=False,
     )
     assert same_results(first, again)
     assert len(again.document.stretches) == 1
     files = {path: path.stat().st_ino for path in first.path.iterdir()}
     assert len(files) == 8
     dates = {path: path.stat().st_mtime_ns for path in files}
-    evaluate(scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False)
+    evaluate(
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        progress=False,
+    )
     assert {path: path.stat().st_ino for path in first.path.iterdir()} == files
     assert {path: path.stat().st_mtime_ns for path in files} == dates
     pytest.importorskip("pyarrow")
@@ -73,10 +89,8 @@ def test_a_complete_run_returns_at_once(
         scene,
         station,
         tmp_path / "run",
-        grasps_per_object=5,
-        blind=True,
+        settings=EvaluationSettings(grasps_per_object=5, blind=True, table="parquet"),
         progress=False,
-        table="parquet",
     )
     assert parquet.table_path.suffix == ".parquet"
     assert read_table(parquet.table_path)["id"].tolist() == first.results["id"].tolist()
@@ -92,8 +106,9 @@ def patch(name, value):
     __import__(module)
     setattr(sys.modules[module], attribute, value)
 known_judge.install(patch, Path(sys.argv[2]), pause=0.2)
-from burg_drake.evaluation.cascade import evaluate
-evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], grasps_per_object=40, blind=True, workers=2)
+from burg_drake.evaluation import EvaluationSettings, evaluate
+settings = EvaluationSettings(grasps_per_object=40, blind=True)
+evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], settings=settings, workers=2)
 """
 
 
@@ -138,8 +153,7 @@ def test_a_killed_run_goes_on_where_it_was(
         scene,
         station,
         tmp_path / "run",
-        grasps_per_object=40,
-        blind=True,
+        settings=EvaluationSettings(grasps_per_object=40, blind=True),
         workers=2,
         progress=events.append,
     )
@@ -153,8 +167,7 @@ def test_a_killed_run_goes_on_where_it_was(
         scene,
         station,
         tmp_path / "fresh",
-        grasps_per_object=40,
-        blind=True,
+        settings=EvaluationSettings(grasps_per_object=40, blind=True),
         workers=1,
         progress=False,
     )
@@ -171,9 +184,9 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
         make = Make(known)
         monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: make)
         options |= {"grasps_per_object": 10, "blind": True, "progress": False}
-        return evaluate(scene, station, tmp_path / out, workers=1, **options)
+        return evaluate(scene, station, tmp_path / out, **asked(workers=1, **options))
 
-    def asked(name: str) -> list[str]:
+    def judged(name: str) -> list[str]:
         return (tmp_path / name).read_text().split()
 
     install(monkeypatch.setattr)
@@ -185,14 +198,14 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
 
     run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
-    assert asked("short again") == [killed] and run.interrupted == [killed]
+    assert judged("short again") == [killed] and run.interrupted == [killed]
     run = judge(KnownJudge(tmp_path / "enough"), "run")
-    assert asked("enough") == [killed] and run.failures == [crashing]
+    assert judged("enough") == [killed] and run.failures == [crashing]
     assert run.row(killed)["outcome"] == expected(killed)
     run = judge(KnownJudge(tmp_path / "none"), "run")
     assert not (tmp_path / "none").exists()
     run = judge(KnownJudge(tmp_path / "failed"), "run", retry_failed=True)
-    assert asked("failed") == [crashing] and run.failures == []
+    assert judged("failed") == [crashing] and run.failures == []
     assert same_results(run, whole)
     assert read_table(run.table_path)["outcome"].tolist() == whole.results["outcome"].tolist()
     assert [stretch.judged for stretch in run.document.stretches] == [30, 1, 1, 1]
@@ -213,10 +226,21 @@ def test_another_run_is_not_mixed_in(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     run = tmp_path / "run"
-    evaluate(scene, station, run, grasps_per_object=5, blind=True, workers=1, progress=False)
+    evaluate(
+        scene,
+        station,
+        run,
+        settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        workers=1,
+        progress=False,
+    )
     with pytest.raises(InvalidInputError) as error:
         evaluate(
-            scene, station, run, grasps_per_object=6, blind=True, engine="reference", progress=False
+            scene,
+            station,
+            run,
+            settings=EvaluationSettings(grasps_per_object=6, blind=True, engine="reference"),
+            progress=False,
         )
     assert str(error.value) == (
         f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object,"
@@ -227,20 +251,27 @@ def test_another_run_is_not_mixed_in(
             scene,
             station,
             run,
-            grasps_per_object=5,
-            blind=True,
-            approach_angle_deg=90,
+            settings=EvaluationSettings(grasps_per_object=5, blind=True, approach_angle_deg=90),
             progress=False,
         )
     assert "(approach angle is 75.0 degrees there, 90.0 degrees here)" in str(error.value)
     with pytest.raises(InvalidInputError, match="mode is reach there, hand here"):
-        evaluate(scene, station, run, grasps_per_object=5, blind=True, mode="hand", progress=False)
+        evaluate(
+            scene,
+            station,
+            run,
+            settings=EvaluationSettings(grasps_per_object=5, blind=True, mode="hand"),
+            progress=False,
+        )
     with pytest.raises(InvalidInputError, match=r"sampled blind there, 5 an object, clear of the"):
-        evaluate(scene, station, run, grasps_per_object=5, progress=False)
+        evaluate(
+            scene, station, run, settings=EvaluationSettings(grasps_per_object=5), progress=False
+        )
     blind = {"grasps_per_object": 5, "blind": True, "progress": False}
     with pytest.raises(InvalidInputError, match=r"blind there, .* sampled blind, on bar here"):
-        evaluate(scene, station, run, only=["bar"], **blind)
-    assert evaluate(scene, station, run, only=["bar", "cube"], **blind).complete  # that is all
+        evaluate(scene, station, run, **asked(only=["bar"], **blind))
+    whole = evaluate(scene, station, run, **asked(only=["bar", "cube"], **blind))
+    assert whole.complete
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
     with pytest.raises(
         InvalidInputError, match="5 an object, sampled blind there, given, content"
@@ -253,8 +284,8 @@ def test_some_objects_only(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     options = {"grasps_per_object": 3, "blind": True, "workers": 1, "progress": False}
-    run = evaluate(scene, station, tmp_path / "a", only=["right", "bar"], **options)
-    everything = evaluate(scene, station, tmp_path / "b", **options)
+    run = evaluate(scene, station, tmp_path / "a", **asked(only=["right", "bar"], **options))
+    everything = evaluate(scene, station, tmp_path / "b", **asked(**options))
     assert run.candidates.id == [i for i in everything.candidates.id if not i.startswith("left")]
     assert load_run(run.path).document.grasps.objects == {"cube": 3, "bar": 3}
     assert "--blind --only right --only bar" in reproduce_command(run)
@@ -262,14 +293,28 @@ def test_some_objects_only(
         name: GraspSet.create(np.eye(4), object=object)
         for name, object in (("left", "cube"), ("bar", "bar"))
     }
-    run = evaluate(scene, station, tmp_path / "c", grasps=given, only=["cube"], progress=False)
+    run = evaluate(
+        scene,
+        station,
+        tmp_path / "c",
+        settings=EvaluationSettings(only=["cube"]),
+        grasps=given,
+        progress=False,
+    )
     assert set(run.candidates.instance) == {"left"}
     with pytest.raises(InvalidInputError, match=r"no grasps are of right; .* some of left, bar"):
-        evaluate(scene, station, tmp_path / "d", grasps=given, only=["right"], progress=False)
+        evaluate(
+            scene,
+            station,
+            tmp_path / "d",
+            settings=EvaluationSettings(only=["right"]),
+            grasps=given,
+            progress=False,
+        )
     with pytest.raises(UnknownNameError, match="'lef', which is not a free instance"):
         evaluate(scene, station, tmp_path / "d", grasps={"lef": given["left"]}, progress=False)
     with pytest.raises(UnknownNameError, match="no free object 'lef'; did you mean 'left'"):
-        evaluate(scene, station, tmp_path / "d", only=["lef"], **options)
+        evaluate(scene, station, tmp_path / "d", **asked(only=["lef"], **options))
     assert not (tmp_path / "d").exists()
 
 
@@ -315,7 +360,13 @@ def test_own_files_are_not_overwritten(
     mine.mkdir()
     (mine / name).write_text("my work")
     with pytest.raises(InvalidInputError) as error:
-        evaluate(scene, station, mine, grasps_per_object=2, blind=True, progress=False)
+        evaluate(
+            scene,
+            station,
+            mine,
+            settings=EvaluationSettings(grasps_per_object=2, blind=True),
+            progress=False,
+        )
     assert str(error.value) == (
         f"{mine} is not empty and holds no run ({name} is in it); choose another -o"
     )
@@ -333,8 +384,8 @@ def test_a_run_that_is_killed_at_its_start_goes_on(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(f"burg_drake.evaluation.store.run_folder.{write}", die)
         with pytest.raises(KeyboardInterrupt):
-            evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
-    run = evaluate(scene, station, tmp_path / "run", **options)  # type: ignore[arg-type]
+            evaluate(scene, station, tmp_path / "run", **asked(**options))  # type: ignore[arg-type]
+    run = evaluate(scene, station, tmp_path / "run", **asked(**options))  # type: ignore[arg-type]
     assert run.complete and run.scene().content == scene.content
     assert run.station().content == station.content
 
@@ -352,12 +403,22 @@ def test_failures_are_reported_and_the_others_go_on(
     from known_judge import CrashingJudge
 
     id = evaluate(
-        scene, station, tmp_path / "a", grasps_per_object=2, blind=True, workers=1, progress=False
+        scene,
+        station,
+        tmp_path / "a",
+        settings=EvaluationSettings(grasps_per_object=2, blind=True),
+        workers=1,
+        progress=False,
     ).candidates.id[0]
     judge = Make(CrashingJudge(how=((id, "segfault"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     run = evaluate(
-        scene, station, tmp_path / "b", grasps_per_object=2, blind=True, workers=1, progress=False
+        scene,
+        station,
+        tmp_path / "b",
+        settings=EvaluationSettings(grasps_per_object=2, blind=True),
+        workers=1,
+        progress=False,
     )
     assert run.complete and run.failures == [id]
     assert run.row(id)["reason"] == "the worker process was ended by SIGSEGV"
@@ -367,7 +428,7 @@ def test_bad_input_is_said_before_any_work(
     scene: Scene, station: Station, tmp_path: Path, monkeypatch
 ) -> None:
     def evaluate_in(folder: str, **options: object) -> None:
-        evaluate(scene, station, tmp_path / folder, progress=False, **options)  # type: ignore[arg-type]
+        evaluate(scene, station, tmp_path / folder, **asked(progress=False, **options))  # type: ignore[arg-type]
 
     install(monkeypatch.setattr)
     monkeypatch.setattr("burg_drake.evaluation.cascade.Job", None)
@@ -387,7 +448,12 @@ def test_bad_input_is_said_before_any_work(
     with pytest.raises(InvalidInputError, match=r"^grasps_per_object is 0; give 1 or more$"):
         evaluate_in("run", grasps_per_object=0)
     with pytest.raises(InvalidInputError, match=r"^grasps_per_object is -1; give 1 or more$"):
-        evaluate("no such scene", "no such station", "", grasps_per_object=-1)
+        evaluate(
+            "no such scene",
+            "no such station",
+            "",
+            settings=EvaluationSettings(grasps_per_object=-1),
+        )
     with pytest.raises(InvalidInputError, match=r"^approach angle is 181 degrees; give"):
         evaluate_in("run", approach_angle_deg=181.0)
     assert not (tmp_path / "run" / "run.yaml").exists()
@@ -407,7 +473,7 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
         raise InvalidInputError("'left' and 'right' overlap")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.station.checks.valid_scene.require_valid_scene", refuse)
+        patch.setattr("burg_drake.station.checks.require_valid_scene", refuse)
         with pytest.raises(InvalidInputError, match="overlap"):
             evaluate(scene, station, tmp_path / "run", progress=False)
     assert not (tmp_path / "run").exists()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from asked import asked
 from inline_executor import Inline
 
 from burg_drake.apps.cli import main
@@ -37,16 +38,17 @@ def judged_here(known_judge: None) -> None:
 
 def test_a_run_with_open_grasps_is_an_error(scene: Scene, station: Station, tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match=r"^13 of 15 grasps have come back without a verdict"):
-        evaluate(scene, station, tmp_path / "run", executor=Short(), **OPTIONS)
+        evaluate(scene, station, tmp_path / "run", **asked(executor=Short(), **OPTIONS))
     assert not list((tmp_path / "run").glob("results.*"))
     assert not (tmp_path / "run/report.html").exists()
-    assert evaluate(scene, station, tmp_path / "run", executor=Inline(), **OPTIONS).complete
+    run = evaluate(scene, station, tmp_path / "run", **asked(executor=Inline(), **OPTIONS))
+    assert run.complete
 
 
 def test_a_run_with_open_scenes_is_an_error(scene: Scene, station: Station, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     with pytest.raises(SimulationError, match=r"^1 of 1 scenes were not judged to the end"):
-        evaluate([scene], station, tmp_path / "runs", executor=Short(), **OPTIONS)
+        evaluate([scene], station, tmp_path / "runs", **asked(executor=Short(), **OPTIONS))
 
 
 def test_the_command_does_not_end_as_if_all_were_well(

@@ -19,6 +19,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
@@ -171,9 +172,9 @@ def test_friction_decides_as_statics_says(tmp_path: Path, factor: float, outcome
         tmp_path / "slippery.yaml",
         STATION,
         tmp_path / "run",
+        settings=EvaluationSettings(mode="hand"),
         grasps={"box": GraspSet.create(on_the_box(BOX[2] - 0.025), object="box")},
         workers=1,
-        mode="hand",
         progress=False,
     )
     assert run.results["outcome"].tolist() == [outcome]

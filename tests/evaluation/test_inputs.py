@@ -10,6 +10,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.run_document import origin_of
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.inputs import find_inputs
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import Scene
@@ -19,7 +20,11 @@ from burg_drake.station.document.station_document import Station
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=3, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=3, blind=True),
+        progress=False,
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from asked import asked
 from inline_executor import Inline
 from known_judge import expected, refuse
 from known_many import OPTIONS, run_all, same
@@ -38,7 +39,7 @@ def test_each_scene_is_as_on_its_own(
     campaign = load_campaign(whole.path)
     assert campaign.names == ["cubes", "moved", "three"] and campaign.complete
     alone: list[Run] = [
-        evaluate(path, station, tmp_path / path.stem, executor=Inline(1), **OPTIONS)
+        evaluate(path, station, tmp_path / path.stem, **asked(executor=Inline(1), **OPTIONS))
         for path in scenes
     ]
     for run, own in zip(load_runs(campaign.path), alone, strict=True):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.usefixtures("pages")
 
 def run_one(scene: Scene, station: Station, out: Path, **options) -> Run:
     executor = options.pop("executor", None) or Inline()
-    return evaluate(scene, station, out, executor=executor, **{**OPTIONS, **options})
+    return evaluate(scene, station, out, **asked(executor=executor, **{**OPTIONS, **options}))
 
 
 def change(run: Run, **values) -> str:

@@ -9,6 +9,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.stages.mode import mode_for
 from burg_drake.station.document.station_document import Station, load_station
 
@@ -28,9 +29,9 @@ def test_the_usual_mode_asks_as_much_as_the_station_can_tell(bare: Station) -> N
 def test_what_needs_an_arm_is_refused_without_one(bare: Station, tmp_path: Path, scene) -> None:
     message = r"^mode 'arm' needs an arm, which station 'wsg_tabletop' lacks; give mode 'hand'$"
     with pytest.raises(InvalidInputError, match=message):
-        evaluate(scene, bare, tmp_path / "run", mode="arm")
+        evaluate(scene, bare, tmp_path / "run", settings=EvaluationSettings(mode="arm"))
     with pytest.raises(InvalidInputError, match="station 'wsg_tabletop' has no arm"):
         reach(scene, bare, {})
     with pytest.raises(InvalidInputError, match=r"^mode is 'leg'; give hand, reach or arm$"):
-        evaluate(scene, bare, tmp_path / "run", mode="leg")  # type: ignore[arg-type]
+        evaluate(scene, bare, tmp_path / "run", settings=EvaluationSettings(mode="leg"))  # type: ignore[arg-type]
     assert not (tmp_path / "run").exists()

@@ -21,6 +21,7 @@ from burg_drake.evaluation.records.trial import read_trial
 from burg_drake.evaluation.replay import differences, rerun
 from burg_drake.evaluation.report.sections.reproduction import reproduce_command
 from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.grasp_motion import GraspMotion
@@ -38,9 +39,14 @@ GRASPS = GraspSet.create(ABOVE[None], object="box", width=0.06)
 
 def judged(folder: Path, motion: GraspMotion | None) -> Run:
     return evaluate(
-        "tabletop_six", "panda_tabletop", folder,
-        grasps=GRASPS, workers=1, mode="hand", motion=motion, progress=False,
-    )  # fmt: skip
+        "tabletop_six",
+        "panda_tabletop",
+        folder,
+        settings=EvaluationSettings(mode="hand", motion=motion),
+        grasps=GRASPS,
+        workers=1,
+        progress=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +84,14 @@ def test_the_lift_for_which_the_arm_has_room_is_executed_and_repeated(tmp_path: 
     the hand was lifted, and the arm is not asked again."""
     scene, station = load_scene("tabletop_six"), load_station("panda_shelf")
     run = evaluate(
-        scene, station, tmp_path / "run",
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(motion=GraspMotion(least_lift=0.02), engine="screening"),
         grasps=GraspSet.create(HANDLE[None], object="screwdriver", width=0.03),
-        motion=GraspMotion(least_lift=0.02), engine="screening", workers=1, progress=False,
-    )  # fmt: skip
+        workers=1,
+        progress=False,
+    )
     row = table_row(read_table(run.table_path), 0)
     assert row["mode"] == "reach" and row["outcome"] == Outcome.LIFTED
     assert 0.02 <= row["lift_height"] < 0.3

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
@@ -192,7 +193,7 @@ def test_a_large_run_of_one_scene(
 ) -> None:
     monkeypatch.setattr(part_writer, "PART_ROWS", 7)
     monkeypatch.setattr(part_writer, "STRETCH", 2000)
-    run = evaluate(scenes[1], station, tmp_path / "one", executor=Inline(), **OPTIONS)
+    run = evaluate(scenes[1], station, tmp_path / "one", **asked(executor=Inline(), **OPTIONS))
     assert len(list((run.path / "parts").iterdir())) == 2
     assert same(run.results, read_results(run.path))
     names = ["outcome", "slip", "none"]

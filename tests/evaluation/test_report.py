@@ -19,13 +19,18 @@ from burg_drake.evaluation.report.elements.charts import Series, histogram, nice
 from burg_drake.evaluation.report.elements.style import STYLES, style_sheet
 from burg_drake.evaluation.report.sections.outcomes import STOPPED
 from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture
 def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=30, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        progress=False,
     )
 
 
@@ -66,7 +71,11 @@ def test_failures_are_listed_and_escaped(
     name = "<script>alert(1)</script> & co"
     moved = dataclasses.replace(scene, path=tmp_path / f"{name}.yaml")
     failed = evaluate(
-        moved, station, tmp_path / "f", grasps_per_object=30, blind=True, progress=False
+        moved,
+        station,
+        tmp_path / "f",
+        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        progress=False,
     )
     text = read_page(failed.report_path.read_text()).text
     assert name in text

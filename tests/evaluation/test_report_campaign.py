@@ -26,6 +26,7 @@ from burg_drake.evaluation.report.sections.outcomes import worst_first
 from burg_drake.evaluation.report.sections.scenes import ranked_chart
 from burg_drake.evaluation.results.counts import OutcomeCounts
 from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
 from burg_drake.evaluation.store.stored_rows import StoredRows
 from burg_drake.scene.document.scene import Scene
@@ -56,8 +57,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
             scenes,
             "panda_tabletop",
             folder / "run",
-            grasps_per_object=PER_OBJECT,
-            blind=True,
+            settings=EvaluationSettings(grasps_per_object=PER_OBJECT, blind=True),
             workers=1,
             progress=False,
         )

@@ -23,6 +23,7 @@ from burg_drake.evaluation.report.elements.charts import Series
 from burg_drake.evaluation.report.elements.mirrored import Limit, mirrored_histogram
 from burg_drake.evaluation.report.elements.style import STYLES
 from burg_drake.evaluation.report.sections.pictures import GRASPS, INSTANCES, drawn_rows
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.station.document.station_document import load_station
 from burg_drake.visualization.style.palette import group_of
@@ -40,8 +41,7 @@ def run_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
             write_scene(folder),
             load_station("panda_tabletop"),
             folder / "run",
-            grasps_per_object=PER_OBJECT,
-            blind=True,
+            settings=EvaluationSettings(grasps_per_object=PER_OBJECT, blind=True),
             progress=False,
         )
     return run.path

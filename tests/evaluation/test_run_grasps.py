@@ -10,6 +10,7 @@ import pytest
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.grasp_sets.run_set import run_grasps
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
@@ -18,7 +19,11 @@ from burg_drake.station.document.station_document import Station
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=5, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        progress=False,
     )
 
 

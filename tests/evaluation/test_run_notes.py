@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from asked import asked
 from rich.console import Console
 
 from burg_drake.core.grasps.outcome import Outcome
@@ -34,7 +35,9 @@ def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
     scene, station = load_scene("tabletop_twelve"), load_station("panda_tabletop")
     out = tmp_path / "run"
     options = {"mode": "hand", "only": ["scissors"], "workers": 1, "progress": False}
-    (note,) = summarize(evaluate(scene, station, out, grasps_per_object=5, **options)).notes
+    (note,) = summarize(
+        evaluate(scene, station, out, **asked(grasps_per_object=5, **options))
+    ).notes
     tried, *counts = (int(n) for n in re.findall(r"(\d+)(?: antipodal|,| and|;)", note)[:3])
     assert note.startswith(f"scissors: 0 of 5 grasps: of {tried} antipodal grasps tried, the open")
     assert sum(counts) == tried >= 400
@@ -54,9 +57,8 @@ def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
 def test_nothing_executed_is_explained(tmp_path: Path) -> None:
     out = tmp_path / "run"
     options = {"mode": "hand", "only": ["screwdriver"], "workers": 1, "progress": False}
-    run = evaluate(
-        "tabletop_six", "panda_tabletop", out, grasps_per_object=20, blind=True, **options
-    )
+    options = asked(grasps_per_object=20, blind=True, **options)
+    run = evaluate("tabletop_six", "panda_tabletop", out, **options)
     counts = Counter(run.results["outcome"].tolist())
     assert counts.total() == 20 and not set(counts) - {"collision_table", "collision_target"}
     (note,) = summarize(run).notes

@@ -19,6 +19,7 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.run_document import RunDocument, run_hash
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report import write_report
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station, load_station
@@ -27,7 +28,11 @@ from burg_drake.station.document.station_document import Station, load_station
 @pytest.fixture
 def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=10, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=10, blind=True),
+        progress=False,
     )
 
 
@@ -179,9 +184,7 @@ def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
             scene,
             station,
             run.path,
-            grasps_per_object=10,
-            blind=True,
-            engine=engine,
+            settings=EvaluationSettings(grasps_per_object=10, blind=True, engine=engine),
             progress=False,
         )
 

@@ -14,6 +14,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
@@ -37,25 +38,26 @@ from pathlib import Path
 sys.path.insert(0, {tests!r})
 import known_judge
 from inline_executor import Inline
-from burg_drake.evaluation import cascade, many_scenes
+from burg_drake.evaluation import cascade
+from burg_drake.evaluation.run import many_scenes
 def patch(place, value):
     module, _, name = place.rpartition(".")
     if "reachability" not in place:
         setattr(__import__(module, fromlist=[name]), name, value)
 known_judge.install(patch, pause=0.04)
 cascade.evaluate({scenes!r}, "panda_tabletop", {out!r}, executor=Inline(3),
-    grasps_per_object=5, blind=True, progress=False)
+    settings=cascade.EvaluationSettings(grasps_per_object=5, blind=True), progress=False)
 """
 
 
 def test_of_a_run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> None:
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        evaluate(scene, station, out, executor=Inline(stop=6), **OPTIONS)
+        evaluate(scene, station, out, **asked(executor=Inline(stop=6), **OPTIONS))
     watch = Watch(out)
     status = watch.look()
     assert (status.judged, status.total, status.complete, status.working) == (6, 15, False, False)
-    run = evaluate(scene, station, out, executor=Inline(), **OPTIONS)
+    run = evaluate(scene, station, out, **asked(executor=Inline(), **OPTIONS))
     status = watch.look()
     assert (status.judged, status.complete, status.left) == (15, True, None)
     assert status.outcomes == Counter(run.results["outcome"].tolist())
@@ -74,8 +76,8 @@ def test_the_rate_is_that_of_the_stretch_under_way(
 ) -> None:
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
-        evaluate(scene, station, out, executor=Inline(stop=9), **OPTIONS)
-    run = evaluate(scene, station, out, executor=Inline(), **OPTIONS)
+        evaluate(scene, station, out, **asked(executor=Inline(stop=9), **OPTIONS))
+    run = evaluate(scene, station, out, **asked(executor=Inline(), **OPTIONS))
     killed, last = run.document.stretches
     assert (killed.before, killed.judged, last.before, last.judged) == (0, 9, 9, 6)
     started = (datetime.now(UTC) - timedelta(seconds=10)).isoformat()

@@ -21,13 +21,18 @@ from burg_drake.evaluation.results.summary import (
     summarize,
 )
 from burg_drake.evaluation.results.summary_tables import summary_view
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture
 def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
     return evaluate(
-        scene, station, tmp_path / "run", grasps_per_object=30, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        progress=False,
     )
 
 
@@ -73,7 +78,11 @@ def test_a_failed_simulation_is_neither_executed_nor_lost_from_the_counts(
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
     failed = evaluate(
-        scene, station, tmp_path / "f", grasps_per_object=30, blind=True, progress=False
+        scene,
+        station,
+        tmp_path / "f",
+        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        progress=False,
     )
     funnel = summarize(failed).total.funnel
     assert funnel["reachable"] - funnel["executed"] == 1

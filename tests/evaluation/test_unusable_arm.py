@@ -13,6 +13,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.motion.workspace.usable_arm import require_usable_arm
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
@@ -68,7 +69,14 @@ def test_it_is_refused_before_a_folder_is_made(case: str, scene: Scene, tmp_path
     run, plans = tmp_path / "run", tmp_path / "plans"
     for mode in ("reach", "arm"):
         with pytest.raises(InvalidInputError) as error:
-            evaluate(scene, station, run, grasps=NOTHING, mode=mode, progress=False)  # type: ignore[arg-type]
+            evaluate(
+                scene,
+                station,
+                run,
+                settings=EvaluationSettings(mode=mode),
+                grasps=NOTHING,
+                progress=False,
+            )  # type: ignore[arg-type]
         assert str(error.value).startswith(f"{station.path}: {message}")
     with pytest.raises(InvalidInputError) as other:
         reach(scene, station, NOTHING, plans=plans)
@@ -81,7 +89,14 @@ def test_it_is_refused_before_a_folder_is_made(case: str, scene: Scene, tmp_path
 
 def test_the_hand_alone_does_not_mind(scene: Scene, tmp_path: Path) -> None:
     station, _ = UNUSABLE["home"]
-    run = evaluate(scene, station, tmp_path / "run", grasps=NOTHING, mode="hand", progress=False)
+    run = evaluate(
+        scene,
+        station,
+        tmp_path / "run",
+        settings=EvaluationSettings(mode="hand"),
+        grasps=NOTHING,
+        progress=False,
+    )
     assert run.complete
 
 

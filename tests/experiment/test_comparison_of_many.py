@@ -14,6 +14,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.table_file import write_table
 from burg_drake.evaluation.run import preparation
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.scene.document.scene import save_scene
@@ -32,13 +33,20 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         instances = (place, *document.instances[1:])
         paths.append(tmp_path / f"{name}.yaml")
         save_scene(replace(document, name=name, instances=instances), paths[-1])
-    options = {"grasps_per_object": 6, "blind": True, "progress": False, "executor": Inline()}
+    settings = EvaluationSettings(grasps_per_object=6, blind=True)
+    options = {"progress": False, "executor": Inline()}
     station = load_station("panda_tabletop")
     known_judge.install(monkeypatch.setattr)
     monkeypatch.setattr(preparation, "write_report", lambda run: None)  # nobody reads them here
-    first = evaluate(paths, station, tmp_path / "first", **options)
+    first = evaluate(paths, station, tmp_path / "first", settings=settings, **options)
     monkeypatch.setattr(known_judge, "expected", _other)
-    second = evaluate(paths, station, tmp_path / "second", engine="screening", **options)
+    second = evaluate(
+        paths,
+        station,
+        tmp_path / "second",
+        settings=replace(settings, engine="screening"),
+        **options,
+    )
     whole = compare(first, second.path)
     parts = [compare(first.run(name), second.run(name)) for name in ("here", "there")]
     assert whole.coverage.compared == sum(p.coverage.compared for p in parts) == 36

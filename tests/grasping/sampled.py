@@ -8,7 +8,7 @@ from scipy.stats import ks_2samp
 from trimesh import creation
 
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 
 
 def box(x: float, y: float, z: float, center=(0.0, 0.0, 0.0)) -> trimesh.Trimesh:
@@ -32,7 +32,9 @@ def lumpy() -> trimesh.Trimesh:
 
 
 def grasp(mesh, n=2000, seed=0, **parameters) -> GraspSet:
-    return sample_antipodal(mesh, n, np.random.default_rng(seed), **parameters)
+    others = {k: parameters.pop(k) for k in ("weights", "accept", "object") if k in parameters}
+    settings = AntipodalSettings(**parameters)
+    return sample_antipodal(mesh, n, np.random.default_rng(seed), settings, **others)
 
 
 def closing(grasps: GraspSet) -> np.ndarray:

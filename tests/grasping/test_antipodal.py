@@ -20,7 +20,7 @@ from trimesh import creation
 from burg_drake.core.errors import InvalidInputError, MeshError
 from burg_drake.core.frames import check_pose, swap_fingers
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.antipodal import PATIENCE, sample_antipodal
+from burg_drake.grasping.sampling.antipodal import PATIENCE, AntipodalSettings, sample_antipodal
 from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
 
 MU = 0.24
@@ -161,12 +161,18 @@ def test_the_provenance_is_enough_to_sample_again():
     mesh = lumpy()
     rng = np.random.default_rng(11)
     rng.random(17)
-    grasps = sample_antipodal(mesh, 40, rng, friction=0.4, opening=(0.01, 0.07), object="lump")
+    grasps = sample_antipodal(
+        mesh, 40, rng, AntipodalSettings(friction=0.4, opening=(0.01, 0.07)), object="lump"
+    )
     p = grasps.provenance
     again = np.random.default_rng()
     again.bit_generator.state = p["rng"]
     repeated = sample_antipodal(
-        mesh, p["n"], again, friction=p["friction"], opening=tuple(p["opening"]), object="lump"
+        mesh,
+        p["n"],
+        again,
+        AntipodalSettings(friction=p["friction"], opening=tuple(p["opening"])),
+        object="lump",
     )
     np.testing.assert_array_equal(repeated.id, grasps.id)
     assert repeated.provenance == p

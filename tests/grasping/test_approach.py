@@ -48,7 +48,7 @@ def test_approaches_to_a_sphere_are_uniform_in_the_cone(degrees, axis):
     uniform, up to the sine of the cone's angle, from where on no approach is left."""
     n = 3000
     sphere = creation.icosphere(subdivisions=5, radius=0.03)
-    grasps = grasp(sphere, n=n, friction=0.01, approach_cone=cone(degrees, axis))
+    grasps = grasp(sphere, n=n, friction=0.01, approach_cones=(cone(degrees, axis),))
     check_pose(grasps.X_OG, "X_OG")
     assert len(grasps) == n
     assert degrees - 2.0 < from_axis(grasps, axis).max() <= degrees + 1e-6
@@ -64,7 +64,7 @@ def test_approaches_to_a_sphere_are_uniform_in_the_cone(degrees, axis):
 def test_a_box_on_a_table_is_not_grasped_by_its_top_and_bottom():
     cube = box(0.04, 0.04, 0.04)
     vertical = {
-        degrees: np.abs(closing(grasp(cube, n=3000, approach_cone=cone(degrees)))[:, 2]) > 0.5
+        degrees: np.abs(closing(grasp(cube, n=3000, approach_cones=(cone(degrees),)))[:, 2]) > 0.5
         for degrees in (60.0, 75.0, 90.0, 180.0)
     }
     assert not vertical[60.0].any() and not vertical[75.0].any()  # the lines tilt by 13.5 degrees
@@ -74,32 +74,35 @@ def test_a_box_on_a_table_is_not_grasped_by_its_top_and_bottom():
 
 
 def test_a_plate_that_lies_has_no_grasp_from_above():
-    assert len(grasp(box(0.3, 0.4, 0.05), n=100, approach_cone=cone(75.0))) == 0
-    steeper = grasp(box(0.3, 0.4, 0.05), n=100, approach_cone=cone(80.0))
+    assert len(grasp(box(0.3, 0.4, 0.05), n=100, approach_cones=(cone(75.0),))) == 0
+    steeper = grasp(box(0.3, 0.4, 0.05), n=100, approach_cones=(cone(80.0),))
     assert len(steeper) == 100  # closing lines that tilt by 10 degrees or more
     assert np.abs(closing(steeper)[:, 2]).max() <= np.cos(np.deg2rad(10.0))
 
 
 def test_a_cone_of_all_directions_leaves_out_nothing():
-    free, everywhere = grasp(lumpy(), n=12000), grasp(lumpy(), n=12000, approach_cone=cone(180.0))
+    free, everywhere = (
+        grasp(lumpy(), n=12000),
+        grasp(lumpy(), n=12000, approach_cones=(cone(180.0),)),
+    )
     for column in (0, 3):  # the same pairs of contacts
         np.testing.assert_array_equal(everywhere.X_OG[..., column], free.X_OG[..., column])
     assert_same_distribution(free, everywhere)
 
 
 def test_a_cone_selects_among_the_pairs_of_the_same_seed():
-    free, above = grasp(lumpy(), n=4000), grasp(lumpy(), n=500, approach_cone=cone(50.0))
+    free, above = grasp(lumpy(), n=4000), grasp(lumpy(), n=500, approach_cones=(cone(50.0),))
     rows = {tuple(row): i for i, row in enumerate(free.X_OG[:, :3, 3])}
     index = [rows[tuple(row)] for row in above.X_OG[:, :3, 3]]
     assert index == sorted(index)
     possible = np.abs(closing(free)[: index[-1] + 1, 2]) <= np.sin(np.deg2rad(50.0))
     assert np.flatnonzero(possible).tolist() == index
-    repeated = grasp(lumpy(), n=9000, approach_cone=cone(50.0))
+    repeated = grasp(lumpy(), n=9000, approach_cones=(cone(50.0),))
     np.testing.assert_array_equal(repeated.id[:500], above.id)
 
 
 def test_several_approaches_share_the_cone_evenly():
-    grasps = grasp(lumpy(), n=600, approaches=3, approach_cone=cone(50.0))
+    grasps = grasp(lumpy(), n=600, approaches=3, approach_cones=(cone(50.0),))
     assert from_axis(grasps).max() <= 50.0 + 1e-6
     rank = rank_among_allowed(grasps, 50.0).reshape(-1, 3)
     wide = np.abs(closing(grasps)[::3, 2]) < 0.6  # where 0.1 degrees are little
@@ -115,7 +118,7 @@ SIDE = (0.8, -0.6, 0.0)
 
 def test_a_half_space_and_a_cone_both_hold():
     cones = (cone(60.0), cone(90.0, SIDE))
-    grasps = grasp(lumpy(), n=3000, approach_cone=cones)
+    grasps = grasp(lumpy(), n=3000, approach_cones=cones)
     assert len(grasps) == 3000
     check_pose(grasps.X_OG, "X_OG")
     assert 55.0 < from_axis(grasps).max() <= 60.0 + 1e-6
@@ -125,7 +128,7 @@ def test_a_half_space_and_a_cone_both_hold():
         np.deg2rad(60.0),
         np.pi / 2,
     ]
-    np.testing.assert_array_equal(grasp(lumpy(), n=100, approach_cone=cones).id, grasps.id[:100])
+    np.testing.assert_array_equal(grasp(lumpy(), n=100, approach_cones=cones).id, grasps.id[:100])
 
 
 @pytest.mark.parametrize(
@@ -141,7 +144,7 @@ def test_a_half_space_and_a_cone_both_hold():
 def test_turns_are_spread_evenly_over_all_that_is_allowed(cones):
     """Against trying all turns one by one, about closing axes in all directions."""
     approaches, steps = 200, 3600
-    grasps = grasp(lumpy(), n=40 * approaches, approaches=approaches, approach_cone=cones)
+    grasps = grasp(lumpy(), n=40 * approaches, approaches=approaches, approach_cones=cones)
     X = grasps.X_OG.reshape(40, approaches, 4, 4)
     turn = 2 * np.pi * np.arange(steps) / steps
     for pair in X:
@@ -162,7 +165,7 @@ def test_turns_are_spread_evenly_over_all_that_is_allowed(cones):
 def test_the_first_turn_is_uniform_over_all_that_is_allowed():
     """Its rank among the allowed turns, counted from one direction on, is uniform."""
     cones = (cone(130.0), cone(125.0, (0.2, 0.1, 1.0)))
-    grasps = grasp(lumpy(), n=1500, approach_cone=cones)
+    grasps = grasp(lumpy(), n=1500, approach_cones=cones)
     x, z = closing(grasps), grasps.X_OG[:, :3, 2]
     start = np.cross(x, (0.3, -0.5, 0.2))
     start /= np.linalg.norm(start, axis=1, keepdims=True)
@@ -179,27 +182,29 @@ def test_the_first_turn_is_uniform_over_all_that_is_allowed():
 
 def test_the_order_of_cones_does_not_matter_to_what_is_allowed():
     a, b = cone(60.0), cone(90.0, SIDE)
-    one, two = (grasp(lumpy(), n=12000, approach_cone=c) for c in ((a, b), (b, a)))
+    one, two = (grasp(lumpy(), n=12000, approach_cones=c) for c in ((a, b), (b, a)))
     assert_same_distribution(one, two)
     np.testing.assert_array_equal(one.X_OG[..., 0], two.X_OG[..., 0])  # the same pairs
-    same = grasp(lumpy(), n=500, approach_cone=(a, a))
-    np.testing.assert_allclose(same.X_OG, grasp(lumpy(), n=500, approach_cone=a).X_OG, atol=1e-7)
+    same = grasp(lumpy(), n=500, approach_cones=(a, a))
+    np.testing.assert_allclose(
+        same.X_OG, grasp(lumpy(), n=500, approach_cones=(a,)).X_OG, atol=1e-7
+    )
 
 
 def test_an_object_that_is_turned_with_its_limits_has_the_turned_approaches():
     X_NO = trimesh.transformations.rotation_matrix(1.1, [1, 2, -0.5])
     cones = (cone(80.0), cone(90.0, SIDE))
     turned_cones = [ApproachCone(tuple(X_NO[:3, :3] @ c.axis), c.angle) for c in cones]
-    turned = grasp(lumpy().apply_transform(X_NO), n=12000, seed=1, approach_cone=turned_cones)
+    turned = grasp(lumpy().apply_transform(X_NO), n=12000, seed=1, approach_cones=turned_cones)
     back = GraspSet.create(
         np.linalg.inv(X_NO) @ turned.X_OG, object="", width=turned.width, score=turned.score
     )
-    assert_same_distribution(grasp(lumpy(), n=12000, seed=2, approach_cone=cones), back)
+    assert_same_distribution(grasp(lumpy(), n=12000, seed=2, approach_cones=cones), back)
 
 
 def test_cones_that_have_no_direction_in_common():
     opposite = (cone(30.0), cone(30.0, (0.0, 0.0, 1.0)))
-    assert len(grasp(lumpy(), n=10, approach_cone=opposite)) == 0
+    assert len(grasp(lumpy(), n=10, approach_cones=opposite)) == 0
 
 
 # --- what is told, and what is refused ------------------------------------------------------------
@@ -207,10 +212,10 @@ def test_cones_that_have_no_direction_in_common():
 
 def test_the_provenance_tells_the_cone():
     assert grasp(lumpy(), n=1).provenance["approach_cones"] == []
-    above = grasp(lumpy(), n=5, approach_cone=cone(60.0, np.array([0, 1, -1])))
+    above = grasp(lumpy(), n=5, approach_cones=(cone(60.0, np.array([0, 1, -1])),))
     (told,) = above.provenance["approach_cones"]
     assert told == {"axis": [0.0, 1.0, -1.0], "angle": np.deg2rad(60.0)}
-    again = grasp(lumpy(), n=5, approach_cone=ApproachCone(tuple(told["axis"]), told["angle"]))
+    again = grasp(lumpy(), n=5, approach_cones=(ApproachCone(tuple(told["axis"]), told["angle"]),))
     np.testing.assert_array_equal(again.id, above.id)
 
 

@@ -22,7 +22,7 @@ from burg_drake.grasping.quality.metrics import (
     grasp_quality,
     score_grasps,
 )
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 
 BOX = Surface.of(trimesh.creation.box((0.04, 0.1, 0.1)))
 MIDDLE = float(np.mean(PANDA_JAWS.z))
@@ -41,7 +41,7 @@ def potato() -> trimesh.Trimesh:
 
 
 def sampled(mesh: trimesh.Trimesh, n: int = 40) -> Array:
-    return sample_antipodal(mesh, n, np.random.default_rng(1), friction=0.3).X_OG
+    return sample_antipodal(mesh, n, np.random.default_rng(1), AntipodalSettings(friction=0.3)).X_OG
 
 
 def assert_alike(one: Quality, other: Quality, rtol: float) -> None:

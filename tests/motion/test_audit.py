@@ -14,7 +14,7 @@ import pytest
 
 from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.motion.reach.witness import Witness
 from burg_drake.scene.document.scene import Scene, load_scene
@@ -55,7 +55,9 @@ def motions(scene: Scene, station: Station) -> list[Motion]:
     found = []
     for name in ("mug", "bottle", "box", "bowl"):
         mesh = scene.library.surface(scene.instance(name).object)
-        sampled = sample_antipodal(mesh, 300, rng_from("audit", name), friction=0.5)
+        sampled = sample_antipodal(
+            mesh, 300, rng_from("audit", name), AntipodalSettings(friction=0.5)
+        )
         X_WG = reach.diagram.X_WO(name) @ sampled.X_OG
         above = np.flatnonzero(X_WG[:, 2, 2] < -0.5)[:12]
         verdicts = reach.check_all([name] * len(above), X_WG[above], sampled.width[above])

@@ -17,7 +17,7 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose, rot_z, swap_fingers
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.motion.planner import Planner
 from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
@@ -130,7 +130,9 @@ def grasps(scene: Scene, reach: ArmReach) -> Grasps:
     names, poses, widths = [], [], []
     for name in scene.instances:
         mesh = scene.library.surface(scene.instance(name).object)
-        sampled = sample_antipodal(mesh, 2000, rng_from("motions", name), friction=0.5)
+        sampled = sample_antipodal(
+            mesh, 2000, rng_from("motions", name), AntipodalSettings(friction=0.5)
+        )
         X = reach.diagram.X_WO(name) @ sampled.X_OG
         front = np.flatnonzero((X[:, 0, 2] > 0.5) & clearance.is_clear(X))[:4]
         names += [name] * len(front)

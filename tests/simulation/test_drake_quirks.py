@@ -13,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import pydrake
 import pytest
 import trimesh
 from pydrake.common.eigen_geometry import Quaternion
@@ -443,3 +444,25 @@ def test_cenic_tears_coupled_joints_apart_in_a_step_of_a_rounding() -> None:
     simulator.AdvanceTo(0.3 + 2.5e-16)
     speed = abs(joints[0].get_translation_rate(context))
     assert speed < 0.151 if changed_in(1, 55) else speed > 1e3
+
+
+ARRAY = "numpy.ndarray[numpy.float64["
+WRONG_STUBS = {
+    "common/eigen_geometry.pyi": ARRAY,
+    "common/value.pyi": "def get_value(self, *args, **kwargs) -> None",
+    "geometry/__init__.pyi": ARRAY,
+    "math.pyi": ARRAY,
+    "multibody/math.pyi": ARRAY,
+    "multibody/plant.pyi": ARRAY,
+    "multibody/tree.pyi": ARRAY,
+    "planning.pyi": ARRAY,
+    "systems/framework.pyi": "def Eval(self, context: ContextBase) -> object",
+    "systems/sensors.pyi": "def mutable_data(self) -> object",
+}
+
+
+@pytest.mark.parametrize("stub", WRONG_STUBS)
+def test_stubs_are_wrong(stub: str) -> None:
+    """Then mypy may follow this one, too: take it out of the overrides in pyproject.toml."""
+    text = (Path(pydrake.__file__).parent / stub).read_text(encoding="utf-8")
+    assert WRONG_STUBS[stub] in text

@@ -14,7 +14,7 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import swap_fingers
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.resources import resolve
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Board, Instance, SceneDocument, load_scene, save_scene
@@ -213,7 +213,9 @@ def test_a_box_that_is_too_wide_for_the_others_is_for_the_wide_hand(
     mesh = trimesh.creation.box(WIDE, trimesh.transformations.translation_matrix((0, 0, 0.05)))
     opening = trial.diagram.station.hand.opening
     assert opening[1] == case.widest
-    sampled = sample_antipodal(mesh, 20, np.random.default_rng(0), opening=opening)
+    sampled = sample_antipodal(
+        mesh, 20, np.random.default_rng(0), AntipodalSettings(opening=opening)
+    )
     result = trial.run("wide", from_above(0.08), friction=0.5)
     if case.widest > WIDE[0]:
         assert len(sampled) == 20 and sampled.width.max() < case.widest

@@ -18,7 +18,7 @@ from burg_drake.core.frames import make_pose, quaternion_from_rotation, rot_z
 from burg_drake.scene.document.scene import Board
 from burg_drake.scene.document.validation import validate_scene
 from burg_drake.station.document.station_document import load_station
-from burg_drake.ui.server.door import PageServer, serve
+from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from burg_drake.ui.view.board import sheet_picture
 from burg_drake.ui.view.object_pictures import ObjectPictures
@@ -31,7 +31,7 @@ FREE = "x, y, yaw only"
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage, PageServer]]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage, ServedPage]]:
     """A page for all tests, without the library's pictures, which take a process of their own."""
     folder = tmp_path_factory.mktemp("scenes")
     with pytest.MonkeyPatch.context() as patch:
@@ -44,7 +44,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage
 
 
 @pytest.fixture
-def page(opened: tuple[SetupPage, PageServer]) -> SetupPage:
+def page(opened: tuple[SetupPage, ServedPage]) -> SetupPage:
     """The page on a new scene."""
     page, _ = opened
     page.actions.session.new("household", discard=True)
@@ -59,7 +59,7 @@ def session(page: SetupPage) -> ComposeSession:
 
 
 @pytest.fixture
-def client(page: SetupPage, opened: tuple[SetupPage, PageServer]) -> Iterator[PageClient]:
+def client(page: SetupPage, opened: tuple[SetupPage, ServedPage]) -> Iterator[PageClient]:
     with PageClient(opened[1]) as client:
         yield client
 

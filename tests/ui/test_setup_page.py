@@ -18,7 +18,7 @@ from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.session import ComposeSession
 from burg_drake.station.document.station_document import load_station
 from burg_drake.ui.pointing.pointer import PageCamera
-from burg_drake.ui.server.door import PageServer, serve
+from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from tests.ui.page_client import until
 
@@ -31,7 +31,7 @@ class Setup:
 
     session: ComposeSession
     page: SetupPage
-    door: PageServer
+    door: ServedPage
     tab: Any
 
     @property

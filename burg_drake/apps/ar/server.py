@@ -16,52 +16,29 @@ this machine as their host (which stops DNS rebinding), and what acts must come 
 
 from __future__ import annotations
 
-import errno
-import json
-import socket
-import sys
 import threading
-from collections.abc import Callable
-from functools import partial
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from typing import Any
 
 from burg_drake.apps.ar.session_status import status
-from burg_drake.apps.web import address, json_body, picture_number
+from burg_drake.apps.web import PageHandler, PageServer, address, picture_number
 from burg_drake.cameras.live import LiveSession, ViewActions
-from burg_drake.core import (
-    HEADERS as ACCESS_HEADERS,
-    LOCALHOST,
-    BurgError,
-    InvalidInputError,
-    RequestError,
-    address_in_use_error,
-    page_url,
-    require_local_host,
-)
+from burg_drake.core import LOCALHOST, RequestError, require_local_host
 
-FIRST_PORT, PORTS = 7100, 50
-"""Without a port the first free one of these; Meshcat's begin at 7000."""
+FIRST_PORT = 7100
+"""Without a port the first free one from here on; Meshcat's begin at 7000."""
 PATIENCE = 1.0
 """How long a request for a picture waits for a newer one [s]."""
-IDLE = 30.0
-"""A connection without requests is closed after this [s]."""
 BOUNDARY = "picture"
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
     "/page.js": ("page.js", "text/javascript; charset=utf-8"),
 }
-HEADERS = {
-    **ACCESS_HEADERS,
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:;"
-    " frame-ancestors 'none'",
-}
+POLICY = "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'"
 
 
-class ViewServer(ThreadingHTTPServer):
+class ViewServer(PageServer):
     """Serves a live session until it is closed.
 
     Args:
@@ -74,8 +51,8 @@ class ViewServer(ThreadingHTTPServer):
         InvalidInputError: the port is taken, or the address is not this machine's.
     """
 
-    daemon_threads = True
-    allow_reuse_address = sys.platform != "win32"
+    first_port = FIRST_PORT
+    title = "view"
 
     def __init__(
         self,
@@ -85,67 +62,37 @@ class ViewServer(ThreadingHTTPServer):
         host: str = LOCALHOST,
         port: int | None = None,
     ) -> None:
-        self.live, self.actions, self.host = live, actions, host
-        if ":" in host:
-            self.address_family = socket.AF_INET6
+        self.live, self.actions = live, actions
         self.closing = threading.Event()
-        ports = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else range(port, port + 1)
-        for candidate in ports:
-            try:
-                super().__init__((host, candidate), ViewHandler)
-                break
-            except OSError as error:
-                failure = error
-                if error.errno != errno.EADDRINUSE:
-                    raise InvalidInputError(
-                        f"the view cannot be served on {host}: {error.strerror or error}"
-                    ) from error
-        else:
-            raise InvalidInputError(
-                address_in_use_error(host, ports, any_of_them=port is None)
-            ) from failure
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return page_url(self.host, self.server_address[1])
-
-    def start(self) -> None:
-        """Serves in a thread of its own."""
-        threading.Thread(target=self.serve_forever, name="view server", daemon=True).start()
+        super().__init__(ViewHandler, host=host, port=port)
 
     def close(self) -> None:
         """Stops serving; requests that are being answered end soon."""
         self.closing.set()
-        self.shutdown()
-        self.server_close()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away in the middle of an answer is no error."""
-        if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
-            super().handle_error(request, client_address)
+        super().close()
 
 
-class ViewHandler(BaseHTTPRequestHandler):
+class ViewHandler(PageHandler):
     """Answers one connection's requests."""
 
     server: ViewServer
-    protocol_version = "HTTP/1.1"
-    timeout = IDLE
+    package = "burg_drake.apps.ar"
+    pages = PAGES
+    policy = POLICY
 
     def do_GET(self) -> None:
         """Pages, pictures, status."""
-        routes: dict[str, Callable[[dict[str, str]], None]] = {
-            "/frame.jpg": self._send_picture,
-            "/stream.mjpg": self._send_stream,
-            "/status": self._send_status,
-        }
-        routes |= {path: partial(self._send_page, path) for path in PAGES}
-        self._answer(routes)
+        self.answer(
+            {
+                "/frame.jpg": self._send_picture,
+                "/stream.mjpg": self._send_stream,
+                "/status": self._send_status,
+            }
+        )
 
     def do_POST(self) -> None:
         """Actions."""
-        self._answer(
+        self.answer(
             {
                 "/settings": self._change_settings,
                 "/snapshot": self._take_snapshot,
@@ -154,39 +101,22 @@ class ViewHandler(BaseHTTPRequestHandler):
             }
         )
 
-    def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
-        try:
-            require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
-            path, query = address(self.path)
-            if path not in routes:
-                raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path}")
-            routes[path](json_body(self.headers, self.rfile) if self.command == "POST" else query)
-        except RequestError as error:
-            self.close_connection = True  # its body may not have been read
-            self._send_json({"error": str(error)}, error.code)
-        except BurgError as error:
-            self._send_json({"error": str(error)}, HTTPStatus.CONFLICT)
-
-    def _send_page(self, path: str, query: dict[str, str]) -> None:
-        name, kind = PAGES[path]
-        page = (files("burg_drake.apps.ar") / name).read_bytes()
-        self._send(HTTPStatus.OK, kind, page)
+    def admitted(self) -> tuple[str, dict[str, str]]:
+        """Only this machine is meant, and only the page itself may be led to from elsewhere."""
+        require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
+        return address(self.path)
 
     def _send_picture(self, query: dict[str, str]) -> None:
         picture = self.server.live.next_picture(picture_number(query), PATIENCE)
         if picture is None:
-            self._send(HTTPStatus.NO_CONTENT)
+            self.send(HTTPStatus.NO_CONTENT)
         else:
-            self._send(
-                HTTPStatus.OK, "image/jpeg", picture.jpeg, {"X-Picture": str(picture.number)}
-            )
+            self.send(HTTPStatus.OK, "image/jpeg", picture.jpeg, {"X-Picture": str(picture.number)})
 
     def _send_stream(self, query: dict[str, str]) -> None:
         self.close_connection = True
-        self.send_response(HTTPStatus.OK)
-        for name, value in HEADERS.items():
-            self.send_header(name, value)
-        self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+        kind = f"multipart/x-mixed-replace; boundary={BOUNDARY}"
+        self.send_head(HTTPStatus.OK, {"Content-Type": kind})
         self.end_headers()
         number = 0
         while not self.server.closing.is_set():
@@ -201,44 +131,22 @@ class ViewHandler(BaseHTTPRequestHandler):
             self.wfile.write(head.encode() + picture.jpeg + b"\r\n")
 
     def _send_status(self, query: dict[str, str]) -> None:
-        self._send_json(status(self.server.live, self.server.actions, picture_number(query)))
+        self.send_json(status(self.server.live, self.server.actions, picture_number(query)))
 
     def _change_settings(self, body: dict[str, Any]) -> None:
         self.server.live.change(**body)
-        self._send_json({})
+        self.send_json({})
 
     def _take_snapshot(self, body: dict[str, Any]) -> None:
-        self._send_json({"path": str(self.server.actions.snapshot())})
+        self.send_json({"path": str(self.server.actions.snapshot())})
 
     def _record(self, body: dict[str, Any]) -> None:
         if not isinstance(body.get("on"), bool):
             raise RequestError(HTTPStatus.BAD_REQUEST, '"on" must be true or false')
         actions = self.server.actions
         path = actions.start_recording() if body["on"] else actions.stop_recording()
-        self._send_json({"path": path and str(path)})
+        self.send_json({"path": path and str(path)})
 
     def _check(self, body: dict[str, Any]) -> None:
         self.server.actions.start_check()
-        self._send_json({})
-
-    def _send_json(self, data: Any, code: HTTPStatus = HTTPStatus.OK) -> None:
-        self._send(code, "application/json", json.dumps(data, allow_nan=False).encode())
-
-    def _send(
-        self,
-        code: HTTPStatus,
-        kind: str = "",
-        body: bytes = b"",
-        headers: dict[str, str] | None = None,
-    ) -> None:
-        self.send_response(code)
-        for name, value in {**HEADERS, **(headers or {})}.items():
-            self.send_header(name, value)
-        if code != HTTPStatus.NO_CONTENT:
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Requests are not worth a line."""
+        self.send_json({})

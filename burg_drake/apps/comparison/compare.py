@@ -10,8 +10,6 @@ from burg_drake.apps.comparison.rejudge import (
     add_rejudge,
     rejudge_for,
     rejudge_words,
-    rejudged_json,
-    rejudged_sections,
     show_rejudged,
 )
 from burg_drake.apps.options import add_verb, not_negative, seed
@@ -99,9 +97,10 @@ def run_compare(arguments: argparse.Namespace) -> int:
     again = rejudge_for(arguments)
     if arguments.html is not None:
         from burg_drake.experiment.comparison.report import comparison_page
+        from burg_drake.experiment.gap.report import rejudged_section
 
-        line, more = command_line(arguments), rejudged_sections(again)
-        page = comparison_page(found, Path(arguments.html), line, more)
+        more = [] if again is None else [rejudged_section(again)]
+        page = comparison_page(found, Path(arguments.html), command_line(arguments), more)
         atomic_write(arguments.html, page)
     _print(found, again, arguments)
     return 0
@@ -124,8 +123,10 @@ def command_line(arguments: argparse.Namespace) -> str:
 def _print(found: Comparison, again: Rejudging | None, arguments: argparse.Namespace) -> None:
     if arguments.json:
         from burg_drake.experiment.comparison import comparison_json
+        from burg_drake.experiment.gap import rejudging_json
 
-        print(comparison_json(found, rejudged_json(again)), end="")
+        more = {} if again is None else {"rejudged": rejudging_json(again)}
+        print(comparison_json(found, more), end="")
         return
     from rich.console import Console
 

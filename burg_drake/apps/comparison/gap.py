@@ -186,6 +186,7 @@ def _measure(
     cluster: Executor | None,
 ) -> GapSteps:
     from burg_drake.core.workers import default_workers
+    from burg_drake.evaluation.run import EvaluationSettings
     from burg_drake.evaluation.workers import LocalExecutor
     from burg_drake.experiment.gap import PlacementNoise, measure_gap
     from burg_drake.scene.document import load_scene
@@ -219,14 +220,16 @@ def _measure(
         scene,
         arguments.output,
         station=station,
-        engine=arguments.engine or DEFAULT_ENGINE,
-        motion=chosen_motion(arguments, station),
-        seed=arguments.seed,
         grasps=given.by_instance if given else None,
-        grasps_per_object=grasps_per_object(arguments),
-        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-        blind=arguments.blind,
-        only=arguments.only,
+        evaluation=EvaluationSettings(
+            engine=arguments.engine or DEFAULT_ENGINE,
+            motion=chosen_motion(arguments, station),
+            seed=arguments.seed,
+            grasps_per_object=grasps_per_object(arguments),
+            approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+            blind=arguments.blind,
+            only=arguments.only,
+        ),
         **options,
     )
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from burg_drake.apps.options import Parser, add_cluster, chosen_cluster, workers
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.experiment.gap import Rejudging
-    from burg_drake.visualization.style import Html
 
 
 def add_rejudge(parser: Parser) -> None:
@@ -80,24 +79,6 @@ def rejudge_words(arguments: argparse.Namespace) -> list[str]:
     if arguments.rejudge is None:
         return []
     return ["--rejudge", *([arguments.rejudge] if arguments.rejudge else [])]
-
-
-def rejudged_sections(found: Rejudging | None) -> list[Html]:
-    """Sections of the page."""
-    if found is None:
-        return []
-    from burg_drake.experiment.gap.report import rejudged_section
-
-    return [rejudged_section(found)]
-
-
-def rejudged_json(found: Rejudging | None) -> dict[str, Any]:
-    """Further keys of the JSON."""
-    if found is None:
-        return {}
-    from burg_drake.experiment.gap import rejudging_json
-
-    return {"rejudged": rejudging_json(found)}
 
 
 def show_rejudged(found: Rejudging | None) -> None:

@@ -49,17 +49,7 @@ def evaluate_many(
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
     motion = chosen_motion(arguments, station)
-    campaign = evaluate(
-        list(references),
-        station,
-        arguments.output,
-        grasps=_given(arguments, station),
-        executor=executor,
-        mode=mode,
-        motion=motion,
-        scene_reports=arguments.scene_reports,
-        **asked_settings(arguments),
-    )
+    campaign = evaluate(list(references), station, arguments.output, settings=asked_settings(arguments, mode, motion), grasps=_given(arguments, station), executor=executor, workers=arguments.workers, retry_failed=arguments.retry_failed, progress=not arguments.quiet,)
     print_campaign(campaign)
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")

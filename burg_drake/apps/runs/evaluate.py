@@ -146,16 +146,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
     with chosen_cluster(arguments) as executor:
-        run = evaluate(
-            scene,
-            station,
-            arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-            grasps=given.by_instance if given else None,
-            executor=executor,
-            mode=mode,
-            motion=motion,
-            **asked_settings(arguments),
-        )
+        run = evaluate(scene, station, arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}", settings=asked_settings(arguments, mode, motion), grasps=given.by_instance if given else None, executor=executor, workers=arguments.workers, retry_failed=arguments.retry_failed, progress=not arguments.quiet,)
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; burg-drake merge unites all of them")

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING
 
-from burg_drake.apps.options import DEFAULT_APPROACH_ANGLE
-from burg_drake.apps.options import grasps_per_object
+from burg_drake.apps.options import DEFAULT_APPROACH_ANGLE, grasps_per_object
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import Mode
+    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.station.document import GraspMotion
 
 
-def asked_settings(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Arguments of `evaluation.cascade.evaluate`: those that need no scene or station."""
-    return {
-        "grasps_per_object": grasps_per_object(arguments),
-        "approach_angle_deg": arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-        "blind": arguments.blind,
-        "only": arguments.only,
-        "engine": arguments.engine,
-        "seed": arguments.seed,
-        "workers": arguments.workers,
-        "shard": arguments.shard,
-        "table": arguments.table,
-        "retry_failed": arguments.retry_failed,
-        "progress": not arguments.quiet,
-    }
+def asked_settings(
+    arguments: argparse.Namespace, mode: Mode, motion: GraspMotion
+) -> EvaluationSettings:
+    """The settings that options ask for, on a station that has this mode and motion."""
+    from burg_drake.evaluation.run import EvaluationSettings
+
+    return EvaluationSettings(
+        grasps_per_object=grasps_per_object(arguments),
+        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
+        blind=arguments.blind,
+        only=arguments.only,
+        mode=mode,
+        engine=arguments.engine,
+        motion=motion,
+        seed=arguments.seed,
+        shard=arguments.shard,
+        table=arguments.table,
+        scene_reports=arguments.scene_reports,
+    )

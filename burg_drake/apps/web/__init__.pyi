@@ -3,3 +3,8 @@ from .requests import (
     json_body as json_body,
     picture_number as picture_number,
 )
+from .server import (
+    Answer as Answer,
+    PageHandler as PageHandler,
+    PageServer as PageServer,
+)

@@ -37,7 +37,9 @@ def coverage(views: list[CharucoView], size: tuple[int, int]) -> NDArray[np.int_
     """
     corners = np.concatenate([view.corners for view in views] or [np.empty((0, 2))])
     edges = [np.linspace(-0.5, n - 0.5, k + 1) for n, k in zip(size[::-1], CELLS, strict=True)]
-    return np.histogram2d(corners[:, 1], corners[:, 0], bins=edges)[0].astype(int)
+    counts, *_ = np.histogram2d(corners[:, 1], corners[:, 0], bins=edges)
+    whole: NDArray[np.int_] = counts.astype(int)
+    return whole
 
 
 def advice(calibration: Calibration) -> list[str]:

@@ -39,4 +39,5 @@ class Picture:
 def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
     """JPEG of an RGB image (H, W, 3)."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return data.tobytes()
+    encoded: bytes = data.tobytes()
+    return encoded

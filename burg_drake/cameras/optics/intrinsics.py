@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from burg_drake.core import Array, FieldError, InvalidInputError
-from burg_drake.station.document import HALF_PIXEL, Camera
+from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, Camera
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
@@ -107,7 +107,8 @@ class Intrinsics:
 
         p = np.asarray(p_CQ, dtype=float)
         if self.is_pinhole or not p.size:
-            return p[..., :2] / p[..., 2:] * self.focal + self.center
+            straight: Array = p[..., :2] / p[..., 2:] * self.focal + self.center
+            return straight
         flat = np.ascontiguousarray(p.reshape(-1, 1, 3))
         pixels, _ = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), self.K, self.coefficients)
         return np.asarray(pixels).reshape(*p.shape[:-1], 2)

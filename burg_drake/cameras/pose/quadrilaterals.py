@@ -63,7 +63,8 @@ def dark_quadrilaterals(
     limit = np.array([grey.shape[1], grey.shape[0]]) - 1 - MARGIN
     inside = ((corners >= MARGIN) & (corners <= limit)).all(axis=(1, 2))
     corners[turn[:, 0] < 0.0] = corners[turn[:, 0] < 0.0, ::-1]
-    return corners[convex & inside & (shortest >= SHORTEST_SIDE * np.array(lengths))]
+    chosen: Array = corners[convex & inside & (shortest >= SHORTEST_SIDE * np.array(lengths))]
+    return chosen
 
 
 def read_cells(

@@ -136,7 +136,8 @@ class MeshOutline:
         angle = np.arctan2(across, np.einsum("ij,ij->i", first, second))
         middle = self.vertices[self.faces].mean(axis=1)
         apart = middle[self.sides[:, 1]] - middle[self.sides[:, 0]]
-        return np.where(np.einsum("ij,ij->i", first, apart) <= 0.0, angle, -angle)
+        signed: Array = np.where(np.einsum("ij,ij->i", first, apart) <= 0.0, angle, -angle)
+        return signed
 
 
 def _edges(faces: Indices) -> tuple[Indices, Indices]:

@@ -188,4 +188,5 @@ def _project(H: Array, distortion: float, p_SQ: Array) -> Array:
     q = np.column_stack([p_SQ, np.ones(len(p_SQ))]) @ H.T
     ahead = q[:, 2:] > 1e-3 * np.abs(q[:, 2]).max()
     flat = np.where(ahead, q[:, :2] / np.where(ahead, q[:, 2:], 1.0), 1e3)
-    return flat * (1.0 + distortion * (flat**2).sum(axis=1, keepdims=True))
+    bent: Array = flat * (1.0 + distortion * (flat**2).sum(axis=1, keepdims=True))
+    return bent

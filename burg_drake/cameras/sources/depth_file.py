@@ -4,6 +4,7 @@ them, or a numpy array."""
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -40,15 +41,18 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
         )
     if unit is None:
         unit = 1.0 if depth.dtype.kind == "f" else MILLIMETRE
-    return np.nan_to_num(depth.astype(np.float32) * np.float32(unit), posinf=0.0, neginf=0.0)
+    metres: NDArray[np.float32] = np.nan_to_num(
+        depth.astype(np.float32) * np.float32(unit), posinf=0.0, neginf=0.0
+    )
+    return metres
 
 
-def _array(path: Path) -> NDArray:
+def _array(path: Path) -> NDArray[Any]:
     with open_npy(path) as stored:
         return stored.read("fiu")
 
 
-def _image(path: Path) -> NDArray:
+def _image(path: Path) -> NDArray[Any]:
     with quiet():
         data = np.frombuffer(read_bytes(path, IMAGE_SIZE), np.uint8)
         depth = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None

@@ -64,7 +64,8 @@ class BoardLoop:
     def X_SC(self, context: Context) -> Array:
         """(4, 4) where the camera truly is; `context` is the whole diagram's."""
         X_WC = self.sensor.GetX_PB(self.sensor.GetMyContextFromRoot(context)).GetAsMatrix4()
-        return inverse(self.built.station.document.X_WS.matrix()) @ X_WC
+        X_SC: Array = inverse(self.built.station.document.X_WS.matrix()) @ X_WC
+        return X_SC
 
     def place_camera(self, context: Context, X_SC: Array) -> None:
         """Puts the camera elsewhere over the board."""

@@ -158,4 +158,5 @@ class PoseFilter(LeafSystem):
 def _difference(X_SC: Array, X_SC_new: Array) -> Array:
     """(6,) small rotation [rad] and translation [m] in S from one pose to another."""
     turn = Rotation.from_matrix(X_SC_new[:3, :3] @ X_SC[:3, :3].T).as_rotvec()
-    return np.r_[turn, X_SC_new[:3, 3] - X_SC[:3, 3]]
+    step: Array = np.r_[turn, X_SC_new[:3, 3] - X_SC[:3, 3]]
+    return step

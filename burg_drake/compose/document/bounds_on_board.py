@@ -39,7 +39,8 @@ def _hull(path: Path, build: str) -> Array:
 
     p_OV = read_vertices(path)
     try:
-        return p_OV[ConvexHull(p_OV).vertices]
+        hull: Array = p_OV[ConvexHull(p_OV).vertices]
+        return hull
     except (QhullError, ValueError):  # flat
         return p_OV
 

@@ -84,7 +84,8 @@ def _split(numbers: NDArray[Any], unit: int) -> tuple[NDArray[Any], NDArray[Any]
 
 def _word(character: str) -> np.uint32:
     """A word with a character at its beginning."""
-    return np.frombuffer(character.encode().ljust(4, PAD), dtype=np.uint32)[0]
+    word: np.uint32 = np.frombuffer(character.encode().ljust(4, PAD), dtype=np.uint32)[0]
+    return word
 
 
 def _words(texts: Iterable[str]) -> Words:

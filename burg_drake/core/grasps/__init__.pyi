@@ -50,10 +50,7 @@ from .verdict_columns import (
     joined_findings as joined_findings,
 )
 from .verdict_field import (
-    COST as COST,
-    DECIDED as DECIDED,
-    MEASURED as MEASURED,
-    POSTURE as POSTURE,
+    Part as Part,
     TableShape as TableShape,
     TextField as TextField,
 )

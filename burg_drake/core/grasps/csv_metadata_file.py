@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from burg_drake.core.grasps.columns import Column
+from burg_drake.core.grasps.column import Column
 
 METADATA_SUFFIX = "-metadata.json"
 """Of the file beside a CSV file: where the standard has readers look for it."""

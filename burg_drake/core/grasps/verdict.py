@@ -20,7 +20,6 @@ from typing import Any
 from burg_drake.core.grasps.mode import Mode
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.grasps.verdict_field import (
-    MEASURED,
     by_instance,
     by_joint,
     by_margin,
@@ -149,7 +148,7 @@ class TrialFindings:
         metadata=text(
             "what the arm touched first against its plan, as LINK vs BODY",
             mode="arm",
-            part=MEASURED,
+            part="measured",
         ),
     )
 

@@ -11,6 +11,7 @@ from burg_drake.core.grasps.mode import Mode, asks
 from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
 from burg_drake.core.grasps.verdict_field import (
     InstancesField,
+    Part,
     VerdictField,
     declared,
 )
@@ -19,17 +20,15 @@ TRIAL_FINDINGS = declared(TrialFindings)
 """What rows of tables tell of a trial."""
 FINDINGS = declared(Findings)
 """What stages find."""
-_ENDING = {"outcome", "stage"}
-VERDICT_FIELDS = (
-    *(one for one in declared(Verdict) if one.name in _ENDING),
-    *(one for one in declared(Verdict) if one.name not in _ENDING),
+VERDICT_FIELDS = tuple(
+    sorted(declared(Verdict), key=lambda one: one.name not in ("outcome", "stage"))
 )
 """All fields that are written, in the order of files: how it ended, then why."""
 
 MARGINS = tuple(one.name for one in fields(Margins))
 """Names of all margins, in the order of tables."""
 SMALLER_IS_BETTER = frozenset(one.name for one in fields(Margins) if one.metadata["less_is_better"])
-"""Of these margins."""
+"""Names of the margins of which a smaller one is better."""
 LIFT_HEIGHT = "lift_height"
 """Margin: length of the lift that was asked for, or for which there is room."""
 ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess", LIFT_HEIGHT)
@@ -41,7 +40,7 @@ PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, In
 MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
 
 
-def fields_in(mode: Mode, part: str) -> list[VerdictField]:
+def fields_in(mode: Mode, part: Part) -> list[VerdictField]:
     """The fields that a part of a row has in tables of a mode."""
     return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
 

@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from burg_drake.core.errors import quoted
 from burg_drake.core.grasps.column import TEXT, Column
@@ -19,11 +19,9 @@ from burg_drake.core.grasps.outcome import Stage
 
 KIND: Final = "kind"
 """Key of the metadata of a dataclass's field."""
-DECIDED: Final = "decided"
-MEASURED: Final = "measured"
-POSTURE: Final = "posture"
-COST: Final = "cost"
-"""Parts of a row that fields of a verdict lie in; other columns stand between them."""
+Part = Literal["decided", "measured", "posture", "cost"]
+"""Parts of a row that fields of a verdict lie in, from left to right; other columns stand between
+them."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ class VerdictField(ABC):
     name: str = ""
     column: Column
     mode: Mode = "hand"
-    part: str = MEASURED
+    part: Part = "measured"
 
     @property
     def is_text(self) -> bool:
@@ -272,7 +270,7 @@ def text(
     *,
     of: type[str] = str,
     mode: Mode = "hand",
-    part: str = DECIDED,
+    part: Part = "decided",
     replayed: bool = True,
 ) -> dict[str, VerdictField]:
     """Metadata of a text; see `TextField`."""
@@ -294,12 +292,12 @@ def by_instance(
 
 def by_joint(prefix: str, unit: str, meaning: str) -> dict[str, VerdictField]:
     """Metadata of a number for each joint; see `JointsField`."""
-    return {KIND: JointsField(column=Column(unit, meaning), prefix=prefix, part=POSTURE)}
+    return {KIND: JointsField(column=Column(unit, meaning), prefix=prefix, part="posture")}
 
 
 def by_stage(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictField]:
     """Metadata of times by stage; see `StagesField`."""
-    return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part=COST)}
+    return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")}
 
 
 def declared(record: type[Any]) -> tuple[VerdictField, ...]:

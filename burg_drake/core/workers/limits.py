@@ -13,7 +13,7 @@ TOO_LONG = (signal.SIGPROF, signal.SIGALRM)
 
 @dataclass(frozen=True)
 class TimeLimit:
-    """What a task, or the building of a session, may take.
+    """What a task, or the building of a session, may take; imports before it do not count.
 
     Attributes:
         cpu: CPU time [s]; on a busy machine work takes longer, but not more CPU time.

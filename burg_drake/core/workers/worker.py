@@ -87,8 +87,8 @@ class _WorkerLoop:
         for key in opening.drop:
             self._sessions.pop(key, None)
         try:
-            with time_limit(opening.limit):
-                build: Callable[[], Any] = pickle.loads(opening.build)
+            build: Callable[[], Any] = pickle.loads(opening.build)
+            with time_limit(opening.limit):  # imports do not count
                 self._sessions[opening.key] = build()
         except Exception as error:
             self._send(SessionOpened(*_portable(error)))
@@ -99,10 +99,10 @@ class _WorkerLoop:
     def _do(self, call: Call) -> None:
         self._number = call.number
         try:
+            function, args, kwargs = pickle.loads(call.work)
+            if call.session is not None:
+                args = (self._sessions[call.session], *args)
             with time_limit(call.limit):
-                function, args, kwargs = pickle.loads(call.work)
-                if call.session is not None:
-                    args = (self._sessions[call.session], *args)
                 result = function(*args, **kwargs)
         except Exception as error:
             self._send(Done(call.number, None, *_portable(error)))

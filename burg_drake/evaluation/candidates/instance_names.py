@@ -160,4 +160,5 @@ def are_of(
     for name in names:
         if name not in known:
             raise UnknownNameError(f"{where} has no grasps of {name!r}; {nearest(name, known)}")
-    return np.any([np.isin(column, names) for column in holders], axis=0)
+    held: NDArray[np.bool_] = np.any([np.isin(column, names) for column in holders], axis=0)
+    return held

@@ -194,23 +194,26 @@ class ObjectSampler:
         self, object: str, cones: tuple[ApproachCone, ...], accept: Accept | None = None
     ) -> GraspSet:
         """Grasps of an object."""
-        from burg_drake.grasping.sampling import sample_antipodal
+        from burg_drake.grasping.sampling import AntipodalSettings, sample_antipodal
 
-        entry, settings = self._library.entry(object), self._settings
+        settings = self._settings
+        antipodal = AntipodalSettings(
+            friction=self._friction(object),
+            opening=self._station.hand.opening,
+            approaches=settings.approaches,
+            approach_cones=cones,
+            standoffs=settings.standoffs,
+            pad=self._pad,
+            diverse=settings.diverse,
+        )
         return distinct(
             sample_antipodal(
                 self.surface(object),
                 self._n,
-                rng_from("antipodal", self._seed, entry.build),
-                friction=self._friction(object),
-                opening=self._station.hand.opening,
-                approaches=settings.approaches,
-                approach_cone=cones,
-                standoffs=settings.standoffs,
-                pad=self._pad,
+                rng_from("antipodal", self._seed, self._library.entry(object).build),
+                antipodal,
                 weights=settings.weights.get(object),
                 accept=accept,
-                diverse=settings.diverse,
                 object=object,
             )
         )

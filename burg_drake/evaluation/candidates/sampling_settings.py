@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.core import Array
 
 DEFAULT_APPROACH_ANGLE_DEG = 75.0
 """Keeps the hand above the horizontal, and leaves out pairs of an object's bottom and top for

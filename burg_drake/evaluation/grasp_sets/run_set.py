@@ -10,9 +10,9 @@ import numpy as np
 
 from burg_drake.core import BurgError
 from burg_drake.core.documents import load_document
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import INPUT_PREFIX, GraspSet
 from burg_drake.evaluation.grasp_sets.provenance import hand_entry, object_files
-from burg_drake.evaluation.records import INPUT_PREFIX, TEXT
+from burg_drake.evaluation.records import TEXT
 from burg_drake.evaluation.store import SCENE_FILE, STATION_FILE, Run
 from burg_drake.station.document import StationDocument, locate_hand
 

@@ -67,7 +67,6 @@ from .shard import (
     share as share,
 )
 from .table import (
-    INPUT_PREFIX as INPUT_PREFIX,
     TEXT as TEXT,
     Columns as Columns,
     columns_of_verdicts as columns_of_verdicts,

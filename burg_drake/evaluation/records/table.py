@@ -31,12 +31,9 @@ from numpy.typing import NDArray
 
 from burg_drake.core import quaternion_from_rotation
 from burg_drake.core.grasps import (
-    COST,
-    DECIDED,
     INPUT_PREFIX,
-    MEASURED,
-    POSTURE,
     VERDICT_FIELDS,
+    Part,
     TableShape,
     Verdict,
     fields_in,
@@ -110,27 +107,27 @@ def trial_columns(
         "id": _texts([t.id for t in trials]),
         "instance": _texts([t.instance for t in trials]),
         "object": _texts([t.object for t in trials]),
-        **columns_of_verdicts(rows, DECIDED, shape),
+        **columns_of_verdicts(rows, "decided", shape),
         "width": _numbers([t.width for t in trials]),
         "score": _numbers([t.score for t in trials]),
         **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
         **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        **columns_of_verdicts(rows, MEASURED, shape),
+        **columns_of_verdicts(rows, "measured", shape),
         "friction": _numbers([t.friction for t in trials]),
         "mass": _numbers([t.mass for t in trials]),
-        **columns_of_verdicts(rows, POSTURE, shape),
+        **columns_of_verdicts(rows, "posture", shape),
     }
     columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
     columns["engine"] = _same(engine_label(origin.engine), len(rows))
     columns["run"] = _same(origin.run, len(rows))
-    columns |= columns_of_verdicts(rows, COST, shape)
+    columns |= columns_of_verdicts(rows, "cost", shape)
     for name, text in origin.cells().items():
         columns[name] = _same(text, len(rows))
     columns["X_OG"] = _texts([pose_text(t.X_OG) for t in trials])
     return columns
 
 
-def columns_of_verdicts(rows: Sequence[Verdict], part: str, shape: TableShape) -> Columns:
+def columns_of_verdicts(rows: Sequence[Verdict], part: Part, shape: TableShape) -> Columns:
     """The columns of verdicts that lie in a part of a row, see `core.grasps.verdict_field`."""
     columns: Columns = {}
     for one in fields_in(shape.mode, part):

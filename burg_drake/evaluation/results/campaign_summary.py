@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from burg_drake.evaluation.store import Campaign, StoredRows
 
 OUTCOMES = tuple(Outcome)
 ALL_STAGES = tuple(Stage)
+Text = TypeVar("Text", bound=str)
 TOLD = 5
 """Scenes of which it is told what is missing, and why."""
 
@@ -96,7 +98,7 @@ def _group(name: str, counts: NDArray[np.int64]) -> OutcomeCounts:
     )
 
 
-def _counter(members: Sequence[str], counts: NDArray[np.int64]) -> Counter:
+def _counter(members: Sequence[Text], counts: NDArray[np.int64]) -> Counter[Text]:
     found = zip(members, counts.tolist(), strict=True)
     return Counter({member: n for member, n in found if n})
 

@@ -33,7 +33,7 @@ from burg_drake.evaluation.robustness.probes import (
     known_answers,
     make_probes,
 )
-from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_columns
+from burg_drake.evaluation.robustness.table import GraspRobustness, gathered, robustness_columns
 from burg_drake.evaluation.store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.workers import judge_all
 
@@ -198,7 +198,7 @@ def _gather(
     context: Sequence[object],
 ) -> GraspRobustness:
     instance = factory.scene.instance(grasp.instance)
-    return GraspRobustness.from_answers(
+    return gathered(
         grasp.id,
         grasp.instance,
         instance.object,

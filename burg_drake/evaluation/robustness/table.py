@@ -67,25 +67,25 @@ class GraspRobustness:
     success: SuccessRate | None = None
     failed: tuple[str, ...] = ()
 
-    @classmethod
-    def from_answers(
-        cls, id: str, instance: str, object: str, friction: float, answers: Sequence[ProbeAnswer]
-    ) -> GraspRobustness:
-        """Gathers the answers to the probes of a grasp."""
-        by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
-        repeats = Counter(answer.outcome for answer in answers if answer.test == "noise")
-        nothing = ProbeAnswer("")
-        return cls(
-            id,
-            instance,
-            object,
-            friction,
-            tug=by_test.get("tug", nothing).forces,
-            shake=by_test.get("shake", nothing).forces,
-            friction_min=by_test.get("friction", nothing).friction,
-            success=SuccessRate(repeats) if repeats else None,
-            failed=tuple(test for test, answer in by_test.items() if answer.failed),
-        )
+
+def gathered(
+    id: str, instance: str, object: str, friction: float, answers: Sequence[ProbeAnswer]
+) -> GraspRobustness:
+    """What the answers to the probes of a grasp say of it; see `GraspRobustness`."""
+    by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
+    repeats = Counter(answer.outcome for answer in answers if answer.test == "noise")
+    tug, shake, friction_min = (by_test.get(test) for test in ("tug", "shake", "friction"))
+    return GraspRobustness(
+        id,
+        instance,
+        object,
+        friction,
+        tug=tug.forces if tug else None,
+        shake=shake.forces if shake else None,
+        friction_min=friction_min.friction if friction_min else None,
+        success=SuccessRate(repeats) if repeats else None,
+        failed=tuple(test for test, answer in by_test.items() if answer.failed),
+    )
 
 
 def robustness_columns(

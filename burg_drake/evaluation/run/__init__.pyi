@@ -9,6 +9,6 @@ from .preparation import (
 from .request import (
     Given as Given,
     Request as Request,
-    names as names,
 )
 from .scene_judging import is_finished as is_finished
+from .settings import EvaluationSettings as EvaluationSettings

@@ -111,9 +111,9 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
         trial=request.trial,
         mode=request.mode,
         arm=request.arm,
-        seed=request.seed,
+        seed=request.settings.seed,
         shard="" if request.shard is None else str(request.shard),
-        table=request.table,
+        table=request.settings.table,
         joints=0 if arm is None else len(arm.home),
         scenes=scenes.entries,
         libraries=scenes.libraries,
@@ -141,7 +141,7 @@ class _Call:
         # a scene whose grasps are shared out knows its share
         self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
         self.judged = 0
-        asked = self.request.scene_reports
+        asked = self.request.settings.scene_reports
         self.reports = self.campaign.document.has_few_scenes if asked is None else asked
 
     def run(self) -> Campaign:
@@ -151,7 +151,7 @@ class _Call:
             self.folder,
             tuple(self.campaign.places),
             self.campaign.document.instances,
-            self.request.table,
+            self.request.settings.table,
             self.reports,
         )
         with ExitStack() as stack:
@@ -283,4 +283,4 @@ class _Call:
         if self.request.retry_failed and state.failed:
             return False
         folder = self.campaign.folder(name)
-        return is_finished(folder, state.size, self.request.table, report=self.reports)
+        return is_finished(folder, state.size, self.request.settings.table, report=self.reports)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,14 +20,15 @@ from burg_drake.evaluation.records import (
     Library,
     RunDocument,
     Shard,
-    TableFormat,
+    as_shard,
     input_of,
     numbers,
     software_versions,
 )
-from burg_drake.evaluation.stages import arm_settings
+from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.scene.document import Scene
-from burg_drake.station.document import Engine, GraspMotion, Station
+from burg_drake.station.document import Engine, GraspMotion, Station, engine_preset
 
 ByInstance = Mapping[str, GraspSet]
 Given = GraspSet | ByInstance | Callable[[Scene], ByInstance]
@@ -39,30 +40,51 @@ class Request:
     """What is asked.
 
     Attributes:
-        station, engine, mode, motion: who judges, and how.
-        seed, per_object, approach_angle_deg, blind: of the sampling.
+        station: where.
+        settings: as the user has them.
+        engine, mode, motion, shard: what the settings come to on this station.
         only: names of objects or instances; all if empty.
         grasps: given in place of sampled ones.
-        table: format of the results file.
-        shard: the share that is judged here; None is all.
         retry_failed: whether grasps that could not be simulated are tried again.
-        scene_reports: whether each of many scenes gets a report of its own; None if they are few.
     """
 
     station: Station
+    settings: EvaluationSettings
     engine: Engine
     mode: Mode
     motion: GraspMotion
-    seed: int
-    per_object: int
-    approach_angle_deg: float
-    blind: bool
-    only: tuple[str, ...] = ()
-    grasps: Given | None = None
-    table: TableFormat = "csv"
-    shard: Shard | None = None
-    retry_failed: bool = False
-    scene_reports: bool | None = None
+    shard: Shard | None
+    only: tuple[str, ...]
+    grasps: Given | None
+    retry_failed: bool
+
+    @classmethod
+    def of(
+        cls,
+        station: Station,
+        settings: EvaluationSettings,
+        grasps: Given | None = None,
+        *,
+        retry_failed: bool = False,
+    ) -> Request:
+        """What settings ask for on a station.
+
+        Raises:
+            UnknownNameError: there is no engine of this name.
+            InvalidInputError: there is no such mode or share, or the station lacks the arm.
+        """
+        engine = settings.engine
+        return cls(
+            station=station,
+            settings=settings,
+            engine=engine_preset(engine) if isinstance(engine, str) else engine,
+            mode=mode_for(station, settings.mode),
+            motion=settings.motion or station.document.motion,
+            shard=as_shard(settings.shard),
+            only=tuple(settings.only or ()),
+            grasps=grasps,
+            retry_failed=retry_failed,
+        )
 
     def given(self, scene: Scene) -> ByInstance | None:
         """The user's grasps on the instances of a scene; None where they are sampled.
@@ -127,9 +149,9 @@ class Request:
             return Grasps(origin="given", count=0, objects={}, content="")
         return Grasps(
             origin="sampled",
-            per_object=self.per_object,
-            approach_angle_deg=self.approach_angle_deg,
-            blind=self.blind,
+            per_object=self.settings.grasps_per_object,
+            approach_angle_deg=float(self.settings.approach_angle_deg),
+            blind=self.settings.blind,
             only=self.only,
             count=0,
             objects={},
@@ -156,9 +178,9 @@ class Request:
             trial=self.trial,
             mode=self.mode,
             arm=self.arm,
-            seed=self.seed,
+            seed=self.settings.seed,
             shard="" if self.shard is None else str(self.shard),
-            table=self.table,
+            table=self.settings.table,
             versions=software_versions(),
         )
 
@@ -179,11 +201,6 @@ def command() -> str:
     """The command that is running, as one can type it again."""
     program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
     return shlex.join([program, *sys.argv[1:]])
-
-
-def names(only: Iterable[str] | None) -> tuple[str, ...]:
-    """Names by which objects are chosen; a text alone is one name."""
-    return (only,) if isinstance(only, str) else tuple(only or ())
 
 
 def given_content(grasps: Given | None) -> str:

@@ -164,7 +164,8 @@ def as_numpy(name: str, column: Any) -> NDArray[Any]:
         codes, categories = as_codes(column)
         return np.array([*categories, ""], dtype=np.str_)[codes]
     values = column.to_numpy()
-    return values.astype(np.float64) if values.dtype.kind == "O" else values
+    plain: NDArray[Any] = values.astype(np.float64) if values.dtype.kind == "O" else values
+    return plain
 
 
 def as_codes(column: Any) -> tuple[NDArray[np.int64], list[str]]:

@@ -27,7 +27,7 @@ from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.paths import portable_reference, resolve
 from burg_drake.evaluation.candidates import Candidate, Candidates
 from burg_drake.evaluation.records import (
-    JOURNAL_FILE,
+    JOURNAL_FILE as JOURNAL_FILE,
     Columns,
     RecordedTrial,
     RunDocument,
@@ -140,7 +140,10 @@ class Run:
     @property
     def failures(self) -> list[str]:
         """Ids of the grasps that could not be simulated."""
-        return self.results["id"][self.results["outcome"] == Outcome.SIMULATION_FAILED].tolist()
+        failed: list[str] = self.results["id"][
+            self.results["outcome"] == Outcome.SIMULATION_FAILED
+        ].tolist()
+        return failed
 
     @property
     def interrupted(self) -> list[str]:

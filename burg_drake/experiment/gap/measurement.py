@@ -41,6 +41,7 @@ from burg_drake.evaluation.records import (
     run_hash,
     software_versions,
 )
+from burg_drake.evaluation.run import EvaluationSettings, Given
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.evaluation.store import (
     RUN_FILE,
@@ -75,7 +76,8 @@ def measure_gap(
     tried: Sequence[str] = (),
     executor: Executor | None = None,
     progress: bool | Listener = True,
-    **evaluation: Any,
+    grasps: Given | None = None,
+    evaluation: EvaluationSettings | None = None,
 ) -> GapSteps:
     """Judges the same grasps step by step; the same call goes on where an earlier one stopped.
 
@@ -91,7 +93,8 @@ def measure_gap(
             in the last mode.
         executor: who judges; as many processes as there are processors if None.
         progress: as for `evaluate`.
-        evaluation: for `evaluate`, with a scene: engine, motion, grasps and how to sample them.
+        grasps: for `evaluate`, with a scene; sampled if None.
+        evaluation: likewise: engine, motion, and how to sample grasps. The mode is that of a step.
 
     Raises:
         InvalidInputError: as `evaluate`; or the folder has other steps, or the run is incomplete.
@@ -127,9 +130,10 @@ def measure_gap(
     )
     _begin(path, document)
     options = {"executor": executor, "progress": progress}
+    begin = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
     steps: list[GapStep] = []
     for mode in MODES[: MODES.index(last) + 1]:
-        made = _mode_step(mode, run, steps, scene, station, path, options, evaluation)
+        made = _mode_step(mode, run, steps, scene, station, path, options, begin)
         steps.append(GapStep(mode, (made,)))
     extra: tuple[Run, ...] = ()
     if samples:
@@ -185,28 +189,34 @@ def _mode_step(
     station: Station,
     path: Path,
     options: dict[str, Any],
-    evaluation: dict[str, Any],
+    begin: dict[str, Any],
 ) -> Run:
     if run is not None and run.document.mode == mode:
         return run
     if not steps and run is None:
-        return evaluate(scene, station, path / mode, mode=mode, **options, **evaluation)
+        return evaluate(scene, station, path / mode, **_in_mode(begin, mode), **options)
     like = run if not steps else steps[0].runs[0]
     assert like is not None
     if mode == "reach":
         _begin_reach(steps[0].runs[0], scene, station, path / mode, options)
-    return evaluate(scene, station, path / mode, mode=mode, **_same(like), **options)
+    return evaluate(scene, station, path / mode, **_in_mode(_same(like), mode), **options)
 
 
 def _same(run: Run) -> dict[str, Any]:
     """What makes `evaluate` judge the grasps of a run as it did."""
-    return {
-        "grasps": by_instance(run.candidates),
-        "engine": run.document.engine,
-        "seed": run.document.seed,
-        "motion": motion_in(run.document.trial),
-        "table": run.document.table,
-    }
+    settings = EvaluationSettings(
+        mode=run.document.mode,
+        engine=run.document.engine,
+        seed=run.document.seed,
+        motion=motion_in(run.document.trial),
+        table=run.document.table,
+    )
+    return {"grasps": by_instance(run.candidates), "settings": settings}
+
+
+def _in_mode(asked: dict[str, Any], mode: Mode) -> dict[str, Any]:
+    """The same arguments of `evaluate` in another mode."""
+    return {**asked, "settings": replace(asked["settings"], mode=mode)}
 
 
 def by_instance(candidates: Candidates) -> dict[str, GraspSet]:
@@ -284,7 +294,7 @@ class _Placing:
     def _judge(self, candidates: Candidates, scene: Scene, number: str, folder: str) -> Run:
         now = _written(scene, self.path / "scenes" / f"{number}.yaml")
         moved = commanded_candidates(self.scene, now, candidates)
-        same = _same(self.run) | {"grasps": by_instance(moved), "mode": self.run.document.mode}
+        same = _same(self.run) | {"grasps": by_instance(moved)}
         return evaluate(now, self.station, self.path / folder / number, **same, **self.options)
 
 

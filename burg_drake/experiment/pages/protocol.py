@@ -21,7 +21,7 @@ from burg_drake.experiment.pages.tried_runs import TriedRuns, TriedScene, in_blo
 from burg_drake.experiment.pages.words import SHORT_LIST
 from burg_drake.experiment.trials import RealTrial
 from burg_drake.scene.document import Scene
-from burg_drake.visualization.style import Html, element, join
+from burg_drake.visualization.style import Html, element, html_document, join
 
 HOW = (
     "Carry out the trials in the order of their numbers. Each block has one scene: set it up on its"
@@ -64,22 +64,12 @@ def sheet_page(
     sections = [
         _block(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]
-    return "<!DOCTYPE html>\n" + element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", f"Trials on the robot: {runs.path.name}"),
-            element("style", Html(style)),
-        ),
-        element(
-            "body",
-            _header(runs, blocks),
-            *sections,
-            element("footer", f"Written by burg_drake {burg_drake.__version__}."),
-        ),
-        lang="en",
+    return html_document(
+        f"Trials on the robot: {runs.path.name}",
+        style,
+        _header(runs, blocks),
+        *sections,
+        element("footer", f"Written by burg_drake {burg_drake.__version__}."),
     )
 
 

@@ -152,7 +152,8 @@ class Factor:
         return self.names == other.names and np.array_equal(self.index, other.index)
 
     def __getitem__(self, row: int) -> str:
-        return self.names[self.index[row]]
+        text: str = self.names[self.index[row]]
+        return text
 
     def where(self, wanted: list[bool]) -> Flags:
         """(N,) truth values from one for each name."""

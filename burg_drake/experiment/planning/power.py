@@ -166,4 +166,5 @@ def _rejecting(m: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
     from scipy.stats import binom
 
     most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)  # the first with a tail of that at least
-    return np.where(2.0 * binom.cdf(most, m, 0.5) <= alpha, most, most - 1)
+    critical: NDArray[np.int64] = np.where(2.0 * binom.cdf(most, m, 0.5) <= alpha, most, most - 1)
+    return critical

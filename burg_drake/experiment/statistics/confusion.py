@@ -67,7 +67,8 @@ class Agreement:
 
 def matrix_of(predicted: Flags, actual: Flags) -> Values:
     """Counts of (tp, fp, fn, tn) from N verdicts and outcomes, both (N,) truth values."""
-    return grouped(predicted, actual, np.zeros(len(predicted), dtype=np.intp), 1)[0]
+    counts: Values = grouped(predicted, actual, np.zeros(len(predicted), dtype=np.intp), 1)[0]
+    return counts
 
 
 def grouped(predicted: Flags, actual: Flags, group: Rows, count: int) -> Values:

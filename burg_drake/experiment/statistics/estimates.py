@@ -104,7 +104,8 @@ def _balanced(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
 
 def _matthews(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
     scale = np.sqrt(tp + fp) * np.sqrt(tp + fn) * np.sqrt(tn + fp) * np.sqrt(tn + fn)
-    return np.clip((tp * tn - fp * fn) / scale, -1.0, 1.0)
+    coefficient: Array = np.clip((tp * tn - fp * fn) / scale, -1.0, 1.0)
+    return coefficient
 
 
 def _kappa(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:

@@ -43,7 +43,8 @@ def draw_cells(
     alpha = counts * np.maximum(size - 2, size / 3) / size + prior(counts, population)
     drawn = rng.standard_gamma(alpha, (draws, *alpha.shape))
     proportions = drawn / drawn.sum(axis=2, keepdims=True)
-    return np.einsum("dsc,s->dc", proportions, population)
+    expected: Array = np.einsum("dsc,s->dc", proportions, population)
+    return expected
 
 
 def prior(counts: Array, population: Array) -> Array:
@@ -78,7 +79,8 @@ def draw_each(counts: Values, rng: np.random.Generator, draws: int = DRAWS) -> A
         (draws, G, 4) proportions.
     """
     drawn = rng.standard_gamma(counts + PRIOR, (draws, *counts.shape))
-    return drawn / drawn.sum(axis=2, keepdims=True)
+    share: Array = drawn / drawn.sum(axis=2, keepdims=True)
+    return share
 
 
 def bounds(values: Array) -> tuple[Array, Array]:

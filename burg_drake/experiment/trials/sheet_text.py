@@ -62,7 +62,7 @@ class _Text:
 
     def offset(self, mark: Any) -> int:
         """Of a place that a parser names."""
-        return self.starts[mark.line] + int(mark.column)
+        return self.starts[int(mark.line)] + int(mark.column)
 
     def end(self, node: yaml.Node) -> int:
         """Where the text of a value ends; marks of the parser come after blank lines and comments
@@ -84,7 +84,8 @@ class _Text:
 
 
 def _trials(root: yaml.Node) -> yaml.Node:
-    return next(value for key, value in root.value if key.value == "trials")
+    node: yaml.Node = next(value for key, value in root.value if key.value == "trials")
+    return node
 
 
 def _edits(text: _Text, node: yaml.Node, old: RealTrial, new: RealTrial) -> list[Edit]:

@@ -39,7 +39,8 @@ def only_object(grasps: GraspSet, kind: str) -> str:
             f"the grasps are of {len(names)} objects ({listing(names)}) and {kind} holds those of"
             " one; choose one of them, or write a file for each"
         )
-    return names[0]
+    name: str = names[0]
+    return name
 
 
 def object_name(file: str) -> str:

@@ -64,4 +64,5 @@ def _read_pose(reference: str) -> Array:
     if index >= len(poses):
         raise InvalidInputError(f"{path} has poses 0 to {len(poses) - 1}; there is no {index}")
     checked, _ = nearest_rigid(poses[index : index + 1], f"{path}: pose {index}")
-    return checked[0]
+    X: Array = checked[0]
+    return X

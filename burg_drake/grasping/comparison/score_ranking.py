@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +102,7 @@ def _colliding(grasps: GraspSet) -> NDArray[np.bool_] | None:
 
 
 def _judge(
-    values: NDArray, name: str
+    values: NDArray[Any], name: str
 ) -> tuple[tuple[str, ...], NDArray[np.bool_], NDArray[np.bool_]]:
     """Names of the criteria, (N,) whether a grasp is judged, (N, L) whether it is good."""
     if values.dtype.kind == "b":

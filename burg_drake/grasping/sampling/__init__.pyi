@@ -1,6 +1,7 @@
 from .antipodal import (
     NO_APPROACH as NO_APPROACH,
     Accept as Accept,
+    AntipodalSettings as AntipodalSettings,
     sample_antipodal as sample_antipodal,
 )
 from .approach import ApproachCone as ApproachCone

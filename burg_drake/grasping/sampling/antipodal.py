@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING
 
@@ -65,20 +65,77 @@ Accept = Callable[[Array], NDArray[np.bool_]]
 depend on the others."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class AntipodalSettings:
+    """What makes a grasp antipodal, and the poses that a pair of contacts gives.
+
+    Attributes:
+        friction: coefficient between object and fingers; the cone's half angle is its arctangent.
+        opening: smallest and largest distance between the fingers [m]. Widths are at most the
+            largest less `FINGER_CLEARANCE` on both sides.
+        approaches: evenly spaced approach angles for each pair of contacts, the first one random.
+        approach_cones: where approach directions lie; of several cones all have to hold at once.
+            Anywhere if there are none. Approaches are uniform among the directions that a pair's
+            closing line leaves; pairs whose line leaves none give no grasp.
+        standoffs: every pose is given once with each of these distances between G and the contacts
+            [m]. Above 0 the hand stays back, as in `frames.pregrasp`, and holds with its finger
+            tips; below 0 it goes further, and holds with what is behind the middle of its pads.
+        pad: from where to where the pads reach along z of G [m]; bounds of the standoffs.
+        diverse: of this many times n grasps those n are kept that `farthest_points` selects, in its
+            order: any first part of them covers the grasps, too.
+
+    Raises:
+        InvalidInputError: a value is out of range.
+    """
+
+    friction: float = DEFAULT_FRICTION
+    opening: tuple[float, float] = PANDA_OPENING
+    approaches: int = 1
+    approach_cones: tuple[ApproachCone, ...] = ()
+    standoffs: tuple[float, ...] = (0.0,)
+    pad: tuple[float, float] = PANDA_PAD
+    diverse: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("opening", "standoffs", "pad"):  # plain numbers, as they go into files
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        object.__setattr__(self, "friction", float(self.friction))
+        object.__setattr__(self, "approach_cones", tuple(self.approach_cones))
+        if not (np.isfinite(self.friction) and self.friction > 0.0):
+            raise InvalidInputError(
+                f"friction is {self.friction}; antipodal grasps need a number above 0"
+            )
+        if not 0.0 <= self.opening[0] < self.opening[1] < np.inf:
+            raise InvalidInputError(
+                f"opening is {self.opening}; give the smallest and largest finger distance [m]"
+            )
+        if self.approaches < 1:
+            raise InvalidInputError(
+                f"approaches is {self.approaches}; give 1 or more per contact pair"
+            )
+        if not self.standoffs:
+            raise InvalidInputError("standoffs is empty; give one or more distances, such as 0")
+        low, high = self.pad
+        for distance in self.standoffs:
+            if not low <= distance <= high:
+                raise InvalidInputError(
+                    f"standoff {1e3 * distance:g} mm puts the contacts off the finger pads; give"
+                    f" {1e3 * low:g} to {1e3 * high:g} mm"
+                )
+        if self.diverse < 1:
+            raise InvalidInputError(
+                f"diverse is {self.diverse}; give how many times n to sample, from 1"
+            )
+
+
 def sample_antipodal(
     mesh: trimesh.Trimesh,
     n: int,
     rng: np.random.Generator,
+    settings: AntipodalSettings | None = None,
     *,
-    friction: float = DEFAULT_FRICTION,
-    opening: tuple[float, float] = PANDA_OPENING,
-    approaches: int = 1,
-    approach_cone: ApproachCone | Sequence[ApproachCone] | None = None,
-    standoffs: Sequence[float] = (0.0,),
-    pad: tuple[float, float] = PANDA_PAD,
     weights: ArrayLike | None = None,
     accept: Accept | None = None,
-    diverse: int = 1,
     object: str = "",
 ) -> GraspSet:
     """Samples grasps whose contacts are antipodal.
@@ -102,22 +159,10 @@ def sample_antipodal(
         n: number of grasps.
         rng: the same generator state gives the same grasps, and, unless they are to be diverse, the
             first of a larger n.
-        friction: coefficient between object and fingers; the cone's half angle is its arctangent.
-        opening: smallest and largest distance between the fingers [m]. Widths are at most the
-            largest less `FINGER_CLEARANCE` on both sides.
-        approaches: evenly spaced approach angles for each pair of contacts, the first one random.
-        approach_cone: where approach directions lie, or several cones that have to hold at once;
-            anywhere if None. They are then uniform among the directions that a pair's closing line
-            leaves; pairs whose line leaves none give no grasp.
-        standoffs: every pose is given once with each of these distances between G and the contacts
-            [m]. Above 0 the hand stays back, as in `frames.pregrasp`, and holds with its finger
-            tips; below 0 it goes further, and holds with what is behind the middle of its pads.
-        pad: from where to where the pads reach along z of G [m]; bounds of the standoffs.
+        settings: what makes a grasp antipodal; for the Franka Hand if None.
         weights: (F,) density of first contacts on each face of the mesh, from 0, in any unit.
             Second contacts lie where the lines lead.
         accept: keeps grasps that pass, such as those at which a hand is clear; n counts these.
-        diverse: of this many times n grasps those n are kept that `farthest_points` selects, in its
-            order: any first part of them covers the grasps, too.
         object: name for the set's `object` column.
 
     Returns:
@@ -131,30 +176,22 @@ def sample_antipodal(
         InvalidInputError: a parameter is out of range, or the weights do not fit the mesh.
         MeshError: the mesh has no face with area, is not finite, or is wound inside out.
     """
-    cones = (approach_cone,) if isinstance(approach_cone, ApproachCone) else approach_cone or ()
-    settings = AntipodalSettings(
-        friction=float(friction),
-        opening=(float(opening[0]), float(opening[1])),
-        approaches=int(approaches),
-        approach_cones=tuple(cones),
-        standoffs=tuple(float(d) for d in standoffs),
-        pad=(float(pad[0]), float(pad[1])),
-    )
+    settings = settings or AntipodalSettings()
     if n < 0:
         raise InvalidInputError(f"n is {n}; give the number of grasps, 0 or more")
-    if diverse < 1:
-        raise InvalidInputError(f"diverse is {diverse}; give how many times n to sample, from 1")
     state = json.loads(json.dumps(rng.bit_generator.state, default=np.ndarray.tolist))
-    found = _collect(Surface.of(mesh, weights), n * diverse, rng, settings, accept)
+    found = _collect(Surface.of(mesh, weights), n * settings.diverse, rng, settings, accept)
+    asked = asdict(settings)
+    diverse = asked.pop("diverse")
     provenance = {
         "sampler": "antipodal",
         "version": SAMPLER_VERSION,
         "n": int(n),
-        **asdict(settings),
+        **asked,
         "finger_clearance": FINGER_CLEARANCE,
         "weights": None if weights is None else content_hash(np.asarray(weights, float)),
         "tested": accept is not None,
-        "diverse": int(diverse),
+        "diverse": diverse,
         "mesh": content_hash(
             np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
         ),
@@ -166,49 +203,9 @@ def sample_antipodal(
     grasps = GraspSet.create(
         found.X_OG, object=object, width=found.width, score=found.score, provenance=provenance
     )
-    if diverse == 1:
+    if settings.diverse == 1:
         return grasps
     return grasps.select(farthest_points(grasps.X_OG, min(n, len(grasps))))
-
-
-@dataclass(frozen=True, kw_only=True)
-class AntipodalSettings:
-    """What makes a grasp antipodal, and the poses that a pair of contacts gives; fields as the
-    arguments of `sample_antipodal`.
-
-    Raises:
-        InvalidInputError: a value is out of range.
-    """
-
-    friction: float
-    opening: tuple[float, float]
-    approaches: int
-    approach_cones: tuple[ApproachCone, ...]
-    standoffs: tuple[float, ...]
-    pad: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction > 0.0):
-            raise InvalidInputError(
-                f"friction is {self.friction}; antipodal grasps need a number above 0"
-            )
-        if not 0.0 <= self.opening[0] < self.opening[1] < np.inf:
-            raise InvalidInputError(
-                f"opening is {self.opening}; give the smallest and largest finger distance [m]"
-            )
-        if self.approaches < 1:
-            raise InvalidInputError(
-                f"approaches is {self.approaches}; give 1 or more per contact pair"
-            )
-        if not self.standoffs:
-            raise InvalidInputError("standoffs is empty; give one or more distances, such as 0")
-        low, high = self.pad
-        for distance in self.standoffs:
-            if not low <= distance <= high:
-                raise InvalidInputError(
-                    f"standoff {1e3 * distance:g} mm puts the contacts off the finger pads; give"
-                    f" {1e3 * low:g} to {1e3 * high:g} mm"
-                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,7 +134,8 @@ def _directions_in_cone(axis: Array, half_angle: float, rng: np.random.Generator
     azimuth = rng.uniform(0.0, 2.0 * np.pi, (len(axis), 1))
     u, v = perpendicular(axis)
     sine = np.sqrt(1.0 - cosine**2)
-    return cosine * axis + sine * (np.cos(azimuth) * u + np.sin(azimuth) * v)
+    directions: Array = cosine * axis + sine * (np.cos(azimuth) * u + np.sin(azimuth) * v)
+    return directions
 
 
 def perpendicular(axis: Array) -> tuple[Array, Array]:

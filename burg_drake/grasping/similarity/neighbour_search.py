@@ -217,4 +217,5 @@ def _round(
     reach, column = tree.points.query(points, k=range(1, count + 1), distance_upper_bound=radius)
     i, k = np.nonzero(np.isfinite(reach))
     stays = settle(rows, i, tree.start + column[i, k] % tree.count, reach[:, -1])
-    return rows[stays & np.isfinite(reach[:, -1])]
+    kept: Indices = rows[stays & np.isfinite(reach[:, -1])]
+    return kept

@@ -72,7 +72,8 @@ def components(X_OG: ArrayLike) -> Array:
 def pair_translation(G: Array, F: Array) -> Array:
     """Distances of the origins [m] from `components`, (12, ...) each, which broadcast."""
     x, y, z = (G[P + k] - F[P + k] for k in range(3))
-    return np.sqrt(x * x + y * y + z * z)
+    length: Array = np.sqrt(x * x + y * y + z * z)
+    return length
 
 
 def pair_angle(G: Array, F: Array) -> Array:

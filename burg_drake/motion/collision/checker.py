@@ -126,7 +126,7 @@ class ArmCollision:
         Raises:
             UnknownNameError: there is no such instance.
         """
-        positions = self._default.copy()
+        positions: Array = self._default.copy()
         positions[self._index] = q
         if not np.isnan(width):
             low, high = self._diagram.station.hand.opening

@@ -60,7 +60,7 @@ class LinkPoses:
 def _placed(poses: Single, points: Single) -> Single:
     """Points (3, ...) of frames (4, 3, ...)."""
     x, y, z, p = poses
-    placed = x * points[0]
+    placed: Single = x * points[0]
     product = y * points[1]
     placed += product
     np.multiply(z, points[2], out=product)

@@ -95,7 +95,7 @@ class PostureGrid:
     @property
     def poses(self) -> int:
         """Number of poses along the line."""
-        return self.q.shape[1]
+        return int(self.q.shape[1])
 
     def solve(self, poses: Indices, grasps: Indices) -> None:
         """Finds the postures at some poses of some grasps."""

@@ -123,4 +123,5 @@ class Trajectory:
         """The same for Drake's `TrajectorySource`: cubic polynomials between the samples."""
         from pydrake.trajectories import PiecewisePolynomial
 
-        return PiecewisePolynomial.CubicHermite(self.t, self.q.T, self.v.T)
+        motion: PiecewisePolynomial = PiecewisePolynomial.CubicHermite(self.t, self.q.T, self.v.T)
+        return motion

@@ -116,7 +116,8 @@ class ReachabilityMap:
     @property
     def share(self) -> Array:
         """(Z, Y, X) shares of the orientations that are reached."""
-        return self.reached.mean(axis=-1)
+        share: Array = self.reached.mean(axis=-1)
+        return share
 
     @property
     def share_from_above(self) -> Array:

@@ -133,7 +133,8 @@ def corner_normals(mesh: trimesh.Trimesh, crease: float = CREASE_ANGLE) -> Array
         )
     size = np.linalg.norm(total, axis=1, keepdims=True)
     own = np.repeat(unit, 3, axis=0)
-    return np.divide(total, size, out=own, where=size > 0).reshape(-1, 3, 3)
+    mean: Array = np.divide(total, size, out=own, where=size > 0).reshape(-1, 3, 3)
+    return mean
 
 
 def _rows(tag: str, values: ArrayLike | NDArray[np.int64], form: str) -> str:

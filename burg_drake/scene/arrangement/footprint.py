@@ -22,17 +22,20 @@ class Footprint:
     @cached_property
     def low(self) -> Array:
         """The lower corner (2,) of the box around it."""
-        return self.corners.min(axis=0)
+        lower: Array = self.corners.min(axis=0)
+        return lower
 
     @cached_property
     def high(self) -> Array:
         """The upper corner (2,) of the box around it."""
-        return self.corners.max(axis=0)
+        upper: Array = self.corners.max(axis=0)
+        return upper
 
     @cached_property
     def middle(self) -> Array:
         """The mean (2,) of its corners."""
-        return self.corners.mean(axis=0)
+        center: Array = self.corners.mean(axis=0)
+        return center
 
     @cached_property
     def reach(self) -> Array:

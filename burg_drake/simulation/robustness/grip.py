@@ -164,7 +164,8 @@ class Grip:
 
     def _current_X_GO(self) -> Array:
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        return X_GO
 
 
 def take_grip(

@@ -190,4 +190,5 @@ def _loads(p_WG: Array, interval: float, gravity: float) -> Array:
     at_ends = np.diff(velocity, axis=0) / interval
     at_ends[:, 2] += gravity
     load = np.linalg.norm(at_ends, axis=1)
-    return np.maximum(load[:-1], load[1:])
+    peak: Array = np.maximum(load[:-1], load[1:])
+    return peak

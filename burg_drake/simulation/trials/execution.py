@@ -282,7 +282,8 @@ class Execution:
     def X_GO(self) -> Array:
         """(4, 4) target in the grasp frame."""
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        return inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        return X_GO
 
     def _center(self) -> Array:
         """The target's centre of mass (3,) in the world [m]."""

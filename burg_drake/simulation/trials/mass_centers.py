@@ -64,4 +64,5 @@ class MassCenterTracker:
 def center_of_mass(plant: MultibodyPlant, plant_context: Context, body: RigidBody) -> Array:
     """Centre of mass (3,) of a body in the world [m]."""
     X_WB = plant.EvalBodyPoseInWorld(plant_context, body)
-    return X_WB.multiply(body.default_com())
+    p_WCm: Array = X_WB.multiply(body.default_com())
+    return p_WCm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from burg_drake.core.grasps import Margins, Outcome, TrialFindings
+from burg_drake.core.grasps import Margins as Margins, Outcome, TrialFindings
 from burg_drake.grasping.clearance import Clearance
 
 

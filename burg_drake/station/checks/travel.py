@@ -105,7 +105,8 @@ class Travel:
             for k in np.flatnonzero(np.isnan(normals).any(axis=1)):
                 normals[k] = self._normal(*asked[k])
         self._world.place(bodies)
-        return np.nan_to_num(normals)
+        unit: Array = np.nan_to_num(normals)
+        return unit
 
     def _normal(self, a: GeometryId, b: GeometryId) -> Array:
         pair = self._world.query().ComputeSignedDistancePairClosestPoints(a, b)

@@ -64,7 +64,8 @@ class HandHandle:
 
     def finger_speed(self, plant_context: Context) -> float:
         """Speed of the faster finger [m/s]."""
-        return max(abs(joint.get_translation_rate(plant_context)) for joint in self.joints)
+        speed: float = max(abs(joint.get_translation_rate(plant_context)) for joint in self.joints)
+        return speed
 
     def X_WG(self, plant_context: Context) -> Array:
         """(4, 4) current grasp frame."""

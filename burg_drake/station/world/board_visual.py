@@ -62,7 +62,8 @@ def marker_grid(board: Board) -> tuple[Array, Array, NDArray[np.bool_]]:
 
 def _distinct(values: Array) -> Array:
     ascending = np.sort(values)
-    return ascending[np.append(True, np.diff(ascending) > SAME_LINE)]
+    lines: Array = ascending[np.append(True, np.diff(ascending) > SAME_LINE)]
+    return lines
 
 
 def _squares(x: Array, y: Array, chosen: NDArray[np.bool_]) -> Mesh:

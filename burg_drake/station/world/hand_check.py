@@ -258,7 +258,7 @@ class _Bench:
         self._simulator.Initialize()
         self._simulator.AdvanceTo(STEPS * TIME_STEP)
         q = self._model.joints[1].get_translation(self._plant_context)
-        return abs(q - positions[1]) > STILL
+        return bool(abs(q - positions[1]) > STILL)
 
     def _error(self, message: str) -> InvalidInputError:
         return InvalidInputError(f"hand {self._hand.name!r}: {message} ({self._hand.model})")

@@ -54,7 +54,7 @@ def add_models(
     except UnicodeDecodeError:
         text = ""
     if path.suffix != ".sdf" or not text or "<include" in text:
-        return list(parser.AddModels(str(path)))
+        return list(parser.AddModels(path))
     folder = Path(escape(str(path.parent.resolve()), quote=False))
     whole = PATH.sub(lambda found: f"<uri>file://{folder / found[1]}</uri>", text)
     try:
@@ -71,7 +71,7 @@ def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
         if known.Contains(name):
             known.Remove(name)
     for name, folder in {**found, BURG_DRAKE: data_root()}.items():
-        known.Add(name, str(folder))
+        known.Add(name, folder)
 
 
 def require_loose(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) -> None:

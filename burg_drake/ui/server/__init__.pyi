@@ -1,5 +1,5 @@
 from .door import (
-    PageServer as PageServer,
+    ServedPage as ServedPage,
     require_viser as require_viser,
     serve as serve,
 )

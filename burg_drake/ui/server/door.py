@@ -36,7 +36,7 @@ FIRST_PORT, PORTS = 7200, 50
 
 
 @dataclass(frozen=True)
-class PageServer:
+class ServedPage:
     """An open door; closed by `close` or at the end of a `with`.
 
     Attributes:
@@ -69,7 +69,7 @@ class PageServer:
 
         stop(self.server)
 
-    def __enter__(self) -> PageServer:
+    def __enter__(self) -> ServedPage:
         return self
 
     def __exit__(
@@ -94,7 +94,7 @@ def require_viser() -> None:
 
 def serve(
     host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_drake"
-) -> PageServer:
+) -> ServedPage:
     """Opens the door to an empty page.
 
     Args:
@@ -122,7 +122,7 @@ def serve(
         stop(server)
         raise
     server.gui.configure_theme(show_share_button=False, show_logo=False)
-    return PageServer(server, host, bound, admission)
+    return ServedPage(server, host, bound, admission)
 
 
 def listen(host: str, port: int | None) -> socket.socket:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.geometry import (
@@ -111,12 +113,13 @@ def _corners(shape: Shape) -> Array:
     if isinstance(shape, Mesh | Convex):
         hull = shape.GetConvexHull()
         return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
-    size = {
+    sizes: dict[type[Shape], Callable[[Any], tuple[float, ...]]] = {
         Box: lambda s: (s.width(), s.depth(), s.height()),
         Sphere: lambda s: 3 * (2 * s.radius(),),
         Cylinder: lambda s: (2 * s.radius(), 2 * s.radius(), s.length()),
         Capsule: lambda s: (2 * s.radius(), 2 * s.radius(), s.length() + 2 * s.radius()),
         Ellipsoid: lambda s: (2 * s.a(), 2 * s.b(), 2 * s.c()),
-    }.get(type(shape), lambda s: (0.0, 0.0, 0.0))(shape)
+    }
+    size = sizes[type(shape)](shape) if type(shape) in sizes else (0.0, 0.0, 0.0)
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     return signs * np.array(size) / 2.0

@@ -9,7 +9,7 @@ import numpy as np
 from burg_drake.cameras.calibration import CELLS, Calibration, coverage, image_grid, uncertainty
 from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
-from burg_drake.visualization.style import Html, element, join
+from burg_drake.visualization.style import Html, element, html_document, join
 
 WIDTH = 460.0
 """Of a drawing of the image [CSS pixels]."""
@@ -59,13 +59,8 @@ def write_report(calibration: Calibration, advice: list[str], path: str) -> None
         _views(calibration),
         _rejected(calibration),
     )
-    head = join(
-        element("meta", charset="utf-8"),
-        element("title", "Calibration of a camera"),
-        element("style", Html(STYLE)),
-    )
-    page = element("html", element("head", head), element("body", body), lang="en")
-    atomic_write(path, f"<!DOCTYPE html>\n{page}\n")
+    page = html_document("Calibration of a camera", STYLE, body)
+    atomic_write(path, f"{page}\n")
 
 
 def _parameters(calibration: Calibration) -> Html:

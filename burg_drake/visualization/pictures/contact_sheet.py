@@ -15,7 +15,7 @@ import burg_drake
 from burg_drake.core.files import atomic_write
 from burg_drake.objects.library import ContactGeometry, ObjectEntry, ObjectLibrary, StablePose
 from burg_drake.visualization.pictures.thumbnails import ObjectRenderer, Thumbnail
-from burg_drake.visualization.style import Child, Html, element
+from burg_drake.visualization.style import Child, Html, element, html_document
 
 POSE_SIZE = (160, 120)
 """Pictures of stable poses [pixel]."""
@@ -204,26 +204,16 @@ def _page(library: ObjectLibrary, names: Sequence[str], cards: Sequence[Html]) -
     if library.document.description:
         about = f"{library.document.description} {about}."
     links = [element("a", name, href=f"#object-{name}") for name in names]
-    return "<!DOCTYPE html>\n" + element(
-        "html",
+    return html_document(
+        f"Object library {library.name}",
+        sheet,
         element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", f"Object library {library.name}"),
-            element("style", Html(sheet)),
+            "header",
+            element("p", "Object library", class_="kind"),
+            element("h1", library.name),
+            element("p", about, class_="about"),
+            element("nav", *links) if len(names) > 6 else None,
         ),
-        element(
-            "body",
-            element(
-                "header",
-                element("p", "Object library", class_="kind"),
-                element("h1", library.name),
-                element("p", about, class_="about"),
-                element("nav", *links) if len(names) > 6 else None,
-            ),
-            element("main", *cards),
-            element("footer", f"{FOOTNOTE} Written by burg_drake {burg_drake.__version__}."),
-        ),
-        lang="en",
+        element("main", *cards),
+        element("footer", f"{FOOTNOTE} Written by burg_drake {burg_drake.__version__}."),
     )

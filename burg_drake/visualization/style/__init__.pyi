@@ -10,6 +10,7 @@ from .color_scale import (
     ColorScale as ColorScale,
     scale_of as scale_of,
 )
+from .html_page import html_document as html_document
 from .legend import (
     SCRIPT as SCRIPT,
     STYLE as STYLE,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from burg_drake.core.grasps import Outcome
-from burg_drake.core.terminal import Rgba
+from burg_drake.core.terminal import Rgba as Rgba
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.evaluation.workers.executor import Job, OnFailure
@@ -48,9 +49,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         "tabletop_six",
         "panda_tabletop",
         tmp_path_factory.mktemp("gap_source") / "run",
+        settings=EvaluationSettings(engine="screening", mode="hand"),
         grasps={"box": GraspSet.create(GRASPS, object="box", width=0.06)},
-        engine="screening",
-        mode="hand",
         executor=Here(),
         progress=False,
     )

@@ -11,6 +11,7 @@ import pytest
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.trials.sheet import (
     RealTrial,
@@ -69,8 +70,9 @@ def make_runs(folder: Path, patch: pytest.MonkeyPatch) -> list[Run]:
         (folder / f"{name}.yaml").write_text(text)
         scene, station = load_scene(folder / f"{name}.yaml"), load_station("panda_tabletop")
         place = folder / f"run_{name}"
-        options = {"grasps": given[name], "executor": Inline(), "mode": "hand", "progress": False}
-        runs.append(evaluate(scene, station, place, **options))
+        options = {"grasps": given[name], "executor": Inline(), "progress": False}
+        settings = EvaluationSettings(mode="hand")
+        runs.append(evaluate(scene, station, place, settings=settings, **options))
     return runs
 
 

@@ -17,32 +17,16 @@ Where other machines can reach the page, a browser needs the token of the printe
 
 from __future__ import annotations
 
-import errno
 import ipaddress
 import json
-import socket
-import sys
-import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from typing import Any
 
 from burg_drake.apps.trials.lab_page.entry_requests import lab_entry, trial_number
-from burg_drake.apps.web import address, json_body, picture_number
-from burg_drake.core import (
-    HEADERS as ACCESS_HEADERS,
-    LOCALHOST,
-    BrowserToken,
-    BurgError,
-    InvalidInputError,
-    RequestError,
-    address_in_use_error,
-    page_url,
-    require_local_host,
-)
+from burg_drake.apps.web import Answer, PageHandler, PageServer, address, picture_number
+from burg_drake.core import LOCALHOST, BrowserToken, BurgError, RequestError, require_local_host
 from burg_drake.experiment.pages import (
     EntryConflict,
     LabBook,
@@ -53,27 +37,24 @@ from burg_drake.experiment.pages import (
     states,
 )
 
-FIRST_PORT, PORTS = 7300, 50
-"""Without a port the first free one of these; those of the setup page begin at 7200."""
+FIRST_PORT = 7300
+"""Without a port the first free one from here on; those of the setup page begin at 7200."""
 PATIENCE = 1.0
 """How long a request for a picture of the camera waits for a newer one [s]."""
 RENDERING = 20.0
 """How long a request for a picture of a grasp waits until it is made [s]."""
 POLL = 0.05
 """Between two looks of whether to stop serving [s]."""
-IDLE = 30.0
-"""A connection without requests is closed after this [s]."""
 SCRIPTS = ("page.js", "outbox.js", "troubles.js", "entering.js", "list.js", "camera.js")
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     "/page.css": ("page.css", "text/css; charset=utf-8"),
     **{f"/{name}": (name, "text/javascript; charset=utf-8") for name in SCRIPTS},
 }
-HEADERS = {
-    **ACCESS_HEADERS,
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
-    " base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-}
+POLICY = (
+    "default-src 'self'; img-src 'self' blob: data:; object-src 'none';"
+    " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 KEPT = "private, max-age=86400"
 """Of pictures of grasps, whose addresses name the plan."""
 NO_TOKEN = (
@@ -82,7 +63,7 @@ NO_TOKEN = (
 )
 
 
-class LabServer(ThreadingHTTPServer):
+class LabServer(PageServer):
     """Serves trials until it is closed.
 
     Args:
@@ -98,8 +79,8 @@ class LabServer(ThreadingHTTPServer):
         InvalidInputError: the port is taken, or the address is not this machine's.
     """
 
-    daemon_threads = True
-    allow_reuse_address = sys.platform != "win32"
+    first_port = FIRST_PORT
+    poll = POLL
 
     def __init__(
         self,
@@ -111,25 +92,9 @@ class LabServer(ThreadingHTTPServer):
         port: int | None = None,
         secret: str | None = None,
     ) -> None:
-        self.lab, self.shelf, self.camera, self.host = lab, shelf, camera, host
+        self.lab, self.shelf, self.camera = lab, shelf, camera
         self.plan = json.dumps(plan_data(lab) | {"camera": camera is not None}).encode()
-        if ":" in host:
-            self.address_family = socket.AF_INET6
-        ports = range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else range(port, port + 1)
-        for candidate in ports:
-            try:
-                super().__init__((host, candidate), LabHandler)
-                break
-            except OSError as error:
-                failure = error
-                if error.errno != errno.EADDRINUSE:
-                    raise InvalidInputError(
-                        f"the page cannot be served on {host}: {error.strerror or error}"
-                    ) from error
-        else:
-            raise InvalidInputError(
-                address_in_use_error(host, ports, any_of_them=port is None)
-            ) from failure
+        super().__init__(LabHandler, host=host, port=port)
         bound, number = self.server_address[:2]
         local = ipaddress.ip_address(str(bound)).is_loopback
         self.token = None if local else BrowserToken(f"burg_drake_{number}", secret)
@@ -139,66 +104,53 @@ class LabServer(ThreadingHTTPServer):
     def url(self) -> str:
         """Address of the page for the next browser; with a token, good for one alone, if other
         machines can reach it."""
-        page = page_url(self.host, self.server_address[1])
-        return page if self.token is None else f"{page}?token={self.token.token}"
-
-    def start(self) -> None:
-        """Serves in a thread of its own."""
-        serving = partial(self.serve_forever, poll_interval=POLL)
-        threading.Thread(target=serving, name="lab server", daemon=True).start()
-
-    def close(self) -> None:
-        """Stops serving; requests that are being answered end soon."""
-        self.shutdown()
-        self.server_close()
-
-    def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that goes away in the middle of an answer is no error."""
-        if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
-            super().handle_error(request, client_address)
+        return super().url if self.token is None else f"{super().url}?token={self.token.token}"
 
 
-class LabHandler(BaseHTTPRequestHandler):
+class LabHandler(PageHandler):
     """Answers one connection's requests."""
 
     server: LabServer
-    protocol_version = "HTTP/1.1"
-    timeout = IDLE
+    package = "burg_drake.apps.trials.lab_page"
+    pages = PAGES
+    policy = POLICY
+    refused_code = HTTPStatus.UNPROCESSABLE_ENTITY
 
     def do_GET(self) -> None:
         """Pages, pictures, what was entered."""
-        routes: dict[str, Callable[[dict[str, str]], None]] = {
-            "/plan": self._send_plan,
-            "/states": self._send_states,
-            "/frame.jpg": self._send_frame,
-            "/camera": self._send_camera,
-        }
-        routes |= {path: partial(self._send_page, path) for path in PAGES}
-        self._answer(routes)
+        self.answer(
+            {
+                "/plan": self._send_plan,
+                "/states": self._send_states,
+                "/frame.jpg": self._send_frame,
+                "/camera": self._send_camera,
+            }
+        )
 
     def do_POST(self) -> None:
         """Entries and actions."""
-        self._answer({"/entry": self._enter, "/watch": self._watch, "/check": self._check})
+        self.answer({"/entry": self._enter, "/watch": self._watch, "/check": self._check})
 
-    def _answer(self, routes: dict[str, Callable[[Any], None]]) -> None:
-        try:
-            path, query = address(self.path)
-            require_local_host(self._header, served=self.server.host, is_page=path == "/")
-            self._require_browser(path, query)
-            if self.command == "GET" and path.startswith("/picture/"):
-                self._send_picture(path.removeprefix("/picture/").removesuffix(".jpg"))
-                return
-            if path not in routes:
-                raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path[:100]}")
-            routes[path](json_body(self.headers, self.rfile) if self.command == "POST" else query)
-        except RequestError as error:
-            self.close_connection = True  # its body may not have been read
-            self._send_json({"error": str(error)}, error.code)
-        except EntryConflict as error:
+    def admitted(self) -> tuple[str, dict[str, str]]:
+        """This machine is meant, and the browser was admitted or brings the token."""
+        path, query = address(self.path)
+        require_local_host(self._header, served=self.server.host, is_page=path == "/")
+        self._require_browser(path, query)
+        return path, query
+
+    def find(self, routes: Mapping[str, Answer], path: str) -> Answer:
+        """Pictures have addresses of their own."""
+        if self.command == "GET" and path.startswith("/picture/"):
+            name = path.removeprefix("/picture/").removesuffix(".jpg")
+            return partial(self._send_picture, name)
+        return super().find(routes, path)
+
+    def refusal(self, error: BurgError) -> tuple[Any, HTTPStatus]:
+        """An entry that another one came before is answered with that one."""
+        if isinstance(error, EntryConflict):
             answer = {"error": str(error), "entry": entry_data(error.trial)}
-            self._send_json(answer, HTTPStatus.CONFLICT)
-        except BurgError as error:
-            self._send_json({"error": str(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
+            return answer, HTTPStatus.CONFLICT
+        return super().refusal(error)
 
     def _header(self, name: str) -> str | None:
         """A header; given twice it would mean one thing here and another thing there."""
@@ -209,88 +161,60 @@ class LabHandler(BaseHTTPRequestHandler):
 
     def _require_browser(self, path: str, query: dict[str, str]) -> None:
         """Lets in who was admitted, or brings the token."""
-        token, self._new_cookie = self.server.token, ""
+        token, self.new_cookie = self.server.token, ""
         if token is None or token.admits(self._header("Cookie") or ""):
             return
         if path != "/" or not token.use(query.get("token", "")):
             raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
-        self._new_cookie = token.set_cookie
+        self.new_cookie = token.set_cookie
         self.server.on_admitted(str(self.client_address[0]))
 
-    def _send_page(self, path: str, query: dict[str, str]) -> None:
-        name, kind = PAGES[path]
-        page = (files("burg_drake.apps.trials.lab_page") / name).read_bytes()
-        cookie = {"Set-Cookie": self._new_cookie} if self._new_cookie else None
-        self._send(HTTPStatus.OK, kind, page, cookie)
-
     def _send_plan(self, query: dict[str, str]) -> None:
-        self._send(HTTPStatus.OK, "application/json", self.server.plan)
+        self.send(HTTPStatus.OK, "application/json", self.server.plan)
 
     def _send_states(self, query: dict[str, str]) -> None:
         found = states(self.server.lab)
         if "version" in found and found["version"] == query.get("after"):
-            self._send(HTTPStatus.NO_CONTENT)
+            self.send(HTTPStatus.NO_CONTENT)
         else:
-            self._send_json(found)
+            self.send_json(found)
 
-    def _send_picture(self, name: str) -> None:
+    def _send_picture(self, name: str, query: dict[str, str]) -> None:
         picture = self.server.shelf.get(name, RENDERING)
         if picture is None:
             fault = self.server.shelf.fault or f"there is no picture {name[:100]}"
             raise RequestError(HTTPStatus.NOT_FOUND, fault)
-        self._send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": KEPT})
+        self.send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": KEPT})
 
     def _send_frame(self, query: dict[str, str]) -> None:
         after = picture_number(query)
         epoch = picture_number({"after": query.get("epoch", "0")})
         found = self._camera().next_picture(epoch, after, PATIENCE)
         if found is None:
-            self._send(HTTPStatus.NO_CONTENT)
+            self.send(HTTPStatus.NO_CONTENT)
             return
         epoch, picture = found
         headers = {"X-Picture": str(picture.number), "X-Epoch": str(epoch)}
-        self._send(HTTPStatus.OK, "image/jpeg", picture.jpeg, headers)
+        self.send(HTTPStatus.OK, "image/jpeg", picture.jpeg, headers)
 
     def _send_camera(self, query: dict[str, str]) -> None:
-        self._send_json(self._camera().status())
+        self.send_json(self._camera().status())
 
     def _enter(self, body: dict[str, Any]) -> None:
         entry = lab_entry(body, self.server.lab.plan)
-        self._send_json({"entry": entry_data(self.server.lab.enter(entry))})
+        self.send_json({"entry": entry_data(self.server.lab.enter(entry))})
 
     def _watch(self, body: dict[str, Any]) -> None:
         self._camera().watch(trial_number(body))
-        self._send_json({})
+        self.send_json({})
 
     def _check(self, body: dict[str, Any]) -> None:
         if not isinstance(body.get("keep"), bool):
             raise RequestError(HTTPStatus.BAD_REQUEST, '"keep" must be true or false')
         self._camera().check(trial_number(body), keep=body["keep"])
-        self._send_json({})
+        self.send_json({})
 
     def _camera(self) -> LabCamera:
         if self.server.camera is None:
             raise RequestError(HTTPStatus.NOT_FOUND, "there is no camera; start with --camera")
         return self.server.camera
-
-    def _send_json(self, data: Any, code: HTTPStatus = HTTPStatus.OK) -> None:
-        self._send(code, "application/json", json.dumps(data, allow_nan=False).encode())
-
-    def _send(
-        self,
-        code: HTTPStatus,
-        kind: str = "",
-        body: bytes = b"",
-        headers: dict[str, str] | None = None,
-    ) -> None:
-        self.send_response(code)
-        for name, value in {**HEADERS, **(headers or {})}.items():
-            self.send_header(name, value)
-        if code != HTTPStatus.NO_CONTENT:
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def log_message(self, format: str, *args: Any) -> None:
-        """Requests are not worth a line."""

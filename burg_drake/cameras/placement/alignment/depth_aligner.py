@@ -3,6 +3,8 @@ by the outline where the depth behind it is clearly larger."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -45,7 +47,7 @@ SETTLED = 2e-5
 """Steps below this end the rounds [m]."""
 
 
-def check_depth(depth: NDArray, intrinsics: Intrinsics) -> NDArray[np.float32]:
+def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> NDArray[np.float32]:
     """(H, W) float32 in metres, 0 where there is nothing.
 
     Raises:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +130,7 @@ def window_slices(window: Window) -> tuple[slice, slice]:
     return rows, slice(window.left, window.left + window.width)
 
 
-def sample_nearest(values: NDArray, pixels: Array, outside: float) -> Array:
+def sample_nearest(values: NDArray[Any], pixels: Array, outside: float) -> Array:
     """Values (H, W) at the pixels nearest to image points (..., 2); `outside` beyond the image."""
     at = np.round(pixels).astype(int)
     height, width = values.shape[:2]

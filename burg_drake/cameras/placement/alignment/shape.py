@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -113,7 +114,7 @@ def target_shapes(scene: Scene) -> dict[str, TargetShape]:
     return shapes
 
 
-def target_shape(vertices: Array, faces: NDArray, X_SO: Array) -> TargetShape:
+def target_shape(vertices: Array, faces: NDArray[Any], X_SO: Array) -> TargetShape:
     """The shape of a mesh at its target.
 
     Args:

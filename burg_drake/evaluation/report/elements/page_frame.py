@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from burg_drake.evaluation.report.elements.blocks import Child, Html, element
 from burg_drake.evaluation.report.elements.style import style_sheet
+from burg_drake.visualization.style import html_document
 
 
 def html_page(title: str, *content: Child) -> str:
@@ -13,18 +14,7 @@ def html_page(title: str, *content: Child) -> str:
         title: of the window.
         content: of the body.
     """
-    return "<!DOCTYPE html>\n" + element(
-        "html",
-        element(
-            "head",
-            element("meta", charset="utf-8"),
-            element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            element("title", title),
-            element("style", Html(style_sheet())),
-        ),
-        element("body", element("main", *content)),
-        lang="en",
-    )
+    return html_document(title, style_sheet(), element("main", *content))
 
 
 def header(kind: str, title: str, about: str) -> Html:

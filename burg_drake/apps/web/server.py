@@ -1,0 +1,196 @@
+"""What the small servers of pages share: a port, one thread a connection, answers to requests.
+
+Other web sites that the browser has open can neither see nor do anything there: requests must name
+this machine as their host (which stops DNS rebinding), and what acts must come from the page.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import socket
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from typing import Any
+
+from burg_drake.apps.web.requests import json_body
+from burg_drake.core import (
+    HEADERS as ACCESS_HEADERS,
+    BurgError,
+    InvalidInputError,
+    RequestError,
+    address_in_use_error,
+    page_url,
+)
+
+PORTS = 50
+"""How many ports are tried if none is given."""
+IDLE = 30.0
+"""A connection without requests is closed after this [s]."""
+
+Answer = Callable[[Any], None]
+"""Answers a request, with the body of a POST, or the query of a GET."""
+
+
+class PageServer(ThreadingHTTPServer):
+    """Serves a page until it is closed.
+
+    Args:
+        handler: answers requests.
+        host: address to listen on.
+        port: to listen on; the first free one from `first_port` on if None, any if 0.
+
+    Attributes:
+        first_port: the first port that is tried.
+        title: of what is served, for messages.
+        poll: between two looks of whether to stop serving [s].
+        host: as given.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+    """
+
+    daemon_threads = True
+    allow_reuse_address = sys.platform != "win32"
+    first_port: int
+    title = "page"
+    poll = 0.5
+
+    def __init__(
+        self, handler: type[BaseHTTPRequestHandler], *, host: str, port: int | None = None
+    ) -> None:
+        self.host = host
+        if ":" in host:
+            self.address_family = socket.AF_INET6
+        first = self.first_port if port is None else port
+        ports = range(first, first + (PORTS if port is None else 1))
+        for candidate in ports:
+            try:
+                super().__init__((host, candidate), handler)
+                break
+            except OSError as error:
+                failure = error
+                if error.errno != errno.EADDRINUSE:
+                    raise InvalidInputError(
+                        f"the {self.title} cannot be served on {host}: {error.strerror or error}"
+                    ) from error
+        else:
+            raise InvalidInputError(
+                address_in_use_error(host, ports, any_of_them=port is None)
+            ) from failure
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return page_url(self.host, self.server_address[1])
+
+    def start(self) -> None:
+        """Serves in a thread of its own."""
+        serving = partial(self.serve_forever, poll_interval=self.poll)
+        threading.Thread(target=serving, name=f"{self.title} server", daemon=True).start()
+
+    def close(self) -> None:
+        """Stops serving; requests that are being answered end soon."""
+        self.shutdown()
+        self.server_close()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that goes away in the middle of an answer is no error."""
+        if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
+            super().handle_error(request, client_address)
+
+
+class PageHandler(BaseHTTPRequestHandler):
+    """Answers one connection's requests.
+
+    Attributes:
+        package: that has the files of the page.
+        pages: file and type by path.
+        policy: the Content-Security-Policy of every answer.
+        refused_code: status of the answer where an action is refused by a `BurgError`.
+        new_cookie: that the page brings along; empty if none.
+    """
+
+    protocol_version = "HTTP/1.1"
+    timeout = IDLE
+    package: str
+    pages: Mapping[str, tuple[str, str]]
+    policy: str
+    refused_code = HTTPStatus.CONFLICT
+    new_cookie = ""
+
+    def admitted(self) -> tuple[str, dict[str, str]]:
+        """Path and query of a request.
+
+        Raises:
+            RequestError: it is refused, whatever it asks for.
+        """
+        raise NotImplementedError
+
+    def find(self, routes: Mapping[str, Answer], path: str) -> Answer:
+        """Who answers a request for a path.
+
+        Raises:
+            RequestError: nobody does.
+        """
+        if self.command == "GET" and path in self.pages:
+            return partial(self._send_page, path)
+        if path not in routes:
+            raise RequestError(HTTPStatus.NOT_FOUND, f"there is no {path[:100]}")
+        return routes[path]
+
+    def refusal(self, error: BurgError) -> tuple[Any, HTTPStatus]:
+        """JSON values and status of the answer to what was refused."""
+        return {"error": str(error)}, self.refused_code
+
+    def answer(self, routes: Mapping[str, Answer]) -> None:
+        """Answers a request by whoever is in charge of its path."""
+        try:
+            path, query = self.admitted()
+            found = self.find(routes, path)
+            found(json_body(self.headers, self.rfile) if self.command == "POST" else query)
+        except RequestError as error:
+            self.close_connection = True  # its body may not have been read
+            self.send_json({"error": str(error)}, error.code)
+        except BurgError as error:
+            self.send_json(*self.refusal(error))
+
+    def send_json(self, data: Any, code: HTTPStatus = HTTPStatus.OK) -> None:
+        """Answers with JSON."""
+        self.send(code, "application/json", json.dumps(data, allow_nan=False).encode())
+
+    def send(
+        self,
+        code: HTTPStatus,
+        kind: str = "",
+        body: bytes = b"",
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        """Answers with a body of a type."""
+        self.send_head(code, headers or {})
+        if code != HTTPStatus.NO_CONTENT:
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def send_head(self, code: HTTPStatus, headers: Mapping[str, str]) -> None:
+        """Begins an answer: its status, the headers of all answers, and its own."""
+        self.send_response(code)
+        common = {**ACCESS_HEADERS, "Content-Security-Policy": self.policy}
+        for name, value in {**common, **headers}.items():
+            self.send_header(name, value)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not worth a line."""
+
+    def _send_page(self, path: str, query: dict[str, str]) -> None:
+        name, kind = self.pages[path]
+        page = (files(self.package) / name).read_bytes()
+        cookie = {"Set-Cookie": self.new_cookie} if self.new_cookie else None
+        self.send(HTTPStatus.OK, kind, page, cookie)

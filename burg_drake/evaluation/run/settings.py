@@ -1,0 +1,66 @@
+"""What is asked about the grasps of scenes, in one object: the settings of `evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
+
+if TYPE_CHECKING:
+    from burg_drake.core.grasps import Mode
+    from burg_drake.evaluation.records import Shard, TableFormat
+    from burg_drake.station.document import Engine, GraspMotion
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationSettings:
+    """Which grasps are judged, and how.
+
+    Attributes:
+        grasps_per_object: antipodal grasps to sample for each free instance, unless grasps are
+            given; the same ones as those of `sample_grasps` with these settings. Of an object that
+            has fewer, `Summary.notes` says why.
+        approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
+            above 0; 90 is as far as from the side, 180 from anywhere.
+        blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
+            see `SamplingSettings`.
+        only: names of free instances, or of objects for all their instances, to judge grasps of;
+            all if None.
+        mode: `hand`: the hand alone executes grasps that are clear. `reach`: those that the arm can
+            execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
+            the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
+        engine: how trials are stepped; an engine or the name of a preset.
+        motion: how the hand goes to a grasp and away from it; as the station says if None.
+        seed: of the sampling.
+        shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
+            fewer every eighth grasp of each. `merge_runs` unites the shares.
+        table: format of the results file.
+        scene_reports: whether each of several scenes gets a report of its own; None if they are at
+            most a hundred, as one takes some tenths of a second. `write_report` makes it later.
+
+    Raises:
+        InvalidInputError: no grasps are asked for.
+    """
+
+    grasps_per_object: int = 100
+    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG
+    blind: bool = False
+    only: Iterable[str] | None = None
+    mode: Mode | None = None
+    engine: Engine | str = "standard"
+    motion: GraspMotion | None = None
+    seed: int = 0
+    shard: Shard | str | None = None
+    table: TableFormat = "csv"
+    scene_reports: bool | None = None
+
+    def __post_init__(self) -> None:
+        only = (self.only,) if isinstance(self.only, str) else tuple(self.only or ()) or None
+        object.__setattr__(self, "only", only)
+        if self.grasps_per_object < 1:
+            raise InvalidInputError(
+                f"grasps_per_object is {self.grasps_per_object}; give 1 or more"
+            )
