@@ -270,7 +270,7 @@ def test_predicted_probability_comes_from_a_table_of_robustness(tmp_path: Path) 
     named = {c.name: c for c in compare(first, second).judgement.calibration}
     assert named["probability"].trials == 10 and named["probability"].without == 2
     (tmp_path / "bad.csv").write_text("id,outcome\na,b\n")
-    with pytest.raises(InvalidInputError, match="no table of robustness"):
+    with pytest.raises(InvalidInputError, match="not a table of robustness"):
         compare(first, second, robustness=tmp_path / "bad.csv")
 
 
