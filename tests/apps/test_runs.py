@@ -143,7 +143,7 @@ def test_interrupted_evaluation_says_how_to_go_on(
     monkeypatch.setattr("burg_drake.evaluation.evaluate", interrupt)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 130
     assert capsys.readouterr().err == (
-        "burg-drake: interrupted; the same command goes on from here\n"
+        "burg-drake: interrupted; run the same command to continue\n"
     )
 
 
@@ -293,7 +293,7 @@ def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Captu
     [
         (["--only", "bux"], "has no grasps of 'bux'; did you mean 'box'? Known: box"),
         (["--outcome", "dropped"], "has no such grasps; choose other outcomes"),
-        (["--outcome", "lifte"], "'lifte' is no outcome; did you mean 'lifted'? Known: "),
+        (["--outcome", "lifte"], "'lifte' is not an outcome; did you mean 'lifted'? Known: "),
     ],
 )
 def test_bad_choice_of_grasps(run: Run, options: list[str], message: str, capsys: Capture) -> None:

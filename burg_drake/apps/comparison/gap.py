@@ -98,7 +98,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     add_motion(parser)
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def _add_displaced(parser: Parser) -> None:
@@ -244,7 +244,7 @@ def _require_own(arguments: argparse.Namespace, run: Run) -> None:
         if getattr(arguments, name) not in (None, False):
             raise InvalidInputError(
                 f"--{name.replace('_', '-')} is about a scene; {run.path} is a run, which has"
-                " grasps, station, engine and motion of its own: leave it away"
+                " grasps, station, engine and motion of its own: leave it out"
             )
 
 

@@ -34,7 +34,7 @@ def add_motion(parser: Parser) -> None:
         "100 mm straight in, and 300 mm straight up.",
     )
     for name, text in (
-        ("standoff", "straight way in along the approach, from the pregrasp to the grasp"),
+        ("standoff", "straight approach, from the pregrasp to the grasp"),
         ("retreat", "way back along the approach with the object, before the lift"),
         ("lift_height", "length of the lift"),
         (
@@ -80,7 +80,7 @@ def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:
     if mode == "hand" and arguments.standoff_mm is not None:
         raise InvalidInputError(
             "--standoff-mm is about the arm's way to the grasp; in mode 'hand' the hand begins at"
-            " the grasp: leave it away, or give --mode reach or arm"
+            " the grasp: leave it out, or give --mode reach or arm"
         )
 
 

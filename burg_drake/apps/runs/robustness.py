@@ -100,7 +100,7 @@ def add_to(verbs: Any) -> None:
     )
     add_retry_failed(parser, "tests")
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_robustness(arguments: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from burg_drake.core import content_hash
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import (
     JOURNAL_FILE,
@@ -213,7 +213,7 @@ def _judge(
         return
     todo = sum(len(job.candidates) for job in jobs.values())
     begin = Progress(STARTING, total - todo, total, unit="trials")
-    pace = Pace(reporter.show, begin, "judging again")
+    pace = ProgressMeter(reporter.show, begin, "judging again")
 
     def note(lost: JobFailed) -> None:
         failed.update({c.id: one_line(lost.error) for c in lost.job.candidates})
