@@ -16,6 +16,7 @@ from burg_drake.experiment.comparison import (
 from burg_drake.experiment.gap import (
     Change as Change,
     GapDocument as GapDocument,
+    GapSettings as GapSettings,
     GapStep as GapStep,
     GapSteps as GapSteps,
     OutcomeChange as OutcomeChange,

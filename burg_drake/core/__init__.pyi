@@ -42,6 +42,16 @@ from .frames import (
     swap_fingers as swap_fingers,
     transform_points as transform_points,
 )
+from .settings import (
+    DEGREES as DEGREES,
+    MILLIMETRES as MILLIMETRES,
+    PERCENT as PERCENT,
+    THOUSANDTHS as THOUSANDTHS,
+    Setting as Setting,
+    ShownUnit as ShownUnit,
+    declared as declared,
+    setting as setting,
+)
 from .statistics import (
     Z_95 as Z_95,
     clustered_interval as clustered_interval,

@@ -1,5 +1,4 @@
 from .robustness.friction_search import (
-    FrictionSettings as FrictionSettings,
     friction_limit as friction_limit,
 )
 from .robustness.grip import (
@@ -8,14 +7,17 @@ from .robustness.grip import (
 )
 from .robustness.hold_force import (
     HoldForces as HoldForces,
-    LoadSettings as LoadSettings,
     shake as shake,
     tug as tug,
 )
 from .robustness.perturbation import (
-    Noise as Noise,
     SuccessRate as SuccessRate,
     success_rate as success_rate,
+)
+from .robustness.settings import (
+    FrictionSettings as FrictionSettings,
+    LoadSettings as LoadSettings,
+    Noise as Noise,
 )
 from .trials.carrier import Carrier as Carrier
 from .trials.contacts import BodyContact as BodyContact

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.grasps import stats as verb
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.grasping.similarity.pose_distance import LEVER
 
 
 def line(*millimetres: float, object: str = "mug") -> GraspSet:
@@ -38,13 +34,6 @@ def stats(*arguments: str, tmp_path: Path) -> dict[str, object]:
     assert main(["grasps", "stats", *arguments, "--json", str(path)]) == 0
     figures: dict[str, object] = json.loads(path.read_text())
     return figures
-
-
-def test_defaults_are_those_of_the_library() -> None:
-    tolerance = Tolerance()
-    assert 1e3 * tolerance.translation == verb.DEFAULT_TRANSLATION_MM
-    assert math.radians(verb.DEFAULT_ANGLE_DEG) == tolerance.angle
-    assert 1e-3 * verb.DEFAULT_MM_PER_DEG / math.radians(1.0) == LEVER
 
 
 def test_one_set(files: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> None:

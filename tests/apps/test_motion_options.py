@@ -8,13 +8,9 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.options.hand_motion import LONGEST_MM, add_motion, chosen_motion
-from burg_drake.station.document.grasp_motion import RANGES, GraspMotion
+from burg_drake.apps.options.hand_motion import add_motion, chosen_motion
+from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import load_station
-
-
-def test_lengths_are_those_of_a_document() -> None:
-    assert {name: (0.0, most / 1000.0) for name, most in LONGEST_MM.items()} == RANGES
 
 
 def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -> None:

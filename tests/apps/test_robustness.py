@@ -9,16 +9,17 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.runs import robustness
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.columns import describe
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.records.journal import Journal, read_journal
 from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.robustness import assessment as tested, probes
+from burg_drake.evaluation.robustness import assessment as tested
 from burg_drake.evaluation.robustness.assessment import assess_robustness
-from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.robustness.settings import (
+    RobustnessSettings,
+)
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.simulation.robustness.friction_search import friction_limit
 from burg_drake.simulation.robustness.grip import Grip, take_grip
@@ -191,8 +192,3 @@ def test_bad_arguments(options: list[str], message: str, run: Run, capsys: Captu
     assert code == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("burg-drake: error: ") and message in line
-
-
-def test_the_parser_knows_tests_and_defaults() -> None:
-    assert robustness.TESTS == probes.TESTS
-    assert robustness.DEFAULT_BEST == tested.DEFAULT_BEST

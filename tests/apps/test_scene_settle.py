@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.scene.verbs import DEFAULT_TIME_LIMIT, SETTLING_ENGINE
 from burg_drake.core.paths.resources import resolve
 from burg_drake.scene.document.scene import load_scene
-from burg_drake.simulation.settling import settled_scene
 
 Capture = pytest.CaptureFixture[str]
 
@@ -148,8 +146,3 @@ def test_overlapping_objects(scene_file: Path, capsys: Capture) -> None:
     code, _ = settle(scene_file)
     assert code == 2
     assert "'mug' and 'bottle' overlap by " in capsys.readouterr().err
-
-
-def test_the_parser_knows_the_defaults() -> None:
-    assert SETTLING_ENGINE == settled_scene.DEFAULT_ENGINE
-    assert DEFAULT_TIME_LIMIT == settled_scene.DEFAULT_TIME_LIMIT

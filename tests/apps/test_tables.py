@@ -27,7 +27,9 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.text_table import TextTable
 from burg_drake.evaluation.results.counts import OutcomeCounts, StageCost, Summary
 from burg_drake.evaluation.results.summary_tables import SummaryView
-from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.robustness.settings import (
+    RobustnessSettings,
+)
 from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_view
 from burg_drake.grasping.comparison.score_ranking import rank_by
 from burg_drake.grasping.comparison.summary import compare_grasps, summarize

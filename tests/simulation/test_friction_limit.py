@@ -10,9 +10,11 @@ from trial_world import FORCE, GRAVITY, SLOW, from_above, make_station
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
 from burg_drake.simulation.robustness.friction_search import (
-    FrictionSettings,
     friction_limit,
     friction_to_carry,
+)
+from burg_drake.simulation.robustness.settings import (
+    FrictionSettings,
 )
 from burg_drake.simulation.trials.hand_trial import HandTrial
 

@@ -16,9 +16,11 @@ from burg_drake.simulation.robustness.grip import Grip, take_grip
 from burg_drake.simulation.robustness.hold_force import (
     DIRECTIONS,
     HoldForces,
-    LoadSettings,
     shake,
     tug,
+)
+from burg_drake.simulation.robustness.settings import (
+    LoadSettings,
 )
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult

@@ -13,11 +13,13 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse, make_pose, rotation_angle
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.simulation.robustness.perturbation import (
-    Noise,
     Perturbed,
     SuccessRate,
     perturb,
     success_rate,
+)
+from burg_drake.simulation.robustness.settings import (
+    Noise,
 )
 from burg_drake.simulation.trials.hand_trial import HandTrial
 

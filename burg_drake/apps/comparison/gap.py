@@ -4,37 +4,33 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
-    DEFAULT_APPROACH_ANGLE,
-    DEFAULT_ENGINE,
     DEFAULT_STATION,
-    ENGINE_NAMES,
-    NAMES,
     SCENE_NAMES,
     Parser,
     add_cluster,
     add_given,
     add_motion,
+    add_options,
     add_quiet,
     add_sampling,
     add_verb,
     chosen_cluster,
     chosen_motion,
+    given_motion,
     grasps_per_object,
-    not_negative,
-    positive_int,
+    motion_option,
     read_given,
     require_file,
     require_sampled,
+    settings_from,
     workers,
 )
-from burg_drake.apps.runs import MODES
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -44,8 +40,6 @@ if TYPE_CHECKING:
     from burg_drake.experiment.trials import TrialSheet
 
 DEFAULT_GRASPS = 20
-# Kept in step with experiment.gap, which imports too much for a help text; a test compares them.
-DEFAULT_SAMPLES, DEFAULT_MM, DEFAULT_DEG = 5, 2.0, 2.0
 OF_SCENES = ("station", "grasps_per_object", "blind", "only", "approach_angle", "engine", "grasps")
 """Options that a run answers itself."""
 
@@ -65,7 +59,16 @@ def add_to(verbs: Any) -> None:
         "burg-drake gap tabletop_six --mode reach --samples 0 -o gap",
         "",
         "The same command goes on where an interrupted one stopped. Every step is an ordinary run.",
+        options=_add_options,
     )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.core.grasps import MODES
+    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.station.document import DEFAULT_ENGINE
+
     parser.add_argument(
         "source",
         metavar="SCENE|RUN",
@@ -87,9 +90,7 @@ def add_to(verbs: Any) -> None:
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
-    parser.add_argument(
-        "--engine", choices=ENGINE_NAMES, help=f"with a scene (default: {DEFAULT_ENGINE})"
-    )
+    add_options(parser, EvaluationSettings, "engine", unset=True, told=DEFAULT_ENGINE)
     who = parser.add_mutually_exclusive_group()
     who.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
@@ -98,32 +99,14 @@ def add_to(verbs: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     add_motion(parser)
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def _add_displaced(parser: Parser) -> None:
+    from burg_drake.experiment.gap import GapSettings, PlacementNoise
+
     group = parser.add_argument_group("displaced objects")
-    group.add_argument(
-        "--placement-sd-mm",
-        metavar="MM",
-        type=not_negative,
-        default=DEFAULT_MM,
-        help="standard deviation of each object along x and along y (default: %(default)g)",
-    )
-    group.add_argument(
-        "--placement-sd-deg",
-        metavar="DEG",
-        type=not_negative,
-        default=DEFAULT_DEG,
-        help="standard deviation of its turn about the vertical (default: %(default)g)",
-    )
-    group.add_argument(
-        "--samples",
-        metavar="K",
-        type=_samples,
-        default=DEFAULT_SAMPLES,
-        help="number of displaced scenes; 0 leaves the step out (default: %(default)s)",
-    )
+    add_options(group, PlacementNoise)
+    add_options(group, GapSettings, "samples")
     group.add_argument(
         "--trials", metavar="FILE", help="real trials, to compare each step's verdicts with"
     )
@@ -188,20 +171,14 @@ def _measure(
     from burg_drake.core.workers import default_workers
     from burg_drake.evaluation.run import EvaluationSettings
     from burg_drake.evaluation.workers import LocalExecutor
-    from burg_drake.experiment.gap import PlacementNoise, measure_gap
+    from burg_drake.experiment.gap import GapSettings, PlacementNoise, measure_gap
     from burg_drake.scene.document import load_scene
     from burg_drake.station.document import load_station
 
-    noise = PlacementNoise(
-        place=arguments.placement_sd_mm / 1000.0,
-        turn=math.radians(arguments.placement_sd_deg),
-        seed=arguments.seed,
-    )
+    noise = settings_from(arguments, PlacementNoise, seed=arguments.seed)
     tried = () if sheet is None else tuple(dict.fromkeys(t.grasp for t in sheet.trials))
     options: dict[str, Any] = {
-        "last": arguments.mode,
-        "noise": noise,
-        "samples": arguments.samples,
+        "settings": settings_from(arguments, GapSettings, last=arguments.mode, noise=noise),
         "tried": tried,
         "executor": cluster or LocalExecutor(arguments.workers or default_workers()),
         "progress": not arguments.quiet,
@@ -221,14 +198,13 @@ def _measure(
         arguments.output,
         station=station,
         grasps=given.by_instance if given else None,
-        evaluation=EvaluationSettings(
-            engine=arguments.engine or DEFAULT_ENGINE,
-            motion=chosen_motion(arguments, station),
-            seed=arguments.seed,
+        evaluation=settings_from(
+            arguments,
+            EvaluationSettings,
             grasps_per_object=grasps_per_object(arguments),
-            approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-            blind=arguments.blind,
             only=arguments.only,
+            motion=chosen_motion(arguments, station),
+            mode=None,  # that of a step
         ),
         **options,
     )
@@ -240,17 +216,13 @@ def _require_own(arguments: argparse.Namespace, run: Run) -> None:
     Raises:
         InvalidInputError: names the option.
     """
-    for name in (*OF_SCENES, *NAMES.values()):
-        if getattr(arguments, name) not in (None, False):
-            raise InvalidInputError(
-                f"--{name.replace('_', '-')} is about a scene; {run.path} is a run, which has"
-                " grasps, station, engine and motion of its own: leave it out"
-            )
-
-
-def _samples(text: str) -> int:
-    """A whole number from 0."""
-    return 0 if text == "0" else positive_int(text)
+    given = [n for n in OF_SCENES if getattr(arguments, n) not in (None, False)]
+    options = [f"--{name.replace('_', '-')}" for name in given]
+    for option in (*options, *map(motion_option, given_motion(arguments))):
+        raise InvalidInputError(
+            f"{option} is about a scene; {run.path} is a run, which has grasps, station, engine and"
+            " motion of its own: leave it out"
+        )
 
 
 def _failures(ladder: GapSteps) -> int:

@@ -8,18 +8,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_format,
+    add_options,
     add_quiet,
     add_sampling,
     add_station,
     add_verb,
     grasps_per_object,
-    not_negative,
     number,
     output_of,
-    positive,
-    positive_int,
     print_shortfalls,
+    settings_from,
 )
 from burg_drake.core import InvalidInputError
 from burg_drake.core.terminal import TextTable
@@ -36,7 +36,7 @@ DEFAULT_GRASPS = 1000
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "sample",
         run_sample,
@@ -48,7 +48,11 @@ def add_to(group: Any) -> None:
         "",
         "The grasps of an object follow from --seed, the object and what stands around it;",
         "`evaluate` and `reach` sample the same ones with the same settings.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "source", metavar="SCENE|LIB", help="scene file or library folder, or a built-in name"
     )
@@ -66,22 +70,10 @@ def add_to(group: Any) -> None:
     add_quiet(parser)
 
 
-def _add_settings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--friction", metavar="MU", type=positive, help="coefficient (default: the object's)"
-    )
-    parser.add_argument(
-        "--approaches",
-        metavar="K",
-        type=positive_int,
-        default=1,
-        help="approach angles for each pair of contacts (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--from-arm-side",
-        action="store_true",
-        help="in a scene, only approaches that do not point back to the arm",
-    )
+def _add_settings(parser: Parser) -> None:
+    from burg_drake.evaluation.candidates import SamplingSettings
+
+    add_options(parser, SamplingSettings, "friction", "approaches", "from_arm_side")
     parser.add_argument(
         "--standoffs-mm",
         metavar="MM",
@@ -98,25 +90,7 @@ def _add_settings(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="density of contacts on each face of an object's surface; may be given several times",
     )
-    parser.add_argument(
-        "--margin-mm",
-        metavar="MM",
-        type=not_negative,
-        default=0.0,
-        help="only grasps with this clearance of the open hand (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--conservative",
-        action="store_true",
-        help="test clearance faster, which leaves out a tenth of the clear grasps, too",
-    )
-    parser.add_argument(
-        "--diverse",
-        metavar="K",
-        type=positive_int,
-        default=1,
-        help="sample K times as many and keep those that are farthest apart",
-    )
+    add_options(parser, SamplingSettings, "margin", "conservative", "diverse")
 
 
 def run_sample(arguments: argparse.Namespace) -> int:
@@ -131,17 +105,13 @@ def run_sample(arguments: argparse.Namespace) -> int:
     source = open_source(arguments.source)
     output.require_fits(_objects(arguments.only, source))
     station = load_station(arguments.station)
-    settings = SamplingSettings(
-        friction=arguments.friction,
-        approaches=arguments.approaches,
+    settings = settings_from(
+        arguments,
+        SamplingSettings,
         approach_angle_deg=arguments.approach_angle,
-        from_arm_side=arguments.from_arm_side,
         standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
         weights={name: _load_weights(path) for name, path in arguments.weights},
         blind=arguments.blind,
-        margin=1e-3 * arguments.margin_mm,
-        conservative=arguments.conservative,
-        diverse=arguments.diverse,
     )
     asked = grasps_per_object(arguments)
     sampled, seconds = _sample(arguments, source, asked, station, settings)

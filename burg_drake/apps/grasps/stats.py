@@ -9,30 +9,25 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_file_options,
     add_hand,
+    add_options,
     add_renaming,
     add_verb,
     gripper_for,
-    not_negative,
+    settings_from,
 )
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write, require_writable
 
 if TYPE_CHECKING:
     from burg_drake.formats.common import ImportedGrasps
-    from burg_drake.grasping.similarity import Tolerance
-
-# Kept in step with grasping.pose_search and grasping.similarity, which import too much for a help
-# text; a test compares them.
-DEFAULT_TRANSLATION_MM = 15.0
-DEFAULT_ANGLE_DEG = 15.0
-DEFAULT_MM_PER_DEG = 1.0
 
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "stats",
         run_stats,
@@ -44,33 +39,21 @@ def add_to(group: Any) -> None:
         "",
         "Distances do not tell the two fingers apart, and join grasps of the same object only (and",
         "of the same instance, where both sets name instances).",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.grasping.similarity import Tolerance
+
     parser.add_argument("a", metavar="A", help="grasp file of any format, or folder of a run")
     parser.add_argument("b", metavar="B", nargs="?", help="another one, to compare with A")
     add_file_options(parser)
     add_hand(parser, default=None)
     add_renaming(parser)
     match = parser.add_argument_group("what counts as a match of A and B (all must hold)")
-    for name, unit, default, what in (
-        ("translation", "mm", DEFAULT_TRANSLATION_MM, "distance of the grasp frames"),
-        ("angle", "deg", DEFAULT_ANGLE_DEG, "angle between them"),
-        ("distance", "mm", math.inf, "sum of the two, with --mm-per-deg for each degree"),
-    ):
-        shown = "not bounded" if math.isinf(default) else f"{default:g}"
-        match.add_argument(
-            f"--{name}-{unit}",
-            metavar=unit.upper(),
-            type=not_negative,
-            default=default,
-            help=f"largest {what} (default: {shown})",
-        )
-    parser.add_argument(
-        "--mm-per-deg",
-        metavar="MM",
-        type=not_negative,
-        default=DEFAULT_MM_PER_DEG,
-        help="what one degree counts in combined distances (default: %(default)g)",
-    )
+    add_options(match, Tolerance, "translation", "angle", "distance")
+    add_options(parser, Tolerance, "lever")
     parser.add_argument(
         "--ap",
         metavar="COLUMN",
@@ -85,10 +68,11 @@ def run_stats(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.grasps.stats_tables import print_comparison, print_ranking, print_summary
     from burg_drake.evaluation.grasp_sets import read_input
     from burg_drake.grasping.comparison import compare_grasps, rank_by, summarize
+    from burg_drake.grasping.similarity import Tolerance
 
     if arguments.json is not None:
         require_writable(arguments.json)
-    tolerance, column = _tolerance(arguments), arguments.ap
+    tolerance, column = settings_from(arguments, Tolerance), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
     told = arguments.hand or arguments.gripper_link
     gripper = gripper_for(arguments) if told else None
@@ -113,17 +97,6 @@ def run_stats(arguments: argparse.Namespace) -> int:
         atomic_write(arguments.json, text + "\n")
         print(f"wrote {arguments.json}")
     return 0
-
-
-def _tolerance(arguments: argparse.Namespace) -> Tolerance:
-    from burg_drake.grasping.similarity import Tolerance
-
-    return Tolerance(
-        translation=1e-3 * arguments.translation_mm,
-        angle=math.radians(arguments.angle_deg),
-        distance=1e-3 * arguments.distance_mm,
-        lever=1e-3 * arguments.mm_per_deg / math.radians(1.0),
-    )
 
 
 def _renamed(sets: list[ImportedGrasps], names: dict[str, str]) -> list[ImportedGrasps]:

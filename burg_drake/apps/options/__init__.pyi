@@ -1,8 +1,5 @@
 from .arguments import (
-    DEFAULT_APPROACH_ANGLE as DEFAULT_APPROACH_ANGLE,
-    DEFAULT_ENGINE as DEFAULT_ENGINE,
     DEFAULT_STATION as DEFAULT_STATION,
-    ENGINE_NAMES as ENGINE_NAMES,
     SCENE_NAMES as SCENE_NAMES,
     Parser as Parser,
     add_group as add_group,
@@ -32,6 +29,10 @@ from .cluster import (
     add_cluster as add_cluster,
     chosen_cluster as chosen_cluster,
 )
+from .declared import (
+    add_options as add_options,
+    settings_from as settings_from,
+)
 from .given_grasps import (
     add_given as add_given,
     read_given as read_given,
@@ -55,9 +56,10 @@ from .grasp_output import (
     print_notes as print_notes,
 )
 from .hand_motion import (
-    NAMES as NAMES,
     add_motion as add_motion,
     chosen_motion as chosen_motion,
+    given_motion as given_motion,
+    motion_option as motion_option,
     require_standoff_of_arm as require_standoff_of_arm,
 )
 from .retries import (

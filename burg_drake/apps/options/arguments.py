@@ -5,17 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import textwrap
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from burg_drake.core import did_you_mean, nearest, quoted, shown
 
 DEFAULT_STATION = "panda_tabletop"
-# Kept in step with station.engine, which imports too much for a help text; a test compares them.
-ENGINE_NAMES = ("reference", "standard", "screening")
-DEFAULT_ENGINE = "standard"
-# Likewise in step with evaluation.candidate_sampling.
-DEFAULT_APPROACH_ANGLE = 75.0
-# Likewise those that the package installs.
+# Kept in step with what the package installs; a test compares them.
 SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
 
 
@@ -31,12 +27,37 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
         options.setdefault("allow_abbrev", False)
+        self._waiting: Callable[[Parser], None] | None = None
         super().__init__(**options)
+
+    def wait_with(self, options: Callable[[Parser], None] | None) -> None:
+        """Adds options when somebody asks for them."""
+        self._waiting = options
+
+    def complete(self) -> None:
+        """Adds the options that were left for when somebody asks: they are made of settings, whose
+        modules need not be imported for the sake of other verbs."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            waiting(self)
+
+    def format_usage(self) -> str:
+        """The usage with all options."""
+        self.complete()
+        return super().format_usage()
+
+    def format_help(self) -> str:
+        """The help with all options."""
+        self.complete()
+        return super().format_help()
 
     def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
         """Refuses what it does not know, for its verbs, too, which else leave that to the parser
         of the whole command, whose help knows nothing of them."""
+        self.complete()
         found, unknown = super().parse_known_args(*arguments, **named)
+        if not hasattr(found, "flags"):  # of the verb, whose parser comes first
+            found.flags = {a.dest: a.option_strings[-1] for a in self._actions if a.option_strings}
         if unknown:
             option = unknown[0].partition("=")[0]
             known = self._option_string_actions if option.startswith("-") else ()
@@ -60,7 +81,14 @@ def examples(*lines: str) -> str:
     return "examples:\n" + textwrap.indent("\n".join(lines), "  ")
 
 
-def add_verb(verbs: Any, name: str, run: Any, summary: str, *lines: str) -> Parser:
+def add_verb(
+    verbs: Any,
+    name: str,
+    run: Any,
+    summary: str,
+    *lines: str,
+    options: Callable[[Parser], None] | None = None,
+) -> Parser:
     """Adds a verb.
 
     Args:
@@ -69,6 +97,7 @@ def add_verb(verbs: Any, name: str, run: Any, summary: str, *lines: str) -> Pars
         run: called with the parsed arguments; returns the exit code.
         summary: one sentence.
         lines: examples.
+        options: adds what the verb takes, when somebody asks for it.
     """
     parser: Parser = verbs.add_parser(
         name,
@@ -77,6 +106,7 @@ def add_verb(verbs: Any, name: str, run: Any, summary: str, *lines: str) -> Pars
         epilog=examples(*lines),
     )
     parser.set_defaults(run=run)
+    parser.wait_with(options)
     return parser
 
 
@@ -174,15 +204,16 @@ def add_view(parser: Parser) -> None:
 
 def positive_int(text: str) -> int:
     """A whole number from 1 that can be counted to."""
-    return _whole(text, 1, MOST)
+    return whole(text, 1, MOST)
 
 
 def workers(text: str) -> int:
     """A number of processes."""
-    return _whole(text, 1, MOST_WORKERS)
+    return whole(text, 1, MOST_WORKERS)
 
 
-def _whole(text: str, low: int, high: int) -> int:
+def whole(text: str, low: int, high: int) -> int:
+    """A whole number within bounds."""
     try:
         value = int(text)
     except ValueError:  # also of 4,300 digits
@@ -196,12 +227,12 @@ def _whole(text: str, low: int, high: int) -> int:
 
 def seed(text: str) -> int:
     """A whole number from 0 with at most 64 bits, as documents have it."""
-    return _whole(text, 0, LARGEST_SEED)
+    return whole(text, 0, LARGEST_SEED)
 
 
 def port(text: str) -> int:
     """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
-    return _whole(text, 1024, 65535)
+    return whole(text, 1024, 65535)
 
 
 def positive(text: str) -> float:
@@ -217,16 +248,6 @@ def not_negative(text: str) -> float:
     value = number(text)
     if value < 0.0:
         raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
-    return value
-
-
-def approach_angle(text: str) -> float:
-    """An angle from straight down in degrees, above 0 to 180."""
-    value = number(text)
-    if not 0.0 < value <= 180.0:
-        raise argparse.ArgumentTypeError(
-            f"{shown(text)} is not an angle above 0, at most 180 degrees"
-        )
     return value
 
 

@@ -6,14 +6,8 @@ import argparse
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import (
-    DEFAULT_APPROACH_ANGLE,
-    Parser,
-    add_only,
-    approach_angle,
-    positive_int,
-    seed,
-)
+from burg_drake.apps.options.arguments import Parser, add_only
+from burg_drake.apps.options.declared import add_options
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -28,32 +22,14 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
         default: number of grasps for each object.
         which: group in which the number of grasps is an alternative, such as to grasps of a file.
     """
-    (which or parser).add_argument(
-        "-n",
-        "--grasps-per-object",
-        metavar="N",
-        type=positive_int,
-        help="number of grasps to sample on each object; only those at which the open hand collides"
-        " with nothing, and its pads meet the object within the friction cones"
-        f" (default: {default})",
-    )
+    from burg_drake.evaluation.run import EvaluationSettings
+
+    add_options(which or parser, EvaluationSettings, "grasps_per_object", unset=True, told=default)
     parser.set_defaults(default_grasps=default)
-    parser.add_argument(
-        "--blind",
-        action="store_true",
-        help="sample without regard to the hand, by points of contact alone, as in the literature",
-    )
+    add_options(parser, EvaluationSettings, "blind")
     add_only(parser, "grasps")
-    parser.add_argument(
-        "--approach-angle",
-        metavar="DEG",
-        type=approach_angle,
-        help="in a scene, sample grasps within this angle of straight down"
-        f" (default: {DEFAULT_APPROACH_ANGLE:g}; 180: any)",
-    )
-    parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of the sampling (default: %(default)s)"
-    )
+    add_options(parser, EvaluationSettings, "approach_angle_deg", unset=True)
+    add_options(parser, EvaluationSettings, "seed")
 
 
 def grasps_per_object(arguments: argparse.Namespace) -> int:

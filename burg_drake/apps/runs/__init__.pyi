@@ -1,2 +1,1 @@
 from . import (evaluate as evaluate, merge as merge, reach as reach, replay as replay, report as report, robustness as robustness, status as status,)
-from .evaluate import MODES as MODES

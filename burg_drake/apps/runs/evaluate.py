@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
-    DEFAULT_ENGINE,
-    ENGINE_NAMES,
     SCENE_NAMES,
+    Parser,
+    add_options,
     add_quiet,
     add_station,
     add_verb,
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 DEFAULT_OUTPUT = "runs"
 DEFAULT_GRASPS = 100
 """Sampled for each object, unless grasps are given."""
-# Kept in step with evaluation.mode, which imports too much for a help text; a test compares them.
-MODES = ("hand", "reach", "arm")
 
 
 def add_to(verbs: Any) -> None:
@@ -54,7 +52,14 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
         "",
         "The same command goes on where an interrupted one stopped.",
+        options=_add_options,
     )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.evaluation.run import EvaluationSettings
+
     parser.add_argument(
         "scenes",
         metavar="SCENE",
@@ -73,36 +78,13 @@ def add_to(verbs: Any) -> None:
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
-    parser.add_argument(
-        "--engine",
-        choices=ENGINE_NAMES,
-        default=DEFAULT_ENGINE,
-        help="how time is stepped: for truth, for results, for a first look (default: %(default)s)",
-    )
+    add_options(parser, EvaluationSettings, "engine")
     who = parser.add_mutually_exclusive_group()
     who.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
     )
     add_cluster(who)
-    parser.add_argument(
-        "--table",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="format of the table of results (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--mode",
-        choices=MODES,
-        help="hand: the hand alone executes grasps in simulation; reach: those that the arm can"
-        " execute; arm: those, by the whole arm from the pregrasp on (default: reach, or hand if"
-        " there is no arm)",
-    )
-    parser.add_argument(
-        "--shard",
-        metavar="K/N",
-        help="judge a share of the work, such as 2/8, on one of several machines: every N-th scene,"
-        " or of fewer than N scenes every N-th grasp; burg-drake merge unites them",
-    )
+    add_options(parser, EvaluationSettings, "table", "mode", "shard")
     add_motion(parser)
     add_retry_failed(parser, "grasps")
     parser.add_argument(
@@ -112,7 +94,6 @@ def add_to(verbs: Any) -> None:
         " a hundred. burg-drake report RUN/scenes/NAME makes one later",
     )
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_evaluate(arguments: argparse.Namespace) -> int:

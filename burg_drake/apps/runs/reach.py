@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_quiet,
     add_scene,
     add_station,
@@ -59,7 +60,11 @@ def add_to(verbs: Any) -> None:
         "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
         "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
         "does that.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     add_scene(parser)
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)

@@ -8,12 +8,15 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_only,
+    add_options,
     add_quiet,
     add_verb,
     not_negative,
     positive_int,
     seed,
+    settings_from,
     workers,
 )
 from burg_drake.apps.options import add_retry_failed, how_to_retry
@@ -22,10 +25,6 @@ from burg_drake.core import InvalidInputError
 if TYPE_CHECKING:
     from burg_drake.evaluation.robustness import RobustnessSettings
 
-# Kept in step with evaluation.probes and evaluation.robustness, which import too much for a help
-# text; a test compares them.
-TESTS = ("tug", "shake", "friction", "noise")
-DEFAULT_BEST = 3
 
 
 def add_to(verbs: Any) -> None:
@@ -41,7 +40,15 @@ def add_to(verbs: Any) -> None:
         "",
         "The same command goes on where an interrupted one stopped. The table keeps what earlier",
         "commands found about the same grasps with the same settings.",
+        options=_add_options,
     )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.evaluation.robustness import DEFAULT_BEST, TESTS, RobustnessSettings
+    from burg_drake.simulation.robustness import Noise
+
     parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
@@ -68,26 +75,8 @@ def add_to(verbs: Any) -> None:
         help=f"some of {','.join(TESTS)} (default: all)",
     )
     noise = parser.add_argument_group("noise, as standard deviations")
-    noise.add_argument(
-        "--repeats",
-        metavar="K",
-        type=positive_int,
-        default=20,
-        help="perturbed repeats of each grasp (default: %(default)s)",
-    )
-    for name, unit, default, what in (
-        ("translation", "mm", 5.0, "of the grasp along each axis"),
-        ("rotation", "deg", 5.0, "of the grasp about each axis"),
-        ("mass", "percent", 10.0, "of the object's mass"),
-        ("friction", "percent", 20.0, "of the object's friction coefficient"),
-    ):
-        noise.add_argument(
-            f"--{name}-{unit}",
-            metavar=unit.upper(),
-            type=not_negative,
-            default=default,
-            help=f"{what} (default: %(default)g)",
-        )
+    add_options(noise, RobustnessSettings, "repeats")
+    add_options(noise, Noise)
     noise.add_argument("--seed", metavar="N", type=seed, help="(default: the run's)")
     parser.add_argument(
         "-o",
@@ -100,7 +89,6 @@ def add_to(verbs: Any) -> None:
     )
     add_retry_failed(parser, "tests")
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_robustness(arguments: argparse.Namespace) -> int:
@@ -149,21 +137,19 @@ def _settings(arguments: argparse.Namespace, seed: int) -> RobustnessSettings:
     from burg_drake.evaluation.robustness import RobustnessSettings
     from burg_drake.simulation.robustness import Noise
 
-    return RobustnessSettings(
+    return settings_from(
+        arguments,
+        RobustnessSettings,
         tests=arguments.tests,
-        noise=Noise(
-            translation=arguments.translation_mm * 1e-3,
-            rotation=math.radians(arguments.rotation_deg),
-            mass=arguments.mass_percent / 100.0,
-            friction=arguments.friction_percent / 100.0,
-        ),
-        repeats=arguments.repeats,
+        noise=settings_from(arguments, Noise),
         seed=seed if arguments.seed is None else arguments.seed,
     )
 
 
 def _tests(text: str) -> tuple[str, ...]:
     """Names of tests, each once, in the usual order."""
+    from burg_drake.evaluation.robustness import TESTS
+
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in TESTS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options import DEFAULT_APPROACH_ANGLE, grasps_per_object
+from burg_drake.apps.options import grasps_per_object, settings_from
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
@@ -19,16 +19,12 @@ def asked_settings(
     """The settings that options ask for, on a station that has this mode and motion."""
     from burg_drake.evaluation.run import EvaluationSettings
 
-    return EvaluationSettings(
+    return settings_from(
+        arguments,
+        EvaluationSettings,
         grasps_per_object=grasps_per_object(arguments),
-        approach_angle_deg=arguments.approach_angle or DEFAULT_APPROACH_ANGLE,
-        blind=arguments.blind,
         only=arguments.only,
         mode=mode,
-        engine=arguments.engine,
         motion=motion,
-        seed=arguments.seed,
-        shard=arguments.shard,
-        table=arguments.table,
         scene_reports=arguments.scene_reports,
     )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
-    ENGINE_NAMES,
+    Parser,
     add_group,
     add_quiet,
     add_scene,
@@ -25,11 +25,6 @@ from burg_drake.core.terminal import TextTable, format_number
 if TYPE_CHECKING:
     from burg_drake.simulation.rest import Displacement
     from burg_drake.simulation.settling import SettledScene
-
-DEFAULT_TIME_LIMIT = 10.0
-"""In step with simulation.settle_scene, which imports too much for a help text."""
-SETTLING_ENGINE = "screening"
-"""Likewise."""
 
 
 def add_to(verbs: Any) -> None:
@@ -64,7 +59,7 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_settle(group: Any) -> None:
-    settle = add_verb(
+    add_verb(
         group,
         "settle",
         run_settle,
@@ -74,7 +69,14 @@ def _add_settle(group: Any) -> None:
         "",
         "Exit code 1, and no file without --keep, if something still moves, fell off the table, or",
         "came to rest where `scene validate` refuses it.",
+        options=_add_settle_options,
     )
+
+
+def _add_settle_options(settle: Parser) -> None:
+    from burg_drake.simulation.settling import SETTLING_ENGINE, SETTLING_TIME
+    from burg_drake.station.document import ENGINES
+
     add_scene(settle)
     add_station(settle)
     settle.add_argument(
@@ -84,7 +86,7 @@ def _add_settle(group: Any) -> None:
         "--time-limit",
         metavar="S",
         type=positive,
-        default=DEFAULT_TIME_LIMIT,
+        default=SETTLING_TIME,
         help="simulated time allowed (default: %(default)g)",
     )
     settle.add_argument(
@@ -94,7 +96,7 @@ def _add_settle(group: Any) -> None:
     )
     settle.add_argument(
         "--engine",
-        choices=ENGINE_NAMES,
+        choices=tuple(ENGINES),
         default=SETTLING_ENGINE,
         help="how time is stepped while objects fall (default: %(default)s)",
     )

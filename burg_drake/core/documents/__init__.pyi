@@ -12,13 +12,13 @@ from .ranges import require_ranges as require_ranges
 from .reader import Reader as Reader
 from .schema import (
     Pose as Pose,
-    Vector3 as Vector3,
     dump_document as dump_document,
     load_document as load_document,
     parse_document as parse_document,
     plain_data as plain_data,
     save_document as save_document,
 )
+from .vectors import Vector3 as Vector3
 from .yaml_events import (
     TAGS as TAGS,
     checked_events as checked_events,

@@ -21,6 +21,7 @@ import yaml
 from numpy.typing import ArrayLike
 
 from burg_drake.core.documents.reader import Reader
+from burg_drake.core.documents.vectors import Quaternion, Vector3
 from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write, read_text
@@ -35,8 +36,6 @@ from burg_drake.core.frames import (
 )
 
 T = TypeVar("T")
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import MILLIMETRES, InvalidInputError, setting
 
 if TYPE_CHECKING:
     from burg_drake.core import Array
@@ -41,16 +41,26 @@ class SamplingSettings:
         diverse: of this many times n grasps the most diverse n are kept.
     """
 
-    friction: float | None = None
-    approaches: int = 1
+    friction: float | None = setting(
+        None, "coefficient (default: the object's)", metavar="MU", above=0
+    )
+    approaches: int = setting(1, "approach angles for each pair of contacts", metavar="K", low=1)
     approach_angle_deg: float | None = None
-    from_arm_side: bool = False
+    from_arm_side: bool = setting(
+        False, "in a scene, only approaches that do not point back to the arm"
+    )
     standoffs: tuple[float, ...] = (0.0,)
     weights: Mapping[str, Array] = field(default_factory=dict)
     blind: bool = False
-    margin: float = 0.0
-    conservative: bool = False
-    diverse: int = 1
+    margin: float = setting(
+        0.0, "only grasps with this clearance of the open hand", unit=MILLIMETRES, low=0
+    )
+    conservative: bool = setting(
+        False, "test clearance faster, which leaves out a tenth of the clear grasps, too"
+    )
+    diverse: int = setting(
+        1, "sample K times as many and keep those that are farthest apart", metavar="K", low=1
+    )
 
     def __post_init__(self) -> None:
         angle = self.approach_angle_deg

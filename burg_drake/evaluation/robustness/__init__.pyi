@@ -3,7 +3,11 @@ from .assessment import (
     assess_robustness as assess_robustness,
 )
 from .probe_answer import ProbeAnswer as ProbeAnswer
-from .probes import RobustnessSettings as RobustnessSettings
+from .settings import (
+    DEFAULT_BEST as DEFAULT_BEST,
+    TESTS as TESTS,
+    RobustnessSettings as RobustnessSettings,
+)
 from .shares import (
     TABLE_FILES as TABLE_FILES,
     lifted_shares as lifted_shares,

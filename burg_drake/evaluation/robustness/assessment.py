@@ -29,17 +29,15 @@ from burg_drake.evaluation.records import (
 from burg_drake.evaluation.robustness.probe_judge import ProbeJudgeFactory
 from burg_drake.evaluation.robustness.probes import (
     Probe,
-    RobustnessSettings,
     known_answers,
     make_probes,
 )
+from burg_drake.evaluation.robustness.settings import DEFAULT_BEST, RobustnessSettings
 from burg_drake.evaluation.robustness.table import GraspRobustness, gathered, robustness_columns
 from burg_drake.evaluation.store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.workers import judge_all
 
 TABLE_FILE = "robustness.csv"
-DEFAULT_BEST = 3
-"""So many of the best grasps of each object are asked about if none are named."""
 COST = {"tug": 40.0, "shake": 50.0, "friction": 30.0, "noise": 2.0}
 """CPU time of tests in units of the grasp's own trial, measured on the built-in scene."""
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from burg_drake.core.grasps import Stage
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
-from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.robustness.settings import (
+    RobustnessSettings,
+)
 from burg_drake.evaluation.stages import Decide, Decision, Screen, trial_decision
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.robustness import friction_limit, shake, take_grip, tug

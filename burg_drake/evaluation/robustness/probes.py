@@ -8,62 +8,25 @@ needs, or what becomes of one perturbed repeat of its trial. What an answer is, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import count, takewhile
 from typing import TYPE_CHECKING
 
-from burg_drake.core import InvalidInputError, UnknownNameError, content_hash, nearest
+from burg_drake.core import content_hash
 from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
+from burg_drake.evaluation.robustness.settings import TESTS, RobustnessSettings
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.robustness import (
-    FrictionSettings,
-    LoadSettings,
-    Noise,
     perturb,
 )
 
 if TYPE_CHECKING:
     pass
 
-TESTS = ("tug", "shake", "friction", "noise")
 HASH_DIGITS = 8
 """Digits of the hash in the id of a probe: answers found with other settings do not count."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobustnessSettings:
-    """What is asked about each grasp.
-
-    Attributes:
-        tests: some of `TESTS`.
-        loads: of tug and shake.
-        friction: coefficients that are tried.
-        noise: standard deviations of the perturbed repeats.
-        repeats: number of perturbed repeats.
-        seed: of the perturbations.
-    """
-
-    tests: tuple[str, ...] = TESTS
-    loads: LoadSettings = field(default_factory=LoadSettings)
-    friction: FrictionSettings = field(default_factory=FrictionSettings)
-    noise: Noise = field(default_factory=Noise)
-    repeats: int = 20
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for test in self.tests:
-            if test not in TESTS:
-                raise UnknownNameError(f"test {test!r} does not exist; {nearest(test, TESTS)}")
-        if not self.tests or self.repeats < 1:
-            raise InvalidInputError("give at least one test, and repeats from 1")
-
-    def content(self, test: str) -> list[object]:
-        """What decides about the answers of a test."""
-        if test == "friction":
-            return [vars(self.friction)]
-        return [vars(self.noise), self.seed] if test == "noise" else [vars(self.loads)]
 
 
 @dataclass(frozen=True, eq=False)

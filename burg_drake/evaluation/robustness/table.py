@@ -33,7 +33,9 @@ from burg_drake.core.grasps import Outcome, Stage
 from burg_drake.core.terminal import TextTable, format_number
 from burg_drake.evaluation.records import Columns, engine_label, pairs_text
 from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
-from burg_drake.evaluation.robustness.probes import RobustnessSettings
+from burg_drake.evaluation.robustness.settings import (
+    RobustnessSettings,
+)
 from burg_drake.simulation.robustness import AXES, DIRECTIONS, HoldForces, SuccessRate
 from burg_drake.station.document import Engine
 

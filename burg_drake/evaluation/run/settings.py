@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import InvalidInputError, setting
+from burg_drake.core.grasps import MODES
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
@@ -45,16 +47,51 @@ class EvaluationSettings:
         InvalidInputError: no grasps are asked for.
     """
 
-    grasps_per_object: int = 100
-    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG
-    blind: bool = False
+    grasps_per_object: int = setting(
+        100,
+        "number of grasps to sample on each object; only those at which the open hand collides"
+        " with nothing, and its pads meet the object within the friction cones",
+        flags=("-n",),
+        low=1,
+    )
+    approach_angle_deg: float = setting(
+        DEFAULT_APPROACH_ANGLE_DEG,
+        "in a scene, sample grasps within this angle of straight down"
+        f" (default: {DEFAULT_APPROACH_ANGLE_DEG:g}; 180: any)",
+        name="approach_angle",
+        metavar="DEG",
+        above=0,
+        high=180,
+        noun="an angle in degrees",
+    )
+    blind: bool = setting(
+        False,
+        "sample without regard to the hand, by points of contact alone, as in the literature",
+    )
     only: Iterable[str] | None = None
-    mode: Mode | None = None
-    engine: Engine | str = "standard"
+    mode: Mode | None = setting(
+        None,
+        "hand: the hand alone executes grasps in simulation; reach: those that the arm can execute;"
+        " arm: those, by the whole arm from the pregrasp on (default: reach, or hand if there is no"
+        " arm)",
+        choices=MODES,
+    )
+    engine: Engine | str = setting(
+        DEFAULT_ENGINE,
+        "how time is stepped: for truth, for results, for a first look",
+        choices=tuple(ENGINES),
+    )
     motion: GraspMotion | None = None
-    seed: int = 0
-    shard: Shard | str | None = None
-    table: TableFormat = "csv"
+    seed: int = setting(0, "of the sampling")
+    shard: Shard | str | None = setting(
+        None,
+        "judge a share of the work, such as 2/8, on one of several machines: every N-th scene, or"
+        " of fewer than N scenes every N-th grasp; burg-drake merge unites them",
+        metavar="K/N",
+    )
+    table: TableFormat = setting(
+        "csv", "format of the table of results", choices=("csv", "parquet")
+    )
     scene_reports: bool | None = None
 
     def __post_init__(self) -> None:

@@ -12,6 +12,7 @@ from .rejudged_trials import (
     runs_for as runs_for,
 )
 from .rejudging import rejudge as rejudge
+from .settings import GapSettings as GapSettings
 from .step_agreement import (
     agreement_by_step as agreement_by_step,
     tried_grasps as tried_grasps,

@@ -54,6 +54,7 @@ from burg_drake.evaluation.workers import Executor, LocalExecutor
 from burg_drake.experiment.gap.displacement import commanded_candidates
 from burg_drake.experiment.gap.placement_noise import NoisyScene, PlacementNoise, noisy_scene
 from burg_drake.experiment.gap.reach_step import reach_verdicts
+from burg_drake.experiment.gap.settings import GapSettings
 from burg_drake.experiment.gap.steps import GapDocument, GapStep, GapSteps
 from burg_drake.scene.document import Scene, SceneLike, as_scene, load_scene, save_scene
 from burg_drake.station.document import Station, StationLike, as_station
@@ -61,8 +62,6 @@ from burg_drake.station.document import Station, StationLike, as_station
 DOCUMENT_FILE = "gap.yaml"
 LOCK_FILE = ".gap.lock"
 HEADER = "Where grasps are lost, step by step; written by burg-drake gap."
-DEFAULT_SAMPLES = 5
-USUAL_NOISE = PlacementNoise()
 
 
 def measure_gap(
@@ -70,14 +69,12 @@ def measure_gap(
     out: str | Path,
     *,
     station: StationLike = "panda_tabletop",
-    last: Mode | None = None,
-    noise: PlacementNoise = USUAL_NOISE,
-    samples: int = DEFAULT_SAMPLES,
+    grasps: Given | None = None,
+    evaluation: EvaluationSettings | None = None,
+    settings: GapSettings | None = None,
     tried: Sequence[str] = (),
     executor: Executor | None = None,
     progress: bool | Listener = True,
-    grasps: Given | None = None,
-    evaluation: EvaluationSettings | None = None,
 ) -> GapSteps:
     """Judges the same grasps step by step; the same call goes on where an earlier one stopped.
 
@@ -86,15 +83,13 @@ def measure_gap(
             step of its mode itself. Or a scene.
         out: folder; made if need be.
         station: of a scene.
-        last: the last mode; `arm` where there is an arm, else `hand`, if None.
-        noise: of the objects' places. The hand goes where it was planned to go.
-        samples: number of displaced scenes; 0 leaves the step out.
+        grasps: for `evaluate`, with a scene; sampled if None.
+        evaluation: likewise: engine, motion, and how to sample grasps. The mode is that of a step.
+        settings: which steps; all that the station can have, and five displaced scenes, if None.
         tried: ids of grasps of real trials, which are judged in displaced scenes even if they fail
             in the last mode.
         executor: who judges; as many processes as there are processors if None.
         progress: as for `evaluate`.
-        grasps: for `evaluate`, with a scene; sampled if None.
-        evaluation: likewise: engine, motion, and how to sample grasps. The mode is that of a step.
 
     Raises:
         InvalidInputError: as `evaluate`; or the folder has other steps, or the run is incomplete.
@@ -110,11 +105,11 @@ def measure_gap(
         assert not isinstance(source, Run)
         scene = as_scene(source)
         station = as_station(station)
+    settings = settings or GapSettings()
+    noise, samples, last = settings.noise, settings.samples, settings.last
     if last is None:
         last = "hand" if station.document.arm is None else "arm"
     mode_for(station, last)
-    if samples < 0:
-        raise InvalidInputError(f"samples is {samples}; give 0 or more")
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     path = Path(out)
     document = GapDocument(

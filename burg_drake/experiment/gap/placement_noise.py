@@ -9,15 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, rng_from, rot_z
+from burg_drake.core import DEGREES, THOUSANDTHS, Array, InvalidInputError, rng_from, rot_z, setting
 from burg_drake.experiment.gap.displacement import displaced_scene
 from burg_drake.scene.document import Scene, SceneIssue
 
 MOST_DRAWS = 200
 """Draws of one object; then it stays where it was planned."""
+
+
+def _deviation(default: float, help: str, **more: Any) -> Any:
+    """The declaration of a standard deviation."""
+    return setting(default, help, low=0, **more)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +36,18 @@ class PlacementNoise:
         seed: of the errors.
     """
 
-    place: float = 0.002
-    turn: float = math.radians(2.0)
+    place: float = _deviation(
+        0.002,
+        "standard deviation of each object along x and along y",
+        unit=THOUSANDTHS,
+        name="placement_sd_mm",
+    )
+    turn: float = _deviation(
+        math.radians(2.0),
+        "standard deviation of its turn about the vertical",
+        unit=DEGREES,
+        name="placement_sd_deg",
+    )
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import DEGREES, MILLIMETRES, Array, InvalidInputError, ShownUnit, setting
 from burg_drake.grasping.similarity.pose_distance import (
     LEVER,
     P,
@@ -49,6 +49,11 @@ ROUNDING = 1e-12
 """Relative error of a distance between points, and metres that a point may be off."""
 
 
+MILLIMETRES_A_DEGREE = ShownUnit(
+    "mm", lambda x: 1e-3 * x / math.radians(1.0), lambda x: 1e3 * x * math.radians(1.0)
+)
+
+
 @dataclass(frozen=True)
 class Tolerance:
     """When two grasps count as the same: all three bounds hold.
@@ -61,10 +66,23 @@ class Tolerance:
         lever: weight of the angle in that distance [m/rad].
     """
 
-    translation: float = 0.015
-    angle: float = math.radians(15.0)
-    distance: float = math.inf
-    lever: float = LEVER
+    translation: float = setting(
+        0.015, "largest distance of the grasp frames", unit=MILLIMETRES, low=0
+    )
+    angle: float = setting(math.radians(15.0), "largest angle between them", unit=DEGREES, low=0)
+    distance: float = setting(
+        math.inf,
+        "largest sum of the two, with --mm-per-deg for each degree (default: not bounded)",
+        unit=MILLIMETRES,
+        low=0,
+    )
+    lever: float = setting(
+        LEVER,
+        "what one degree counts in combined distances",
+        unit=MILLIMETRES_A_DEGREE,
+        name="mm_per_deg",
+        low=0,
+    )
 
     def __post_init__(self) -> None:
         check_lever(self.lever)

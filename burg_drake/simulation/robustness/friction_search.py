@@ -2,39 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import Array
 from burg_drake.core.grasps import Outcome
 from burg_drake.simulation.robustness.bisection import largest_passing
+from burg_drake.simulation.robustness.settings import FrictionSettings
 from burg_drake.simulation.trials import HandTrial
 
 LEVERAGE = 1.25
 """The search starts at this many times what carries the weight: few grasps are at the centre."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrictionSettings:
-    """Which coefficients are tried.
-
-    Attributes:
-        smallest, largest: coefficients.
-        tolerance: relative distance between the smallest that lifts and the next that does not.
-    """
-
-    smallest: float = 0.02
-    largest: float = 2.0
-    tolerance: float = 0.02
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.smallest < self.largest:
-            raise InvalidInputError(
-                f"friction from {self.smallest:g} to {self.largest:g}: must rise from above 0"
-            )
-        if not self.tolerance > 0.0:
-            raise InvalidInputError(f"tolerance is {self.tolerance:g}; give more than 0")
 
 
 def friction_limit(

@@ -13,9 +13,10 @@ from functools import partial
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core import Array, UnknownNameError, nearest
 from burg_drake.simulation.robustness.bisection import largest_passing
 from burg_drake.simulation.robustness.grip import Grip
+from burg_drake.simulation.robustness.settings import LoadSettings
 
 DIRECTIONS: dict[str, Array] = {
     f"{sign}{axis}": factor * np.eye(3)[k]
@@ -24,40 +25,6 @@ DIRECTIONS: dict[str, Array] = {
 }
 """Directions (3,) in G: x closes the fingers, z approaches."""
 AXES: dict[str, Array] = {axis: np.eye(3)[k] for k, axis in enumerate("xyz")}
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoadSettings:
-    """How a grip is loaded.
-
-    Attributes:
-        smallest, largest: accelerations that are tried [g].
-        tolerance: relative distance between the largest that is borne and the next that is not.
-        slide: the target has left its place when its point at the grasp has moved in the hand by
-            more than this [m]; it has left, too, when a finger does not touch it.
-        tug_rise: a tug grows to its full force in this time [s], which it then keeps ...
-        tug_time: ... for this long [s]; less if the target is at rest under it.
-        frequency: of shaking [Hz].
-        periods: of shaking; the amplitude grows during the first one.
-    """
-
-    smallest: float = 0.05
-    largest: float = 50.0
-    tolerance: float = 0.03
-    slide: float = 0.005
-    tug_rise: float = 0.05
-    tug_time: float = 0.2
-    frequency: float = 5.0
-    periods: int = 3
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.smallest < self.largest:
-            raise InvalidInputError(
-                f"loads from {self.smallest:g} to {self.largest:g} g: must rise from above 0"
-            )
-        for name in ("tolerance", "slide", "tug_rise", "tug_time", "frequency", "periods"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} is {getattr(self, name):g}; give more than 0")
 
 
 @dataclass(frozen=True)

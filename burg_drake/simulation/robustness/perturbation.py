@@ -11,29 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import Array, InvalidInputError, make_pose, rng_from, wilson_interval
 from burg_drake.core.grasps import Outcome
+from burg_drake.simulation.robustness.settings import Noise
 from burg_drake.simulation.trials import HandTrial
-
-
-@dataclass(frozen=True, kw_only=True)
-class Noise:
-    """Standard deviations.
-
-    Attributes:
-        translation: of the grasp in the target, along each axis [m].
-        rotation: of the grasp in the target, about each axis [rad].
-        mass: of the target, relative.
-        friction: of the target's coefficient, relative.
-    """
-
-    translation: float = 0.005
-    rotation: float = math.radians(5.0)
-    mass: float = 0.1
-    friction: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0.0 <= value < math.inf:
-                raise InvalidInputError(f"noise of the {name} is {value:g}; give 0 or more")
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from burg_drake.simulation.rest import (
 )
 from burg_drake.simulation.settling.reduced_friction import reduce_friction
 from burg_drake.simulation.settling.scene_state import placed_scene
+from burg_drake.simulation.settling.usual import SETTLING_ENGINE, SETTLING_TIME
 from burg_drake.station.checks import DEEPEST, overlaps
 from burg_drake.station.diagram import (
     StationDiagram,
@@ -30,10 +31,6 @@ from burg_drake.station.diagram import (
 )
 from burg_drake.station.document import ENGINES, Engine, Station, StationLike, as_station
 
-DEFAULT_TIME_LIMIT = 10.0
-"""Simulated time allowed [s]."""
-DEFAULT_ENGINE = "screening"
-"""How time is stepped while objects fall; they come to rest in steps of their own."""
 RELAXING_TIME = 1.0
 """Time that may be stepped in each round of relaxing [s]."""
 ROUNDS = 4
@@ -72,8 +69,8 @@ def settle_scene(
     scene: SceneLike,
     station: StationLike,
     *,
-    engine: Engine = ENGINES[DEFAULT_ENGINE],
-    time_limit: float = DEFAULT_TIME_LIMIT,
+    engine: Engine = ENGINES[SETTLING_ENGINE],
+    time_limit: float = SETTLING_TIME,
     progress: Callable[[float, int], None] | None = None,
 ) -> SettledScene:
     """Simulates the objects of a scene until they are at rest.

@@ -6,6 +6,7 @@ from .board_visibility import (
 from .boxes import boxes_in_scene as boxes_in_scene
 from .content import world_content as world_content
 from .engine import (
+    DEFAULT_ENGINE as DEFAULT_ENGINE,
     ENGINES as ENGINES,
     Engine as Engine,
     engine_preset as engine_preset,

@@ -58,6 +58,9 @@ ENGINES = {
 """Presets by name: `reference` for truth, `standard` for results, `screening` for a first look."""
 
 
+DEFAULT_ENGINE = "standard"
+
+
 def engine_preset(name: str) -> Engine:
     """A preset by name.
 

@@ -3,12 +3,15 @@ segments."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from burg_drake.core import Array, FieldError
+from burg_drake.core import THOUSANDTHS, FieldError, setting
 from burg_drake.core.documents import Vector3, require_ranges
+
+if TYPE_CHECKING:
+    from burg_drake.core import Array
 
 RANGES = {
     "standoff": (0.0, 1.0),
@@ -20,6 +23,12 @@ RANGES = {
 SHORTEST = 1e-3
 """Least way of the hand with the object, retreat and lift together [m]: with less, nothing would
 tell a grasp that holds from one that does not."""
+
+
+def _length(default: float | None, field: str, help: str, name: str = "") -> Any:
+    """The declaration of a length in its range."""
+    low, high = (1000.0 * bound for bound in RANGES[field])
+    return setting(default, help, name=name, unit=THOUSANDTHS, low=low, high=high, noun="a length")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +48,26 @@ class GraspMotion:
         lift_direction: of the lift in the world; of any length above 0.
     """
 
-    standoff: float = 0.10
-    retreat: float = 0.0
-    lift_height: float = 0.30
-    least_lift: float | None = None
-    lift_direction: Vector3 = (0.0, 0.0, 1.0)
+    standoff: float = _length(
+        0.10,
+        "standoff",
+        "straight way in along the approach, from the pregrasp to the grasp",
+    )
+    retreat: float = _length(
+        0.0, "retreat", "way back along the approach with the object, before the lift"
+    )
+    lift_height: float = _length(0.30, "lift_height", "length of the lift", "lift_mm")
+    least_lift: float | None = _length(
+        None,
+        "least_lift",
+        "lift as far as there is room, at most by --lift-mm and at least by this; the column"
+        " lift_height tells how far",
+    )
+    lift_direction: Vector3 = setting(
+        (0.0, 0.0, 1.0),
+        "of the lift in the world, of any length; 0 0 1 is up",
+        metavar=("X", "Y", "Z"),
+    )
 
     def __post_init__(self) -> None:
         x, y, z = (float(part) for part in self.lift_direction)  # arrays are no part of documents
@@ -56,7 +80,7 @@ class GraspMotion:
                 " m; the hand rises by no more than lift_height",
                 "least_lift",
             )
-        if not np.linalg.norm(self.lift_direction) > 1e-9:
+        if not math.hypot(*self.lift_direction) > 1e-9:
             raise FieldError(
                 f"lift_direction {list(self.lift_direction)} has no length; give a direction in the"
                 " world, such as [0, 0, 1] for up",
@@ -78,5 +102,7 @@ class GraspMotion:
     @property
     def direction_W(self) -> Array:
         """(3,) unit vector of the lift in the world."""
+        import numpy as np
+
         u = np.array(self.lift_direction, dtype=float)
         return np.asarray(u / np.linalg.norm(u))

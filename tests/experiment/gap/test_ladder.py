@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -14,9 +13,8 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.comparison import gap as gap_verb
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import Verdict
+from burg_drake.core.grasps import Mode, Verdict
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
 from burg_drake.evaluation.records.run_document import run_hash
 from burg_drake.evaluation.replay import differences
@@ -25,11 +23,12 @@ from burg_drake.evaluation.stages.station_judge import build_judge
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.evaluation.workers.executor import Job
 from burg_drake.experiment.gap.changes import gap_changes
-from burg_drake.experiment.gap.measurement import DEFAULT_SAMPLES, USUAL_NOISE, measure_gap
+from burg_drake.experiment.gap.measurement import measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.experiment.gap.report.sections import change_section, push_section
 from burg_drake.experiment.gap.report.sentences import step_sentences
 from burg_drake.experiment.gap.report.tables import gap_json
+from burg_drake.experiment.gap.settings import GapSettings
 from burg_drake.experiment.gap.step_agreement import agreement_by_step, tried_grasps
 from burg_drake.experiment.gap.steps import GapStep, GapSteps
 from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, TrialSheet
@@ -39,20 +38,25 @@ from burg_drake.station.document.engine import ENGINES
 from tests.experiment.gap.conftest import Here
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
-ASKED: dict[str, Any] = {"noise": NONE, "executor": Here(), "progress": False}
+ASKED: dict[str, Any] = {"executor": Here(), "progress": False}
+
+
+def steps(last: Mode, samples: int) -> GapSettings:
+    """So many, with objects where they should be."""
+    return GapSettings(last=last, samples=samples, noise=NONE)
 
 
 @pytest.fixture(scope="module")
 def by_hand(run: Run, tmp_path_factory: pytest.TempPathFactory) -> GapSteps:
     """The grasps of a run by the hand alone, and in a scene that is displaced by nothing."""
     out = tmp_path_factory.mktemp("gap") / "steps"
-    return measure_gap(run, out, last="hand", samples=1, **ASKED)
+    return measure_gap(run, out, settings=steps("hand", 1), **ASKED)
 
 
 @pytest.fixture(scope="module")
 def ladder(run: Run, by_hand: GapSteps) -> GapSteps:
     """The same folder with one step more."""
-    found = measure_gap(run, by_hand.path, last="reach", samples=0, **ASKED)
+    found = measure_gap(run, by_hand.path, settings=steps("reach", 0), **ASKED)
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
@@ -99,9 +103,9 @@ def test_the_page_and_the_figures_tell_the_same(
 
 def test_other_steps_are_refused(run: Run, ladder: GapSteps) -> None:
     with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '.*' there"):
-        measure_gap("tabletop_six", ladder.path, last="reach", **ASKED)
+        measure_gap("tabletop_six", ladder.path, settings=steps("reach", 5), **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
-        measure_gap(run, ladder.path, last="reach", progress=False)
+        measure_gap(run, ladder.path, settings=GapSettings(last="reach"), progress=False)
 
 
 class Killed(Exception):
@@ -122,24 +126,39 @@ class Ending:
 def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) -> None:
     """Killed within the second step; then comes the same run by another engine."""
     with pytest.raises(Killed):
-        measure_gap(run, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+        measure_gap(
+            run,
+            tmp_path,
+            settings=steps("reach", 0),
+            **ASKED | {"executor": Ending()},
+        )
     journal = tmp_path / "reach" / "journal.jsonl"
     before = journal.read_bytes()
     assert before.count(b"\n") == 1
     document = replace(run.document, engine=ENGINES["standard"], hash="")
     other = Run(run.path, replace(document, hash=run_hash(document)))
     with pytest.raises(InvalidInputError, match="steps of something else"):
-        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+        measure_gap(
+            other,
+            tmp_path,
+            settings=steps("reach", 0),
+            **ASKED | {"executor": Ending()},
+        )
     (tmp_path / "gap.yaml").unlink()  # which older versions wrote at the end
     with pytest.raises(InvalidInputError, match=r"holds another run \(engine is"):
-        measure_gap(other, tmp_path, last="reach", samples=0, **ASKED | {"executor": Ending()})
+        measure_gap(
+            other,
+            tmp_path,
+            settings=steps("reach", 0),
+            **ASKED | {"executor": Ending()},
+        )
     assert journal.read_bytes() == before
 
 
 def test_a_gap_that_came_to_nothing_does_not_take_the_folder(run: Run, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="overlap"):
-        measure_gap(overlapping(run.scene()), tmp_path, last="hand", samples=0, **ASKED)
-    again = measure_gap(run, tmp_path, last="hand", samples=0, **ASKED)
+        measure_gap(overlapping(run.scene()), tmp_path, settings=steps("hand", 0), **ASKED)
+    again = measure_gap(run, tmp_path, settings=steps("hand", 0), **ASKED)
     assert again.document.source == run.document.hash
 
 
@@ -161,12 +180,6 @@ def test_options_of_a_scene_are_refused_with_a_run(
     assert main([*words, "--lift-mm", "100"]) == 2
     assert "--lift-mm is about a scene;" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_defaults_of_the_verb_are_those_of_the_library() -> None:
-    assert gap_verb.DEFAULT_SAMPLES == DEFAULT_SAMPLES
-    assert pytest.approx(USUAL_NOISE.place) == gap_verb.DEFAULT_MM / 1e3
-    assert pytest.approx(USUAL_NOISE.turn) == math.radians(gap_verb.DEFAULT_DEG)
 
 
 def stated(run: Run, outcomes: dict[str, Outcome]) -> Run:

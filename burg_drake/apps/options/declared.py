@@ -1,0 +1,141 @@
+"""Options made of settings dataclasses, and settings made of options.
+
+A field that is declared by `core.settings.setting` becomes an option of its name, unit, range,
+default and help; `settings_from` brings what was given back into the dataclass, in SI.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import MISSING, Field
+from typing import Any, TypeVar
+
+from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, whole
+from burg_drake.core import Setting, declared, shown
+
+Settings = TypeVar("Settings")
+
+
+def option_name(name: str, declaration: Setting) -> str:
+    """The long option of a field, such as `--lift-mm`."""
+    unit = "" if declaration.unit is None else f"_{declaration.unit.name}"
+    return f"--{(declaration.name or name + unit).replace('_', '-')}"
+
+
+def destination(settings: type, name: str) -> str:
+    """What the parsed arguments call a field."""
+    return option_name(name, declared(settings)[name][1])[2:].replace("-", "_")
+
+
+def add_options(
+    parser: Any, settings: type, *names: str, unset: bool = False, told: Any = None
+) -> None:
+    """Adds an option for each of some fields.
+
+    Args:
+        parser: gets them; a parser or a group of one.
+        settings: the dataclass.
+        names: of the fields; all that are declared if there are none.
+        unset: leave the value None unless one is given, as where it then comes from elsewhere; the
+            help does not tell a default.
+        told: the default that the help tells all the same.
+    """
+    known = declared(settings)
+    for name in names or tuple(known):
+        field, declaration = known[name]
+        options: dict[str, Any] = {"help": declaration.help}
+        default = told if unset else shown_value(field, declaration)
+        if field.type == "bool":
+            options["action"] = "store_true"
+        else:
+            options |= {"default": None if unset else default, **_value_options(field, declaration)}
+            if default is not None and "(default" not in declaration.help:
+                text = f"{default:g}" if isinstance(default, float) else default
+                options["help"] = f"{declaration.help} (default: {text})"
+        option = option_name(name, declaration)
+        parser.add_argument(*declaration.flags, option, **options)
+
+
+def _value_options(field: Field[Any], declaration: Setting) -> dict[str, Any]:
+    """What `add_argument` has to know of an option that takes a value."""
+    if declaration.choices:
+        return {"choices": declaration.choices}
+    found: dict[str, Any] = {"type": _parser_of(field, declaration)}
+    unit = "" if declaration.unit is None else declaration.unit.name.upper()
+    found["metavar"] = declaration.metavar or unit or "N"
+    if isinstance(declaration.metavar, tuple):
+        found["nargs"] = len(declaration.metavar)
+    return found
+
+
+def shown_value(field: Field[Any], declaration: Setting) -> Any:
+    """The default of a field as people would give it; None if it has none."""
+    value = None if field.default is MISSING else field.default
+    if declaration.unit is None or value is None:
+        return value
+    return float(f"{declaration.unit.from_si(value):.12g}")
+
+
+def settings_from(
+    arguments: argparse.Namespace, settings: type[Settings], **others: Any
+) -> Settings:
+    """The settings that options ask for; a field without an option keeps its default.
+
+    Args:
+        arguments: as parsed.
+        settings: the dataclass.
+        others: values of fields that options do not tell, or not alone.
+    """
+    return settings(**(given_fields(arguments, settings) | others))
+
+
+def given_fields(arguments: argparse.Namespace, settings: type) -> dict[str, Any]:
+    """The values of fields, in SI, that options give."""
+    given: dict[str, Any] = {}
+    for name, (_, declaration) in declared(settings).items():
+        value = getattr(arguments, destination(settings, name), None)
+        if value is None:
+            continue
+        unit = declaration.unit
+        given[name] = value if unit is None else unit.to_si(value)
+        if isinstance(value, list):
+            given[name] = tuple(value)
+    return given
+
+
+def _parser_of(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
+    """What reads the value of an option."""
+    kind = str(field.type).partition(" ")[0]
+    if kind == "int":
+        low, high = int(declaration.low or 0), declaration.high or MOST
+        most = LARGEST_SEED if field.name == "seed" else int(high)
+        return lambda text: whole(text, low, most)
+    if kind in ("float", "Vector3"):
+        return lambda text: in_range(text, declaration)
+    return str
+
+
+def in_range(text: str, declaration: Setting) -> float:
+    """A finite number within the bounds of a setting.
+
+    Raises:
+        argparse.ArgumentTypeError: it is something else.
+    """
+    value = number(text)
+    low, above, high = declaration.low, declaration.above, declaration.high
+    above_low = (above is None or value > above) and (low is None or value >= low)
+    if above_low and (high is None or value <= high):
+        return value
+    if high is None:
+        what = f"above {above:g}" if above is not None else f"below {low:g}"
+        raise argparse.ArgumentTypeError(
+            f"{shown(text)} is {'not ' if above is not None else ''}{what}"
+        )
+    unit = "" if declaration.unit is None else f" {declaration.unit.name}"
+    lowest = -math.inf if low is None else low
+    bounds = f"above {above:g}, at most" if above is not None else f"from {lowest:g} to"
+    raise argparse.ArgumentTypeError(
+        f"{shown(text)} is not {declaration.noun} {bounds} {high:g}{unit}"
+    )

@@ -1,0 +1,98 @@
+"""Options are made of settings dataclasses, and settings of options."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import pytest
+
+from burg_drake.apps.options.arguments import Parser
+from burg_drake.apps.options.declared import add_options, settings_from
+from burg_drake.core.settings import DEGREES, KEY, MILLIMETRES, PERCENT, THOUSANDTHS, setting
+from burg_drake.evaluation.robustness.settings import RobustnessSettings
+from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.experiment.gap.placement_noise import PlacementNoise
+from burg_drake.grasping.similarity.neighbour_search import Tolerance
+from burg_drake.simulation.robustness.settings import Noise
+from burg_drake.station.document.grasp_motion import GraspMotion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """One field of each kind."""
+
+    count: int = setting(3, "how many", flags=("-c",), low=1)
+    depth: float = setting(0.005, "how deep", unit=MILLIMETRES, low=0, high=50, noun="a length")
+    turn: float = setting(math.radians(2.0), "how far round", unit=DEGREES, low=0)
+    share: float = setting(0.1, "of all", unit=PERCENT, above=0)
+    fast: bool = setting(False, "hurry")
+    kind: str = setting("round", "which", choices=("round", "square"))
+    hidden: float = 1.0
+
+
+def parsed(*words: str, **others: object) -> Made:
+    parser = Parser()
+    add_options(parser, Made)
+    return settings_from(parser.parse_args(words), Made, **others)
+
+
+def test_without_options_all_is_as_the_dataclass_has_it() -> None:
+    assert parsed() == Made()
+    assert parsed(hidden=2.0) == Made(hidden=2.0)
+
+
+def test_values_come_back_in_si() -> None:
+    words = "-c 5 --depth-mm 9 --turn-deg 90 --share-percent 50 --fast --kind square"
+    assert parsed(*words.split()) == Made(
+        count=5, depth=1e-3 * 9, turn=math.radians(90), share=0.5, fast=True, kind="square"
+    )
+
+
+def test_the_help_has_units_and_defaults() -> None:
+    parser = Parser()
+    add_options(parser, Made)
+    text = " ".join(parser.format_help().split())
+    for part in (
+        "-c N, --count N how many (default: 3)",
+        "--depth-mm MM how deep (default: 5)",
+        "--turn-deg DEG how far round (default: 2)",
+        "--share-percent PERCENT of all (default: 10)",
+        "--fast hurry",
+        "--kind {round,square} which (default: round)",
+    ):
+        assert part in text
+    assert "hidden" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("-c 0", "'0' is not a whole number from 1 to 10000000"),
+        ("--depth-mm 51", "51 is not a length from 0 to 50 mm"),
+        ("--depth-mm deep", "'deep' is not a finite number"),
+        ("--turn-deg -1", "-1 is below 0"),
+        ("--share-percent 0", "0 is not above 0"),
+    ],
+)
+def test_what_is_out_of_range(words: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parsed(*words.split())
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [EvaluationSettings, GraspMotion, Noise, PlacementNoise, RobustnessSettings, Tolerance],
+)
+def test_defaults_survive_the_way_through_their_units(settings: type) -> None:
+    """To the bit: they are in hashes."""
+    parser = Parser()
+    names = [f.name for f in fields(settings) if KEY in f.metadata and f.name != "lift_direction"]
+    add_options(parser, settings, *names)
+    found, usual = settings_from(parser.parse_args([]), settings), settings()
+    assert [getattr(found, name) for name in names] == [getattr(usual, name) for name in names]
+
+
+def test_units_that_files_tell_apart() -> None:
+    assert MILLIMETRES.to_si(9.0) == 0.009000000000000001 and THOUSANDTHS.to_si(9.0) == 0.009
