@@ -59,8 +59,8 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
     [
         (["--grasps-per-object", "0"], "'0' is not a whole number from 1"),
         (["--grasps-per-object", "many"], "'many' is not a whole number from 1"),
-        (["--approach-angle", "0"], "0 is not an angle above 0, at most 180 degrees"),
-        (["--approach-angle", "200"], "200 is not an angle above 0, at most 180 degrees"),
+        (["--approach-angle", "0"], "0 is not an angle in degrees above 0, at most 180"),
+        (["--approach-angle", "200"], "200 is not an angle in degrees above 0, at most 180"),
         (["--approach-angle", "steep"], "'steep' is not a finite number"),
         (["--seed", "-1"], "'-1' is not a whole number from 0"),
         (["--workers", "0"], "'0' is not a whole number from 1"),
