@@ -55,6 +55,7 @@ GROUPS: dict[str, Modules] = {
         "evaluation/stages/screening": ("evaluation/test_judge", "evaluation/test_arm_mode"),
         "evaluation/records/rows": ("evaluation/test_rows",),
         "evaluation/records/journal": ("evaluation/test_journal",),
+        "evaluation/results/counts": ("evaluation/test_summary",),
         "evaluation/results/summary": ("evaluation/test_summary",),
         "simulation/trials/execution": ("simulation/test_hand_trial",),
         "simulation/trials/contacts": ("simulation/test_hand_trial",),

@@ -51,3 +51,8 @@ def test_every_public_name_exists_where_it_is_announced():
     assert set(burg_drake.__all__) <= set(dir(burg_drake))
     for name in burg_drake.__all__:
         assert getattr(burg_drake, name) is not None, name
+
+
+def test_faces_are_imported_on_first_use():
+    code = "import burg_drake as burg\nassert burg.errors.MeshError\n"
+    assert run(code + "assert not {'grasps', 'arm', 'objects'} & set(vars(burg))") == []

@@ -192,7 +192,7 @@ def test_a_large_run_of_one_scene(
     scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
 ) -> None:
     monkeypatch.setattr(part_writer, "PART_ROWS", 7)
-    monkeypatch.setattr(part_writer, "STRETCH", 2000)
+    monkeypatch.setattr(part_writer, "BATCH_BYTES", 2000)
     run = evaluate(scenes[1], station, tmp_path / "one", **asked(executor=Inline(), **OPTIONS))
     assert len(list((run.path / "parts").iterdir())) == 2
     assert same(run.results, read_results(run.path))

@@ -1,6 +1,7 @@
-"""Sets of grasps, what their columns mean, and what can become of a grasp.
+"""Sets of grasps, what can become of a grasp, and what columns mean.
 
-Read `grasp_set` and `outcome` first, then `columns`; `storage` has the files.
+Read `grasp_set`, `outcome` and `verdict` first, then `columns`; `verdict_field` says how verdicts
+are written, `storage` has the files.
 """
 
 import lazy_loader

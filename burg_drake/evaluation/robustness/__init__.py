@@ -1,6 +1,6 @@
 """How robust the grasps are that a run found to lift.
 
-Read `assessment` first, then `probes` and `table`.
+Read `probes` and `probe_answer` first, then `probe_judge`, `assessment` and `table`.
 """
 
 import lazy_loader

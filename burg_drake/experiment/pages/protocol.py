@@ -9,7 +9,6 @@ import base64
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from burg_drake.experiment.pages.tried_runs import TriedRuns, TriedScene, in_blo
 from burg_drake.experiment.pages.words import SHORT_LIST
 from burg_drake.experiment.trials import RealTrial
 from burg_drake.scene.document import Scene
-from burg_drake.visualization.style import Html, element, html_document, join
+from burg_drake.visualization.style import Html, element, html_document, join, page_style
 
 HOW = (
     "Carry out the trials in the order of their numbers. Each block has one scene: set it up on its"
@@ -60,7 +59,7 @@ def sheet_page(
     """
     options = options or SheetOptions()
     blocks = in_blocks(runs.sheet)
-    style = (files("burg_drake.experiment.pages") / "sheet_page.css").read_text(encoding="utf-8")
+    style = page_style("burg_drake.experiment.pages", "sheet_page.css")
     sections = [
         _block(runs, pictures, number, trials, options) for number, trials in blocks.items()
     ]

@@ -8,14 +8,13 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 import burg_drake
 from burg_drake.core.files import atomic_write
 from burg_drake.objects.library import ContactGeometry, ObjectEntry, ObjectLibrary, StablePose
 from burg_drake.visualization.pictures.thumbnails import ObjectRenderer, Thumbnail
-from burg_drake.visualization.style import Child, Html, element, html_document
+from burg_drake.visualization.style import Child, Html, element, html_document, page_style
 
 POSE_SIZE = (160, 120)
 """Pictures of stable poses [pixel]."""
@@ -196,9 +195,7 @@ def _figure(picture: Thumbnail, alt: str, *caption: Child) -> Html:
 
 
 def _page(library: ObjectLibrary, names: Sequence[str], cards: Sequence[Html]) -> str:
-    sheet = (files("burg_drake.visualization.pictures") / "contact_sheet.css").read_text(
-        encoding="utf-8"
-    )
+    sheet = page_style("burg_drake.visualization.pictures", "contact_sheet.css")
     poses = sum(len(library.entry(name).stable_poses) for name in names)
     about = f"{_count(len(names), 'object')}, {_count(poses, 'stable pose')}"
     if library.document.description:

@@ -10,7 +10,10 @@ from .color_scale import (
     ColorScale as ColorScale,
     scale_of as scale_of,
 )
-from .html_page import html_document as html_document
+from .html_page import (
+    html_document as html_document,
+    page_style as page_style,
+)
 from .legend import (
     SCRIPT as SCRIPT,
     STYLE as STYLE,

@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 from burg_drake.visualization.style.markup import Child, Html, element
+
+
+def page_style(package: str, name: str) -> str:
+    """A style sheet of a page, with the rules before it that all pages have.
+
+    Args:
+        package: that has the sheet.
+        name: of its file.
+    """
+    sheets = ("burg_drake.visualization.style", "page.css"), (package, name)
+    return "".join((files(where) / file).read_text(encoding="utf-8") for where, file in sheets)
 
 
 def html_document(title: str, style: str, *content: Child) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
-from burg_drake.visualization.style import GROUPS, contrast
+from burg_drake.visualization.style import GROUPS, contrast, page_style
 
 STYLES = {group.name: f"g{i}" for i, group in enumerate(GROUPS)}
 THEMED = {
@@ -21,7 +19,7 @@ TEXT = ("#101418", "#ffffff")
 
 def style_sheet() -> str:
     """All styles of the page."""
-    sheet = (files("burg_drake.evaluation.report") / "style.css").read_text(encoding="utf-8")
+    sheet = page_style("burg_drake.evaluation.report", "style.css")
     light = "".join(_rule(g.name, THEMED.get(g.name, (g.hex,))[0]) for g in GROUPS)
     dark = "".join(_rule(name, tones[1]) for name, tones in THEMED.items())
     return f"{sheet}{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n"
