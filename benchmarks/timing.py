@@ -88,7 +88,7 @@ def measure(planner: Planner, grasps: Grasps, title: str) -> None:
         loads = [torques(part, planner) for part in parts[:TORQUES]]
         line("  torque beside gravity, of the limit", [torque for torque, _ in loads], "")
         line("  change of torque", [rate for _, rate in loads], "Nm/s")
-        used = [limits.stretch(part.peaks()) for part in parts]
+        used = [limits.time_scale(part.peaks()) for part in parts]
         print(f"  largest use of a limit {max(used):.4f}")
         if name != "transfer":
             print(

@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     link = connect(version, names, with_camera_info=intrinsics is None)
     try:
-        link.say(f"{scene.name}: ROS {version}, images from {names.image}")
+        link.log(f"{scene.name}: ROS {version}, images from {names.image}")
         serve(link, node)
     except KeyboardInterrupt:
         pass

@@ -48,8 +48,8 @@ from .pose.estimator import (
 )
 from .projection.visibility import visible_from as visible_from
 from .rectification.stream import (
-    BoardLook as BoardLook,
-    board_looks as board_looks,
+    BoardObservation as BoardObservation,
+    board_observations as board_observations,
 )
 from .rectification.top_view import (
     BoardPicture as BoardPicture,

@@ -105,8 +105,8 @@ class ComposeSession(BackgroundEditor):
     def close(self) -> None:
         """Lets others open the scene. Changes that are in no file stay in the journal, and are
         there when the scene is opened again."""
-        self._end_beside()
-        with self._alone():
+        self._end_background()
+        with self._exclusive():
             self._callbacks.clear()
             self._storage.close(keep=self._changed)
 
@@ -123,7 +123,7 @@ class ComposeSession(BackgroundEditor):
             InvalidInputError: it cannot be written; the old file is as it was, and so is the
                 session.
         """
-        with self._alone():
+        with self._exclusive():
             self._storage.save(self._history, name, self.folder, overwrite=overwrite)
             self._storage.announce(self._address)
             selection = self._state.selection
@@ -144,7 +144,7 @@ class ComposeSession(BackgroundEditor):
             InvalidInputError: the scene has no file, or the name would lead elsewhere.
             BurgError: the file cannot be read, or does not fit.
         """
-        with self._alone():
+        with self._exclusive():
             path = self._storage.path if name is None else scene_path(name, self.folder)
             if path is None:
                 raise InvalidInputError("this scene was never saved, so there is nothing to load")
@@ -154,7 +154,7 @@ class ComposeSession(BackgroundEditor):
             known = fingerprint(path)
             scene = load_scene(path)
             self._drag = None
-            self._take(HistoryStep(f"load {path.name}", State(scene.document, scene.library)))
+            self._add_step(HistoryStep(f"load {path.name}", State(scene.document, scene.library)))
             self._storage.known, self._storage.saved = known, scene.document
             self._storage.record_all(self._history)
             return self._publish()
@@ -171,7 +171,7 @@ class ComposeSession(BackgroundEditor):
             UnknownNameError: there is no such library.
             DocumentError: its document does not fit the schema.
         """
-        with self._alone():
+        with self._exclusive():
             self._require_saved(discard=discard)
             reference = self._history.state.library.root if library is None else self._own(library)
             if library is None and self._history.state.document.library in builtin_names("models"):
@@ -229,8 +229,8 @@ class ComposeSession(BackgroundEditor):
     def refresh(self) -> SessionView:
         """Looks whether the library or the scene's file has changed on the disk; notices say so.
         Each step does that first."""
-        with self._alone():
-            self._look_around()
+        with self._exclusive():
+            self._update_surroundings()
             return self._view
 
     def _change(self, opened: Opened) -> SessionView:
@@ -248,13 +248,13 @@ class ComposeSession(BackgroundEditor):
                 f"scene {name!r} has changes that are not saved; save or discard them"
             )
 
-    def _look_around(self) -> None:
-        self._look_at_file()
+    def _update_surroundings(self) -> None:
+        self._check_scene_file()
         library = self._history.state.library
         if self._watch is None or self._watch.library.root != library.root:
             self._watch = LibraryWatch(library)
         try:
-            changed = self._watch.look()
+            changed = self._watch.reload_if_changed()
         except BurgError as error:
             self.notify(f"library {library.root} cannot be read any more: {error}")
             return
@@ -265,7 +265,7 @@ class ComposeSession(BackgroundEditor):
         self._revision += 1
         self._show(replace(self._state, library=changed))
 
-    def _look_at_file(self) -> None:
+    def _check_scene_file(self) -> None:
         """Tells once of each change of the scene's file that is not this session's."""
         path = self._storage.path
         if path is None:

@@ -1,7 +1,7 @@
 from .cache import (
     Arrays as Arrays,
     cache_folder as cache_folder,
-    kept as kept,
+    cached as cached,
 )
 from .content import (
     content_hash as content_hash,
@@ -62,8 +62,8 @@ from .web_access import (
     HEADERS as HEADERS,
     LOCALHOST as LOCALHOST,
     RequestError as RequestError,
+    address_in_use_error as address_in_use_error,
     page_url as page_url,
-    require_own_host as require_own_host,
-    taken as taken,
+    require_local_host as require_local_host,
 )
 from .web_token import BrowserToken as BrowserToken

@@ -29,7 +29,14 @@ from numpy.typing import NDArray
 
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files import NUMBERS, UNFINISHED, NpzFile, atomic_write, open_npz, reading
+from burg_drake.core.files import (
+    NUMBERS,
+    UNFINISHED,
+    NpzFile,
+    atomic_write,
+    open_npz,
+    reporting_read_errors,
+)
 
 VARIABLE = "BURG_DRAKE_CACHE"
 OFF = "off"
@@ -42,9 +49,9 @@ ABANDONED = 3_600.0
 """A file that has not got its name for so long [s] is of a process that was killed."""
 ROOMS = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
 """Packages whose code decides about what is kept."""
-MAKERS = ("numpy", "scipy", "drake")
+VERSIONED_PACKAGES = ("numpy", "scipy", "drake")
 """Packages whose version does."""
-MADE = "made_by"
+VERSION_KEY = "made_by"
 """Name of the array that says what an entry was computed by, and from what."""
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -66,7 +73,7 @@ def cache_folder() -> Path | None:
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "burg_drake"
 
 
-def kept(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
+def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
     """Arrays from the cache, or computed and kept there.
 
     Args:
@@ -79,7 +86,7 @@ def kept(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
     if folder is None:
         return make()
     path = folder / f"{kind}-{content[:32]}.npz"
-    made_by = content_hash(kind, content, *_makers())
+    made_by = content_hash(kind, content, *_code_version())
     found = _read(path, made_by)
     if found is None:
         found = make()
@@ -94,14 +101,14 @@ def _read(path: Path, made_by: str) -> Arrays | None:
     except OSError:
         return None  # there is none
     try:
-        with reading(path, "an entry of the cache"), open_npz(path) as archive:
-            said = archive.array(MADE).read("U", ()).item()
-            found = _arrays(archive) if said == made_by else None
+        with reporting_read_errors(path, "an entry of the cache"), open_npz(path) as archive:
+            origin = archive.array(VERSION_KEY).read("U", ()).item()
+            found = _arrays(archive) if origin == made_by else None
     except InvalidInputError as error:
         _log.warning("cache: %s; it is computed anew", error)
         return None
     if found is None:
-        _tell_of_versions(path.parent)
+        _log_other_version(path.parent)
     elif time.time() - mark > TOUCHED:
         with contextlib.suppress(OSError):
             os.utime(path)
@@ -109,7 +116,7 @@ def _read(path: Path, made_by: str) -> Arrays | None:
 
 
 @functools.cache
-def _tell_of_versions(folder: Path) -> None:
+def _log_other_version(folder: Path) -> None:
     """One line a process, as after an update that is so of all entries."""
     _log.warning(
         "cache: what %s has was made by another version; what is needed is computed anew", folder
@@ -117,13 +124,15 @@ def _tell_of_versions(folder: Path) -> None:
 
 
 def _arrays(archive: NpzFile) -> Arrays:
-    return {name: archive.array(name).read(NUMBERS) for name in archive.names if name != MADE}
+    return {
+        name: archive.array(name).read(NUMBERS) for name in archive.names if name != VERSION_KEY
+    }
 
 
 def _write(path: Path, arrays: Arrays, made_by: str) -> None:
     """Writes an entry, if that is possible."""
     buffer = io.BytesIO()
-    every: dict[str, Any] = {MADE: np.array(made_by), **arrays}
+    every: dict[str, Any] = {VERSION_KEY: np.array(made_by), **arrays}
     np.savez(buffer, **every)
     try:
         atomic_write(path, buffer.getvalue())
@@ -153,12 +162,12 @@ def _limit(folder: Path) -> None:
 
 
 @functools.cache
-def _makers() -> tuple[str, ...]:
+def _code_version() -> tuple[str, ...]:
     """Hash of the code, and versions of what it computes with."""
     package = Path(__file__).parents[1]
     files = [file for room in ROOMS for file in sorted((package / room).rglob("*.py"))]
     code = content_hash([file.relative_to(package).as_posix() for file in files], files)
-    return code, *(_version(name) for name in MAKERS)
+    return code, *(_version(name) for name in VERSIONED_PACKAGES)
 
 
 def _version(package: str) -> str:

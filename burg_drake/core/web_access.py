@@ -40,7 +40,7 @@ class RequestError(Exception):
         self.code = code
 
 
-def names_this_machine(name: str, served: str) -> bool:
+def is_local_host(name: str, served: str) -> bool:
     """Whether a `Host` header names this machine.
 
     A rebound DNS name is a name, so that any plain address will do.
@@ -63,7 +63,7 @@ def names_this_machine(name: str, served: str) -> bool:
     return True
 
 
-def require_own_host(header: Callable[[str], str | None], *, served: str, is_page: bool) -> None:
+def require_local_host(header: Callable[[str], str | None], *, served: str, is_page: bool) -> None:
     """Refuses what another site may have sent.
 
     Args:
@@ -75,7 +75,7 @@ def require_own_host(header: Callable[[str], str | None], *, served: str, is_pag
         RequestError: another host is meant, or another site asks.
     """
     host, origin = header("Host") or "", header("Origin")
-    if not names_this_machine(host, served):
+    if not is_local_host(host, served):
         raise RequestError(HTTPStatus.FORBIDDEN, f"this is not {shown(host) or 'a nameless host'}")
     if origin is not None and origin != f"http://{host}":
         raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {shown(origin)} are refused")
@@ -90,7 +90,7 @@ def page_url(host: str, port: int) -> str:
     return f"http://{name}:{port}/"
 
 
-def taken(host: str, ports: range, *, any_of_them: bool) -> str:
+def address_in_use_error(host: str, ports: range, *, any_of_them: bool) -> str:
     """Says that no port was free.
 
     Args:

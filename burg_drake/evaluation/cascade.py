@@ -17,7 +17,7 @@ from typing import overload
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
@@ -182,7 +182,9 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
     done = total - len(job.candidates)
     again = {grasp.id for grasp in job.candidates}
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
-    pace = Pace(reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging")
+    pace = ProgressMeter(
+        reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging"
+    )
     stretches = run.document.stretches
     stretch = begun_now(executor.workers, len(run.verdicts))
     save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))

@@ -21,7 +21,7 @@ from burg_drake.core.grasps import (
     Verdict,
 )
 from burg_drake.core.paths import require_name
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import (
     INSTANCE,
     Candidate,
@@ -70,8 +70,8 @@ def reach(
 ) -> GraspSet:
     """Asks of every grasp whether the arm can execute it, without a trial.
 
-    That is: the open hand is clear, also on the straight way in, and with the target in it on the
-    straight ways back and up; the arm can follow them; and it finds a way from home to where they
+    That is: the open hand is clear, also on the straight approach, and with the target in it on the
+    straight retreat and lift; the arm can follow them; and it finds a way from home to where they
     begin.
 
     Args:
@@ -96,8 +96,8 @@ def reach(
     Returns:
         The grasps by instance in the scene's order, each one once on its instance, with columns:
         `instance`; `outcome`, `reachable` or what hinders the arm; `blocker`; `reason`, why there
-        is no outcome, or no plan of what is reachable, should a computation fail; `clearance` of
-        the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
+        is no outcome, or no plan of what is reachable, should a computation fail; `clearance`
+        of the open hand at the grasp [m]; `arm_clearance` [m] and `joint_excess` [rad], see
         `core.grasps.Margins`; `lift_height` [m], as asked or as far as there is room;
         `q_grasp_1` and so on, `q_pregrasp_1` and so on: the arm there [rad], NaN where there is
         none; and `cpu` [s]. Answers do not depend on the batch, the order or the number of workers.
@@ -115,8 +115,7 @@ def reach(
     scene, station = as_scene(scene), as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
-            f"station {station.name!r} has no arm, of which one could ask what it can reach; give"
-            " another one"
+            f"station {station.name!r} has no arm to reach with; give another one"
         )
     motion = motion or station.document.motion
     given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
@@ -143,8 +142,8 @@ def reach(
         left = [candidate for candidate in candidates if candidate.id not in verdicts]
         outcomes = Counter(v.outcome for v in verdicts.values())
         done, total = len(candidates) - len(left), len(candidates)
-        event = Progress(STARTING, done, total, outcomes=outcomes, good=YES)
-        pace = Pace(reporter.show, event, "judging")
+        event = Progress(STARTING, done, total, outcomes=outcomes, counted_outcome=YES)
+        pace = ProgressMeter(reporter.show, event, "judging")
         for candidate, verdict in opened.enter_context(
             closing(judge_all(left, factory, workers=workers))
         ):

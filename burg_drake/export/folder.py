@@ -66,7 +66,7 @@ def require_own_folder(folder: str | Path) -> Path:
         known = load_document(path / RECORD_FILE, ExportRecord).files
     except DocumentError as error:
         raise InvalidInputError(
-            f"{folder} has files in it and is no earlier export; choose a new folder"
+            f"{folder} has files in it and is not an earlier export; choose a new folder"
         ) from error
     foreign = sorted(set(present) - {*known, RECORD_FILE})
     if foreign:

@@ -56,15 +56,15 @@ class MjcfAssets:
         atomic_write(self._folder / file, obj_text(part))
         # The walls of what is looked at may be open: no volume is needed, a surface is.
         SubElement(self._asset, "mesh", {"name": mesh, "file": file, "inertia": "shell"})
-        look = {"rgba": " ".join(f"{v:g}" for v in part.rgba)}
+        appearance = {"rgba": " ".join(f"{v:g}" for v in part.rgba)}
         if part.image is not None:
             texture = f"{OBJECTS}/{name}/visual_{i}.png"
             data = io.BytesIO()
             part.image.convert("RGB").save(data, format="PNG")
             atomic_write(self._folder / texture, data.getvalue())
             SubElement(self._asset, "texture", {"name": mesh, "type": "2d", "file": texture})
-            look = {"texture": mesh}
-        SubElement(self._asset, "material", {"name": mesh, "specular": "0.1", **look})
+            appearance = {"texture": mesh}
+        SubElement(self._asset, "material", {"name": mesh, "specular": "0.1", **appearance})
         return mesh, mesh
 
     def _piece(self, name: str, i: int, piece: str) -> str:

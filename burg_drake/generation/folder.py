@@ -26,7 +26,7 @@ from burg_drake.core.files import (
     writable_folder,
 )
 from burg_drake.generation.sample import SampledScene
-from burg_drake.scene.document import Ingredients, SceneDocument, save_scene
+from burg_drake.scene.document import SamplingProvenance, SceneDocument, save_scene
 
 RECIPE_FILE = "recipe.yaml"
 TABLE_FILE = "scenes.csv"
@@ -112,7 +112,7 @@ class SceneRow:
 class SceneFolder:
     """A folder opened for sampling; one process at a time can hold it."""
 
-    def __init__(self, path: str | Path, ingredients: Ingredients) -> None:
+    def __init__(self, path: str | Path, provenance: SamplingProvenance) -> None:
         """Opens or makes the folder.
 
         Raises:
@@ -130,17 +130,17 @@ class SceneFolder:
                 f"{path} is being written by another process; wait for it, or choose another folder"
             ) from error
         try:
-            self._open(ingredients)
+            self._open(provenance)
         except BaseException:
             os.close(self._lock)
             raise
 
-    def _open(self, ingredients: Ingredients) -> None:
+    def _open(self, provenance: SamplingProvenance) -> None:
         remove_unfinished(self.path)
         recipe = self.path / RECIPE_FILE
         if recipe.exists():
-            there = load_document(recipe, Ingredients)
-            found = there.differences(ingredients)
+            there = load_document(recipe, SamplingProvenance)
+            found = there.differences(provenance)
             if found:
                 raise InvalidInputError(
                     f"{self.path} holds other scenes ({'; '.join(found)}); choose another -o, or"
@@ -152,7 +152,7 @@ class SceneFolder:
                 " choose another -o"
             )
         else:
-            save_document(ingredients, recipe, "What the scenes of this folder were made with.")
+            save_document(provenance, recipe, "What the scenes of this folder were made with.")
         self._table = self.path / TABLE_FILE
         self.rows = {row.scene: row for row in read_table(self._table)}
         self.rows = {
@@ -160,7 +160,7 @@ class SceneFolder:
         }
         for number, row in self.rows.items():
             if row.accepted:
-                _require_sound(self.file(number))
+                _require_readable(self.file(number))
         self.sort()
 
     def file(self, number: int) -> Path:
@@ -181,8 +181,8 @@ class SceneFolder:
                 stream.write(row.text())
         except OSError as error:
             raise InvalidInputError(
-                f"cannot write {self._table}: {error.strerror}; what is there is kept, and the same"
-                " command goes on from there"
+                f"cannot write {self._table}: {error.strerror}; what is there is kept; run the"
+                " same command to continue"
             ) from error
         self.rows[row.scene] = row
 
@@ -205,7 +205,7 @@ class SceneFolder:
         os.close(self._lock)
 
 
-def _require_sound(path: Path) -> None:
+def _require_readable(path: Path) -> None:
     try:
         load_document(path, SceneDocument)
     except DocumentError as error:
@@ -216,7 +216,7 @@ def read_table(path: Path) -> list[SceneRow]:
     """The rows of a table; lines that cannot be read, such as a torn last one, count as not there.
 
     Raises:
-        InvalidInputError: it is no file, or cannot be read.
+        InvalidInputError: it is not a file, or cannot be read.
     """
     if not path.exists():
         return []

@@ -74,34 +74,34 @@ def pile(
     Raises:
         SimulationError: Drake cannot step the scene.
     """
-    ground = _Ground(station, check, shapes)
+    settler = _PileSettler(station, check, shapes)
     falling: Collection[str] = scene.instances
     margin = min(MARGIN, MARGIN_SHARE * min(scene.board.size))
     for drops in range(DROPS + 1):
         try:
-            landed = drop_onto_scene(scene, station, falling, shapes, margin)
-            lost = scene.instances.keys() - landed.instances.keys()
-            scene = _with_lost(landed, scene)
-            scene, faulty = (scene, lost) if lost else ground.rested(scene)
+            dropped = drop_onto_scene(scene, station, falling, shapes, margin)
+            lost = scene.instances.keys() - dropped.instances.keys()
+            scene = _with_missing(dropped, scene)
+            scene, faulty = (scene, lost) if lost else settler.settled_or_faulty(scene)
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             raise SimulationError(
                 f"{scene.path}: the heap cannot be simulated: {' '.join(str(error).split())}"
             ) from error
         if not faulty or drops == DROPS:
             break
-        scene, falling, margin = ground.hung_again(scene, faulty, rng), faulty, EDGE
+        scene, falling, margin = settler.raised_again(scene, faulty, rng), faulty, EDGE
     return SettledHeap(scene, tuple(sorted(faulty)), drops)
 
 
 @dataclass(frozen=True)
-class _Ground:
+class _PileSettler:
     """Where a heap lies."""
 
     station: Station
     check: SceneCheck
     shapes: ObjectShapes
 
-    def rested(self, scene: Scene) -> tuple[Scene, Collection[str]]:
+    def settled_or_faulty(self, scene: Scene) -> tuple[Scene, Collection[str]]:
         """A heap that was relaxed, and what is wrong with it, if anything."""
         faulty = self._misplaced(scene)
         if faulty:
@@ -119,7 +119,9 @@ class _Ground:
             slack |= dict.fromkeys(moving, share)
         return scene, moving
 
-    def hung_again(self, scene: Scene, faulty: Collection[str], rng: np.random.Generator) -> Scene:
+    def raised_again(
+        self, scene: Scene, faulty: Collection[str], rng: np.random.Generator
+    ) -> Scene:
         """The scene with its faulty objects where there is room above the others, large ones
         first."""
         heap = Heap(
@@ -129,10 +131,10 @@ class _Ground:
         found = dict(scene.instances)
         for name, one in found.items():
             if name not in faulty:
-                heap.stand(self.shapes[one.object], scene.X_SO(name))
+                heap.add(self.shapes[one.object], scene.X_SO(name))
         sizes = {n: np.prod(np.ptp(self.shapes[found[n].object].corners, axis=0)) for n in faulty}
         for name in sorted(faulty, key=lambda name: (-sizes[name], name)):
-            X_SO = heap.hang_low(self.shapes[found[name].object], rng)
+            X_SO = heap.place_low(self.shapes[found[name].object], rng)
             if X_SO is not None:
                 found[name] = replace(found[name], X_SO=Pose.readable(X_SO))
         document = replace(scene.document, instances=tuple(found.values()))
@@ -142,18 +144,18 @@ class _Ground:
         """A scene whose objects have come to rest with shares of their friction."""
         built = build_station_diagram(scene, self.station, robot="none", engine=RELAXING)
         reduce_friction_of(built, {built.free[name]: share for name, share in slack.items()})
-        herd = BoardEdgeGuard(
+        guard = BoardEdgeGuard(
             built, self.shapes, margin=EDGE, share=1.0
         )  # what gets slower is stopped
-        relaxed = relax(built, moving, RELAXING_TIME, before_window=herd.drive)
-        return _with_lost(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
+        relaxed = relax(built, moving, RELAXING_TIME, before_window=guard.push_back)
+        return _with_missing(placed_scene(built, relaxed.X_WO, exact=relaxed.together), scene)
 
     def _misplaced(self, scene: Scene) -> set[str]:
         """Objects that are where a scene may have nothing."""
         return {issue.instance for issue in self.check.issues(scene) if issue.is_error}
 
 
-def _with_lost(scene: Scene, before: Scene) -> Scene:
+def _with_missing(scene: Scene, before: Scene) -> Scene:
     """A scene with all objects of an earlier one: what fell off the table hangs where it did, and
     in the order of that."""
     instances = tuple(scene.instances.get(name, one) for name, one in before.instances.items())

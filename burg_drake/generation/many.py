@@ -14,11 +14,11 @@ from burg_drake.generation.folder import SceneFolder, SceneRow
 from burg_drake.generation.sample import (
     SampledScene,
     SceneSampler,
-    ingredients_of,
+    provenance_of,
     require_possible,
 )
 from burg_drake.objects.library import ObjectLibrary, load_library
-from burg_drake.scene.document import Ingredients, SceneRecipe
+from burg_drake.scene.document import SamplingProvenance, SceneRecipe
 from burg_drake.station.document import Station, StationLike, as_station, load_station
 
 
@@ -91,7 +91,7 @@ def sample_scenes(
     """
     station = as_station(station)
     require_possible(recipe, library, station)
-    ingredients = ingredients_of(recipe, library, station)
+    ingredients = provenance_of(recipe, library, station)
     with SceneFolder(folder, ingredients) as opened:
         kitchen = _kitchen(ingredients, library, station, opened.path)
         todo = [SceneTask(kitchen, number) for number in range(count) if number not in opened.rows]
@@ -128,7 +128,7 @@ def sample_scene(work: SceneTask) -> SampledScene:
 
 
 def _kitchen(
-    ingredients: Ingredients, library: ObjectLibrary, station: Station, folder: Path
+    ingredients: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
 ) -> SamplingInputs:
     contents = (ingredients.library_content, ingredients.station_content)
     return SamplingInputs(ingredients.recipe, library.root, station.path, contents, folder)
@@ -143,7 +143,7 @@ def _sampler(kitchen: SamplingInputs) -> SceneSampler:
     """
     library, station = load_library(kitchen.library), load_station(kitchen.station)
     sampler = SceneSampler(kitchen.recipe, library, station)
-    there = sampler.ingredients
+    there = sampler.provenance
     for what, found, path, content in (
         ("library", there.library_content, library.root, kitchen.contents[0]),
         ("station", there.station_content, station.path, kitchen.contents[1]),

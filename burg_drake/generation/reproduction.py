@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.paths import resolve
-from burg_drake.generation.sample import SceneSampler, ingredients_of
+from burg_drake.generation.sample import SceneSampler, provenance_of
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station, load_station
 
@@ -47,7 +47,7 @@ def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
             f"{scene.path} has no `origin`: it was not sampled, or was changed since"
         )
     station = load_station(resolve(origin.recipe.station, "stations", scene.path.parent))
-    here = ingredients_of(origin.recipe, scene.library, station)
+    here = provenance_of(origin.recipe, scene.library, station)
     differences = origin.differences(here)
     if differences and not force:
         raise InvalidInputError(

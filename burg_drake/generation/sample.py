@@ -25,7 +25,13 @@ from burg_drake.generation.heap import pile
 from burg_drake.generation.rules import broken_rule, require_rules
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.arrangement import ObjectRequest, ObjectShapes, arrange, choose
-from burg_drake.scene.document import Ingredients, Scene, SceneDocument, SceneOrigin, SceneRecipe
+from burg_drake.scene.document import (
+    SamplingProvenance,
+    Scene,
+    SceneDocument,
+    SceneOrigin,
+    SceneRecipe,
+)
 from burg_drake.simulation.settling import settle_scene
 from burg_drake.station.checks import SceneCheck
 from burg_drake.station.document import (
@@ -86,7 +92,7 @@ class SceneSampler:
         """
         require_possible(recipe, library, station)
         self.recipe, self.library, self.station = recipe, library, station
-        self.ingredients = ingredients_of(recipe, library, station)
+        self.provenance = provenance_of(recipe, library, station)
         self._content = recipe.content
         self._shapes = ObjectShapes(library)
         self._check = SceneCheck(station, library)
@@ -117,7 +123,7 @@ class SceneSampler:
             tries += used
             enough = not missing or (self.recipe.fewer and bool(scene.instances))
             again = rng_from("dropped again", self._content, number, attempt)
-            reason, scene = self._judged(scene, again) if enough else (NO_ROOM, scene)
+            reason, scene = self._settled(scene, again) if enough else (NO_ROOM, scene)
             if not reason:
                 scene = self._with_origin(scene, number, attempt)
                 return SampledScene(scene, number, True, missing, attempt, tries, dict(reasons))
@@ -154,7 +160,7 @@ class SceneSampler:
         scene = Scene(document, self.library, folder / f"{name}.yaml")
         return scene, laid_out.missing, laid_out.tries
 
-    def _judged(self, scene: Scene, rng: np.random.Generator) -> tuple[str, Scene]:
+    def _settled(self, scene: Scene, rng: np.random.Generator) -> tuple[str, Scene]:
         """The first reason to refuse a scene, if any, and the scene at rest."""
         found = self._faults(scene)
         if found:
@@ -180,7 +186,7 @@ class SceneSampler:
         return next((reason for kind, reason in REASONS.items() if kind in kinds), "")
 
     def _with_origin(self, scene: Scene, number: int, attempt: int) -> Scene:
-        origin = SceneOrigin(**vars(self.ingredients), number=number, attempt=attempt)
+        origin = SceneOrigin(**vars(self.provenance), number=number, attempt=attempt)
         return Scene(replace(scene.document, origin=origin), scene.library, scene.path)
 
 
@@ -208,9 +214,11 @@ def sample_scene(
     return SceneSampler(recipe, library, station).sample(number)
 
 
-def ingredients_of(recipe: SceneRecipe, library: ObjectLibrary, station: Station) -> Ingredients:
+def provenance_of(
+    recipe: SceneRecipe, library: ObjectLibrary, station: Station
+) -> SamplingProvenance:
     """What scenes of a recipe are made with here and now."""
-    return Ingredients(
+    return SamplingProvenance(
         recipe=recipe,
         library_content=content_hash(library.content)[:HASH_DIGITS],
         station_content=station.content[:HASH_DIGITS],

@@ -153,7 +153,7 @@ class Ball:
         start = each(lambda v: v[:, first], vertices)
         u = each(lambda v: v[:, second] - v[:, first], vertices)
         t = np.clip(-dot(start, u) / dot(u, u), 0.0, 1.0)
-        return _along_ways(self.radius, each(lambda p, v: -(p + t * v), start, u), vertices)
+        return _along_paths(self.radius, each(lambda p, v: -(p + t * v), start, u), vertices)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class Cylinder:
         """Across the axis, away from edges and from vertices; and where edges meet a rim."""
         across = along_silhouette(self, one, AXES[2], normals, vertices)
         x, y, z = vertices
-        radial = _along_ways(self.radius, (-x, -y, np.zeros_like(z)), vertices)
+        radial = _along_paths(self.radius, (-x, -y, np.zeros_like(z)), vertices)
         rims = along_arcs(self, one, normals, vertices)
         return np.minimum(np.minimum(across, radial), rims)
 
@@ -256,7 +256,7 @@ def along_arcs(other: Convex, one: Polytope, normals: Components, vertices: Comp
     return np.asarray(overlap(0.5 * (low + high)).min(axis=1))
 
 
-def _along_ways(radius: float, a: Components, vertices: Components) -> Array:
+def _along_paths(radius: float, a: Components, vertices: Components) -> Array:
     """(M,) smallest overlap along ways `a` (M, K) from a polytope to the centre of a circle or
     ball; inf where all of them have no length."""
     length = np.sqrt(dot(a, a))

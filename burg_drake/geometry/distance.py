@@ -156,14 +156,14 @@ class _DistanceSearch:
         self._one, self._shape, self._other, self._piece = one, shape, other, piece
         self._R = np.ascontiguousarray(np.moveaxis(X_BA.R, 0, -1))
         self._p = np.ascontiguousarray(X_BA.p.T)
-        self._way = X_BA.apply(one.center[shape]).T - other.center[piece].T
+        self._direction = X_BA.apply(one.center[shape]).T - other.center[piece].T
 
     def distances(self, ceiling: Array) -> Array:
         """(L,) distances [m]; inf above the ceiling (L,)."""
         balls = self._one.ball[self._shape] + self._other.ball[self._piece]
         found = np.full(len(balls), np.inf)
         live = np.arange(len(balls))
-        v = self._support(live, self._way)
+        v = self._support(live, self._direction)
         corners = np.stack([v, v, v], axis=1)
         for _ in range(MOST_STEPS):
             length = np.sqrt(_dot(v, v))

@@ -104,10 +104,10 @@ class Planner:
             limit_margin=self.reach.settings.limit_margin,
         )
         low, high = hand.opening
-        way = high - (low if np.isnan(width) else width)
+        witness_path = high - (low if np.isnan(width) else width)
         return replace(
             plan,
-            close_time=way / 2.0 / hand.closing_speed + GRIP_TIME,
+            close_time=witness_path / 2.0 / hand.closing_speed + GRIP_TIME,
             opening=high,
             width=width,
             origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),

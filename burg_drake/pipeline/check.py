@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.core import BurgError, MeshError
-from burg_drake.objects.collision import coarse_note
+from burg_drake.objects.collision import deviation_warning
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 from burg_drake.objects.meshes import mesh_hash
 from burg_drake.objects.physics import implausible
@@ -89,9 +89,9 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
     if traced and record is not None and _hash(source) != record.keys.mesh:
         yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
     if not missing:
-        complaint = drake_complaint(library.root / entry.sdf)
-        if complaint:
-            yield _issue(name, "broken", f"Drake about {library.root / entry.sdf}: {complaint}")
+        drake_problem = drake_error(library.root / entry.sdf)
+        if drake_problem:
+            yield _issue(name, "broken", f"Drake about {library.root / entry.sdf}: {drake_problem}")
 
 
 def _hash(source: Path) -> str:
@@ -145,7 +145,7 @@ def _fit_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "unsure", text)
         return
     diagonal = float(np.linalg.norm(np.subtract(entry.upper, entry.lower)))
-    text = coarse_note(entry.fit, diagonal)
+    text = deviation_warning(entry.fit, diagonal)
     if text:
         yield _issue(name, "implausible", text)
 
@@ -164,21 +164,21 @@ def _issue(name: str, kind: IssueKind, message: str) -> LibraryIssue:
     return LibraryIssue(object=name, kind=kind, message=message)
 
 
-def drake_complaint(sdf: Path) -> str:
+def drake_error(sdf: Path) -> str:
     """What Drake's parser says against a model: its error or first warning; empty if nothing."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    from burg_drake.station.world import add_models, held_remarks  # imports Drake
+    from burg_drake.station.world import add_models, buffered_remarks  # imports Drake
 
     plant, graph = MultibodyPlant(0.001), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(graph)
-    with held_remarks() as remarks:
+    with buffered_remarks() as remarks:
         try:
             add_models(Parser(plant), sdf)
             plant.Finalize()
         except (RuntimeError, ValueError, SystemExit, BurgError) as error:
             return " ".join(str(error).split())
-    doubts = [record.getMessage() for record in remarks if record.levelno >= logging.WARNING]
-    return " ".join(doubts[0].split()) if doubts else ""
+    warnings = [record.getMessage() for record in remarks if record.levelno >= logging.WARNING]
+    return " ".join(warnings[0].split()) if warnings else ""

@@ -11,9 +11,9 @@ import trimesh
 from burg_drake.core import MeshError
 from burg_drake.objects.collision import (
     Pieces,
-    coarseness,
     convex_pieces,
     describe_fit,
+    deviation,
     given_pieces,
     measure_fit,
 )
@@ -67,13 +67,13 @@ def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
         return best
     seconds, tried = first.seconds, 0
     for threshold in FINER:
-        if coarseness(best.fit, mesh.surface) <= 1.0:
+        if deviation(best.fit, mesh.surface) <= 1.0:
             break
         tried += 1
         with contextlib.suppress(MeshError):  # it took too long: what there is, is kept
             finer = _at(mesh, replace(parameters, threshold=threshold))
             seconds += finer.seconds
-            better = coarseness(finer.fit, mesh.surface) < coarseness(best.fit, mesh.surface)
+            better = deviation(finer.fit, mesh.surface) < deviation(best.fit, mesh.surface)
             if better and len(finer.pieces) <= MOST_PIECES:
                 best = finer
     note = f"finer cuts with at most {MOST_PIECES} pieces fit no better" if tried else ""

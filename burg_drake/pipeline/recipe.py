@@ -207,7 +207,7 @@ def _bad_name(name: str) -> str:
         hint = f", such as {object_name(name)!r}"
     except InvalidInputError:
         hint = ""
-    return f"{name!r} is no object name; use a-z, 0-9 and underscores{hint}"
+    return f"{name!r} is not a name for an object; use a-z, 0-9 and underscores{hint}"
 
 
 def _check_positive(label: str, value: float | None, unit: str) -> None:

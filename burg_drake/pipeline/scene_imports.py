@@ -108,10 +108,10 @@ class _Names:
         self.taken = {object_name(item.object_type) for item in items}
         lacking = [i for i in items if object_name(i.object_type) not in library.objects]
         if lacking:
-            lines = [f"{scene.path}:{i.line}: {self._lacks(i)}" for i in lacking]
+            lines = [f"{scene.path}:{i.line}: {self._require_object(i)}" for i in lacking]
             raise UnknownNameError("; ".join(lines))
 
-    def _lacks(self, item: BurgInstance) -> str:
+    def _require_object(self, item: BurgInstance) -> str:
         name = object_name(item.object_type)
         return (
             f"object {name!r} ({item.object_type!r}) is not in library {self.library.root};"

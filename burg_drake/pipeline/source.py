@@ -104,7 +104,7 @@ def check_source(source: ObjectSource) -> None:
     """
     if not NAME_PATTERN.fullmatch(source.name):
         raise InvalidInputError(
-            f"{source.name!r} is no object name; use a-z, 0-9 and underscores, such as"
+            f"{source.name!r} is not a name for an object; use a-z, 0-9 and underscores, such as"
             f" {object_name(source.name + '_0').removesuffix('_0') or 'mug'!r}"
         )
     for label, value, unit in (

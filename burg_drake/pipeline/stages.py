@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.files import atomic_write
-from burg_drake.objects.collision import coarse_note
+from burg_drake.objects.collision import deviation_warning
 from burg_drake.objects.library import (
     Decomposition,
     MassProperties,
@@ -137,7 +137,7 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
     notes += implausible(properties, geometry.lower, geometry.upper)
     diagonal = float(np.linalg.norm(np.subtract(geometry.upper, geometry.lower)))
-    notes += [geometry.cut, coarse_note(geometry.fit, diagonal), *geometry.notes]
+    notes += [geometry.cut, deviation_warning(geometry.fit, diagonal), *geometry.notes]
     return [note for note in notes if note]
 
 
@@ -146,8 +146,8 @@ def _origin(source: ObjectSource, root: Path) -> tuple[str, str]:
     if isinstance(source.mesh, trimesh.Trimesh):
         return "", ""
     mesh = Path(source.mesh)
-    seen = os.path.relpath(os.path.realpath(mesh), os.path.realpath(root))
-    return mesh.name, Path(seen).as_posix()
+    known = os.path.relpath(os.path.realpath(mesh), os.path.realpath(root))
+    return mesh.name, Path(known).as_posix()
 
 
 def _entry(

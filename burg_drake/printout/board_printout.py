@@ -132,7 +132,7 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
     if settings.names:
         sheet, homeless = place_names(sheet, tiling)
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
-    warnings += _lost(sheet, tiling)
+    warnings += _lost_warnings(sheet, tiling)
     warnings += _spread(size, layout, drawings, settings, tiling)
     warnings += _without_white(size, layout)
     warnings += [f"there is no room for the words {words!r}" for words in homeless]
@@ -171,9 +171,9 @@ def _spread(
 
     margin = next((m for m in MARGINS if m < settings.margin and on_one(margin=m)), None)
     page = next((name for name in PAPERS if on_one(page=name)), None)
-    ways = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
-    ways += [f"page {page}"] if page else []
-    remedy = f"; {' or '.join(ways)} would do with one" if ways else ""
+    changes = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
+    changes += [f"page {page}"] if page else []
+    remedy = f"; {' or '.join(changes)} would do with one" if changes else ""
     return [
         f"the board is no larger than the page, but takes {pages} because of the margins, rulers"
         f" and words{remedy}"
@@ -195,7 +195,7 @@ def _needed(
     return lower, upper
 
 
-def _lost(sheet: Sheet, tiling: Tiling) -> list[str]:
+def _lost_warnings(sheet: Sheet, tiling: Tiling) -> list[str]:
     """What of the objects no page shows; of those beyond the board something else was said."""
     first, last = tiling.tiles[0], tiling.tiles[-1]
     lower = np.array([first.lower[0], last.lower[1]])
@@ -235,9 +235,9 @@ def _scale_correction(settings: PrintSettings) -> Array:
 
 
 def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings) -> bytes:
-    stretch, paper = _scale_correction(settings), tiling.paper
+    print_scale, paper = _scale_correction(settings), tiling.paper
     stream = io.BytesIO()
-    page_size = tuple((stretch * [paper.width, paper.height] / POINT).tolist())
+    page_size = tuple((print_scale * [paper.width, paper.height] / POINT).tolist())
     canvas = Canvas(stream, pagesize=page_size, pageCompression=1, invariant=1)
     canvas.setTitle(f"Board of {scene.name}")
     canvas.setSubject(f"scene {scene.name}, content {scene.content}")
@@ -249,7 +249,7 @@ def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSetting
     draw_sheet(pen, sheet)
     canvas.endForm()
     for tile in tiling.tiles:
-        canvas.scale(*stretch.tolist())
+        canvas.scale(*print_scale.tolist())
         _draw_board(pen, sheet, tile)
         draw_page_frame(
             pen,

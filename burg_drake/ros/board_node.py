@@ -79,27 +79,27 @@ class BoardNode:
         self._board: BoardPose | None = None
         self._overlay: Overlay | None = None
 
-    def look(self, image: Any, camera_info: Any | None) -> Sighting:
+    def locate(self, image: Any, camera_info: Any | None) -> Sighting:
         """Finds the board.
 
         Args:
             image: `sensor_msgs/Image` or `CompressedImage`.
             camera_info: `sensor_msgs/CameraInfo`, the latest; None if there was none yet.
         """
-        picture = intrinsics = None
+        rgb = intrinsics = None
         try:
-            picture = pixels(image)
-            intrinsics = self._intrinsics(camera_info, picture)
+            rgb = pixels(image)
+            intrinsics = self._intrinsics(camera_info, rgb)
             if self._board is None or self._board.intrinsics != intrinsics:
                 self._board = BoardPose(self._scene.board, intrinsics, self._print_scale)
-            estimate = self._board.estimate(picture)
+            estimate = self._board.estimate(rgb)
         except InvalidInputError as error:
             estimate = BoardEstimate(reason=str(error))
         return Sighting(
             stamp=image.header.stamp,
             camera_frame=image.header.frame_id,
             estimate=estimate,
-            image=picture,
+            image=rgb,
             intrinsics=intrinsics,
         )
 

@@ -40,8 +40,12 @@ def choose(wanted: int | None, environment: Mapping[str, str] = os.environ) -> i
     Raises:
         MissingDependencyError: it cannot be imported; says why, and what to install.
     """
-    told = environment.get(VERSION_VARIABLE, "")
-    order = [wanted] if wanted else sorted(CLIENTS, key=lambda version: str(version) != told)
+    version_variable = environment.get(VERSION_VARIABLE, "")
+    order = (
+        [wanted]
+        if wanted
+        else sorted(CLIENTS, key=lambda version: str(version) != version_variable)
+    )
     failures = []
     for version in order:
         failure = _import(CLIENTS[version])

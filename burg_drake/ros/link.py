@@ -162,7 +162,7 @@ class Link(ABC):
         """How many publish each of the topics that the node listens to."""
 
     @abstractmethod
-    def say(self, text: str, *, warning: bool = False) -> None:
+    def log(self, text: str, *, warning: bool = False) -> None:
         """A line in the log of ROS."""
 
     @abstractmethod

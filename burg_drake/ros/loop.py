@@ -31,12 +31,12 @@ class StatusLog:
         self._hinted = False
         self._reason: str | None = None
         self._reason_since = now
-        self._told: str | None = None
-        self._told_at = now - REASON_EVERY
+        self._reported: str | None = None
+        self._reported_at = now - REASON_EVERY
         self._since = now
         self._images = self._poses = 0
 
-    def looked(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
+    def record_image(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
         """After an image: a line and whether it is a warning, or None."""
         self._last_image, self._hinted = now, False
         self._images += 1
@@ -44,17 +44,17 @@ class StatusLog:
         reason = "" if sighting.estimate.valid else sighting.estimate.reason
         if reason != self._reason:
             self._reason, self._reason_since = reason, now
-        if reason == self._told:
+        if reason == self._reported:
             return None
         if not reason:
-            self._told = reason
+            self._reported = reason
             return f"the board is in sight: {sighting.status}", False
-        if now - self._reason_since < REASON_AFTER or now - self._told_at < REASON_EVERY:
+        if now - self._reason_since < REASON_AFTER or now - self._reported_at < REASON_EVERY:
             return None
-        self._told, self._told_at = reason, now
+        self._reported, self._reported_at = reason, now
         return sighting.status, True
 
-    def waited(self, publishers: Mapping[str, int], now: float) -> str | None:
+    def record_silence(self, publishers: Mapping[str, int], now: float) -> str | None:
         """Without an image: a warning, once."""
         if self._hinted or now - self._last_image < HINT_AFTER:
             return None
@@ -84,15 +84,15 @@ def serve(link: Link, node: BoardNode) -> None:
     while link.running():
         image = link.next_image(PATIENCE)
         if image is None:
-            hint = account.waited(link.publishers(), time.monotonic())
+            hint = account.record_silence(link.publishers(), time.monotonic())
             if hint:
-                link.say(hint, warning=True)
+                link.log(hint, warning=True)
             continue
-        sighting = node.look(image, link.camera_info)
+        sighting = node.locate(image, link.camera_info)
         link.publications.publish(sighting, node.draw)
-        news = account.looked(sighting, time.monotonic())
+        news = account.record_image(sighting, time.monotonic())
         if news:
-            link.say(news[0], warning=news[1])
+            link.log(news[0], warning=news[1])
         rate = account.rate(time.monotonic())
         if rate:
-            link.say(rate)
+            link.log(rate)

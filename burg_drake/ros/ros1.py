@@ -80,7 +80,7 @@ class Ros1Link(Link):
         """See `Link`."""
         return {topic: s.get_num_connections() for topic, s in self._topics.items()}
 
-    def say(self, text: str, *, warning: bool = False) -> None:
+    def log(self, text: str, *, warning: bool = False) -> None:
         """See `Link`."""
         log = self._rospy.logwarn if warning else self._rospy.loginfo
         log("%s", text)

@@ -79,7 +79,7 @@ class Ros2Link(Link):
         """See `Link`."""
         return {topic: int(self._node.count_publishers(topic)) for topic in self._topics}
 
-    def say(self, text: str, *, warning: bool = False) -> None:
+    def log(self, text: str, *, warning: bool = False) -> None:
         """See `Link`."""
         logger = self._node.get_logger()
         # rclpy allows one severity a calling line.

@@ -38,8 +38,8 @@ from burg_drake.ui.view import (
     ObjectMeshes,
     ObjectPictures,
     SceneView,
-    Shown,
-    begin_with,
+    ShownInstance,
+    set_initial_view,
 )
 from burg_drake.ui.widgets import Call, PageActions, register, show_overlay, style
 
@@ -82,7 +82,7 @@ class SetupPage:
         self._build()
         self.actions.on_refused = self._refresh
         self._unsubscribe = session.on_change(lambda view: self._changed())
-        server.on_client_disconnect(self._gone)
+        server.on_client_disconnect(self._on_disconnect)
         self._refresh()
 
     def close(self) -> None:
@@ -101,7 +101,7 @@ class SetupPage:
             show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
         )
         gui.set_panel_label("Setup")
-        begin_with(self._server, view.document.board)
+        set_initial_view(self._server, view.document.board)
 
     def _build(self) -> None:
         gui, actions = self._server.gui, self.actions
@@ -155,7 +155,7 @@ class SetupPage:
 
         calls = selection_calls(self._session)
         return {name: anywhere(action) for name, action in calls.items()} | {
-            "none": self._let_go,
+            "none": self._release_drags,
             "save": self._files.save,
             "settle": anywhere(self._session.settle),
             "snap": anywhere(self._arrange.snap),
@@ -165,7 +165,7 @@ class SetupPage:
             "help": show_overlay,
         }
 
-    def _let_go(self, client: viser.ClientHandle | None) -> None:
+    def _release_drags(self, client: viser.ClientHandle | None) -> None:
         who = None if client is None else client.client_id
         if who is None or not (self._drags.put_back(who) or self._gizmo.put_back(who)):
             self._session.select(())
@@ -176,7 +176,9 @@ class SetupPage:
 
     def _pictures_of(self, library: ObjectLibrary) -> ObjectPictures:
         def ready(wanted: object) -> None:
-            self.actions.ask(self._draw_pictures, key="pictures", after=0.1, patient=True)
+            self.actions.submit(
+                self._draw_pictures, key="pictures", after=0.1, wait_for_typing=True
+            )
 
         return ObjectPictures(library, ready)
 
@@ -186,7 +188,7 @@ class SetupPage:
             self._poses.draw()
 
     def _changed(self) -> None:
-        self.actions.ask(self._refresh, key="refresh", patient=True)
+        self.actions.submit(self._refresh, key="refresh", wait_for_typing=True)
 
     def _refresh(self) -> None:
         """Brings everything to the session's view of now."""
@@ -207,15 +209,15 @@ class SetupPage:
             self._poses.show(view, self._pictures)
         self._server.flush()
 
-    async def _gone(self, client: viser.ClientHandle) -> None:
+    async def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self._drags.drop(client.client_id)
         self._gizmo.drop(client.client_id)
 
 
-def _shown(view: SessionView) -> dict[str, Shown]:
+def _shown(view: SessionView) -> dict[str, ShownInstance]:
     fixed = {id(instance) for instance in view.document.background}
     return {
-        name: Shown(
+        name: ShownInstance(
             instance.object,
             view.X_SO(name),
             view.status.get(name, "ok"),

@@ -114,8 +114,8 @@ def test_a_result_that_tells_little_is_not_written(tmp_path: Path, capsys: Captu
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "give images of the target, or --camera; one of both"),
-        (["a.png", "--camera", "0"], "give images of the target, or --camera; one of both"),
+        ([], "give images of the target, or --camera; not both"),
+        (["a.png", "--camera", "0"], "give images of the target, or --camera; not both"),
         (["nowhere/*.png"], "no image files go by 'nowhere/*.png'"),
         (["--camera", "97"], "camera 97 does not open"),
         (["a.png", "--squares", "8"], "'8' is not two whole numbers, such as 8x11"),

@@ -216,7 +216,7 @@ def test_what_goes_on_later_ends_on_sigterm_as_on_ctrl_c(
 
     monkeypatch.setattr(evaluate, "run_evaluate", run)
     assert cli.main(["evaluate", "tabletop_six"]) == 130
-    assert "interrupted; the same command goes on from here" in capsys.readouterr().err
+    assert "interrupted; run the same command to continue" in capsys.readouterr().err
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
 
 

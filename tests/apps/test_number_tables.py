@@ -12,7 +12,7 @@ from burg_drake.apps.cli import main
 from burg_drake.apps.terminal import number_tables
 from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.terminal.number_text import figure
+from burg_drake.core.terminal.number_text import format_number
 
 Capture = pytest.CaptureFixture[str]
 
@@ -56,7 +56,7 @@ antipodal_angle [deg]     1,000        0    180     -
     ],
 )
 def test_short_numbers(value: float, text: str) -> None:
-    assert figure(value) == text
+    assert format_number(value) == text
     assert len(text) <= 8
 
 

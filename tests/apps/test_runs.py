@@ -59,8 +59,8 @@ def test_grasps_of_an_object_that_is_not_there(tmp_path: Path, capsys: Capture) 
     [
         (["--grasps-per-object", "0"], "'0' is not a whole number from 1"),
         (["--grasps-per-object", "many"], "'many' is not a whole number from 1"),
-        (["--approach-angle", "0"], "0 is not an angle above 0, at most 180 degrees"),
-        (["--approach-angle", "200"], "200 is not an angle above 0, at most 180 degrees"),
+        (["--approach-angle", "0"], "0 is not an angle in degrees above 0, at most 180"),
+        (["--approach-angle", "200"], "200 is not an angle in degrees above 0, at most 180"),
         (["--approach-angle", "steep"], "'steep' is not a finite number"),
         (["--seed", "-1"], "'-1' is not a whole number from 0"),
         (["--workers", "0"], "'0' is not a whole number from 1"),
@@ -143,7 +143,7 @@ def test_interrupted_evaluation_says_how_to_go_on(
     monkeypatch.setattr("burg_drake.evaluation.evaluate", interrupt)
     assert main(["evaluate", "tabletop_six", "-o", str(tmp_path / "run")]) == 130
     assert capsys.readouterr().err == (
-        "burg-drake: interrupted; the same command goes on from here\n"
+        "burg-drake: interrupted; run the same command to continue\n"
     )
 
 
@@ -293,7 +293,7 @@ def test_choice_of_grasps(run: Run, options: list[str], line: str, capsys: Captu
     [
         (["--only", "bux"], "has no grasps of 'bux'; did you mean 'box'? Known: box"),
         (["--outcome", "dropped"], "has no such grasps; choose other outcomes"),
-        (["--outcome", "lifte"], "'lifte' is no outcome; did you mean 'lifted'? Known: "),
+        (["--outcome", "lifte"], "'lifte' is not an outcome; did you mean 'lifted'? Known: "),
     ],
 )
 def test_bad_choice_of_grasps(run: Run, options: list[str], message: str, capsys: Capture) -> None:

@@ -33,7 +33,7 @@ def test_the_folder_of_the_scene_is_refused(
 ) -> None:
     arguments = ["scene", "export", str(scene_file), "--to", "sdf", "-o", str(scene_file.parent)]
     assert main(arguments) == 2
-    assert "has files in it and is no earlier export" in capsys.readouterr().err
+    assert "has files in it and is not an earlier export" in capsys.readouterr().err
     assert scene_file.exists()
 
 

@@ -98,7 +98,7 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
         assert message in capsys.readouterr().err
     with pytest.raises(SystemExit):  # before anything else is looked at
         trials("record", "none.yaml", "abc", "--time", "noon")
-    assert "'noon' is no time; give ISO 8601 such as" in capsys.readouterr().err
+    assert "'noon' is not a time; give ISO 8601 such as" in capsys.readouterr().err
     assert trial(sheet, 2).outcome is None
     assert trials("record", sheet, "1", "--outcome", "dropped", "--correct") == 0
     assert (trial(sheet, 1).outcome, trial(sheet, 1).note) == ("dropped", "wet")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.rectification.stream import board_looks
+from burg_drake.cameras.rectification.stream import board_observations
 from burg_drake.cameras.rectification.top_view import BoardPicture, BoardRectifier, board_picture
 from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError
@@ -139,7 +139,7 @@ def test_looks_at_files(plain: np.ndarray, tmp_path: Path) -> None:
     (tmp_path / "3.png").write_bytes(b"no image")
     cv2.imwrite(str(tmp_path / "4.png"), plain[::2, ::2])
     with open_source(tmp_path) as source:
-        looks = list(board_looks(source, BoardRectifier(BOARD, VGA)))
+        looks = list(board_observations(source, BoardRectifier(BOARD, VGA)))
     assert [look.picture is not None for look in looks] == [True, False, False, False]
     assert looks[0].reason == ""
     assert "no marker of the board in sight" in looks[1].reason
@@ -150,7 +150,7 @@ def test_looks_at_files(plain: np.ndarray, tmp_path: Path) -> None:
 def test_looks_at_a_camera_until_it_is_stopped(plain: np.ndarray) -> None:
     stop = threading.Event()
     camera = Pictures(plain, plain, plain, live=True)
-    looks = board_looks(camera, BoardRectifier(BOARD, VGA), period=0.01, stop=stop)
+    looks = board_observations(camera, BoardRectifier(BOARD, VGA), period=0.01, stop=stop)
     assert next(looks).picture is not None
     assert next(looks).picture is not None
     stop.set()

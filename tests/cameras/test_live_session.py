@@ -151,7 +151,7 @@ def test_settings_draw_the_same_frame_again(
     assert first is not None
     running.change(opacity=0.0, names=False)
     second = running.next_picture(first.number, TIMEOUT)
-    assert second is not None and second.sight is first.sight
+    assert second is not None and second.located is first.located
     assert (second.overlay != first.overlay).any()
     assert running.counts.frames == 1
     with pytest.raises(UnknownNameError):

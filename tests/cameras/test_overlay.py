@@ -161,7 +161,7 @@ def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
     view = FieldOfView(PINHOLE)
     lines = visible_lines(shape, view, X_SC)
     shades = np.full(len(shape.owner), 200, np.uint8)
-    owner = SurfaceCamera(shape, view).look(X_SC, lines, shades).owner
+    owner = SurfaceCamera(shape, view).render(X_SC, lines, shades).owner
     p = np.array([[0.0, -0.05, 0.01], [0.0, 0.05, 0.0], [0.0, -0.005, 0.1], [0.0, 0.0, 0.0]])
     x, y = np.round(PINHOLE.project((p - X_SC[:3, 3]) @ X_SC[:3, :3])).astype(int).T
     assert owner[y, x].tolist() == [0, 1, 1, 1]

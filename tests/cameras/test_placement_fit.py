@@ -53,7 +53,7 @@ def test_the_gain_says_how_a_measurement_moves_the_result() -> None:
     assert base is not None
     assert moved is not None
     np.testing.assert_allclose(
-        moved.step - base.step, base.gain[:, 17] * 1e-3, rtol=1e-3, atol=1e-12
+        moved.step - base.step, base.sensitivity[:, 17] * 1e-3, rtol=1e-3, atol=1e-12
     )
 
 

@@ -35,7 +35,7 @@ def test_noise_falls_with_the_square_root_of_the_window(window: float) -> None:
     pose_filter = PoseFilter(0.1, window=window)
     track, errors, normalised = Track(), [], []
     for k in range(3000):
-        track = pose_filter.follow(track, noisy(TRUTH, rng))
+        track = pose_filter.update(track, noisy(TRUTH, rng))
         assert track.X_SC is not None
         if k > 10 * window:
             errors.append(error(track.X_SC, TRUTH))
@@ -49,10 +49,10 @@ def test_a_moved_camera_is_followed_with_the_second_estimate() -> None:
     rng = np.random.default_rng(2)
     pose_filter, track = PoseFilter(0.1), Track()
     for _ in range(20):
-        track = pose_filter.follow(track, noisy(TRUTH, rng))
-    track = pose_filter.follow(track, noisy(MOVED, rng))
+        track = pose_filter.update(track, noisy(TRUTH, rng))
+    track = pose_filter.update(track, noisy(MOVED, rng))
     assert track.X_SC is not None and np.linalg.norm(error(track.X_SC, TRUTH)[3:]) < 1e-3
-    track = pose_filter.follow(track, noisy(MOVED, rng))
+    track = pose_filter.update(track, noisy(MOVED, rng))
     assert track.X_SC is not None and np.linalg.norm(error(track.X_SC, MOVED)[3:]) < 1e-3
 
 
@@ -60,12 +60,12 @@ def test_a_single_outlier_leaves_no_trace() -> None:
     rng = np.random.default_rng(3)
     pose_filter, tracks = PoseFilter(0.1), [Track()]
     for _ in range(20):
-        tracks.append(pose_filter.follow(tracks[-1], noisy(TRUTH, rng)))
-    tracks.append(pose_filter.follow(tracks[-1], noisy(MOVED, rng)))
+        tracks.append(pose_filter.update(tracks[-1], noisy(TRUTH, rng)))
+    tracks.append(pose_filter.update(tracks[-1], noisy(MOVED, rng)))
     assert tracks[-1].X_SC is tracks[-2].X_SC
     for _ in range(5):
-        tracks.append(pose_filter.follow(tracks[-1], noisy(TRUTH, rng)))
-    assert tracks[-1].strange == 0
+        tracks.append(pose_filter.update(tracks[-1], noisy(TRUTH, rng)))
+    assert tracks[-1].rejected_in_a_row == 0
     steps = [np.linalg.norm(error(b.X_SC, a.X_SC)[3:]) for a, b in pairwise(tracks[2:])]
     assert max(steps) < 1e-3
 

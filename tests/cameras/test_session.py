@@ -50,7 +50,7 @@ def image(scene: Scene) -> np.ndarray:
 
 
 def test_looks_and_draws(session: FrameProcessor, image: np.ndarray) -> None:
-    sight = session.look(Frame(image, None, 0.0, "a"))
+    sight = session.locate(Frame(image, None, 0.0, "a"))
     assert sight.estimate.valid
     assert np.linalg.norm(sight.estimate.X_SC[:3, 3] - camera_at(0.3)[:3, 3]) < 1e-3
     drawn = session.draw(sight, ViewSettings())
@@ -74,19 +74,19 @@ def test_steady(session: FrameProcessor, scene: Scene, image: np.ndarray) -> Non
         levels = picture + rng.normal(0.0, 12.0, picture.shape)
         return Frame(np.clip(levels, 0, 255).astype(np.uint8), None, 0.0, "a")
 
-    sights = [session.look(noisy(image), steady=True) for _ in range(20)]
+    sights = [session.locate(noisy(image), steady=True) for _ in range(20)]
     drawn = np.array([s.X_SC[:3, 3] for s in sights[5:]]).std(axis=0)
     estimated = np.array([s.estimate.X_SC[:3, 3] for s in sights[5:]]).std(axis=0)
     assert np.linalg.norm(drawn) < 0.6 * np.linalg.norm(estimated)
     elsewhere = board_image(scene.board, CAMERA, camera_at(0.33))
-    moved = [session.look(noisy(elsewhere), steady=True) for _ in range(2)][-1]
+    moved = [session.locate(noisy(elsewhere), steady=True) for _ in range(2)][-1]
     assert np.array_equal(moved.X_SC, moved.estimate.X_SC)
-    assert session.look(noisy(image)).X_SC[0, 3] == pytest.approx(0.3, abs=2e-3)
+    assert session.locate(noisy(image)).X_SC[0, 3] == pytest.approx(0.3, abs=2e-3)
 
 
 def test_without_a_board_the_picture_says_so(session: FrameProcessor) -> None:
     empty = np.full((240, 320, 3), 90, dtype=np.uint8)
-    sight = session.look(Frame(empty, None, 0.0, "a"))
+    sight = session.locate(Frame(empty, None, 0.0, "a"))
     assert not sight.estimate.valid
     drawn = session.draw(sight, ViewSettings())
     assert 0 < (drawn != empty).any(axis=-1).sum() < 0.3 * empty[..., 0].size
@@ -96,7 +96,7 @@ def test_print_scale(scene: Scene) -> None:
     """A board printed at 97 %, and told so, is seen where it is."""
     picture = board_image(scene.board, CAMERA, camera_at(0.3), scale=(0.97, 0.97))
     told = FrameProcessor(scene, CAMERA, print_scale=(0.97, 0.97))
-    estimate = told.look(Frame(picture, None, 0.0, "a")).estimate
+    estimate = told.locate(Frame(picture, None, 0.0, "a")).estimate
     assert np.linalg.norm(estimate.X_SC[:3, 3] - camera_at(0.3)[:3, 3]) < 1e-3
 
 

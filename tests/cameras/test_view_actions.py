@@ -74,7 +74,7 @@ def test_snapshot_of_the_picture(
     assert np.array_equal(taken.image, image)
     assert np.array_equal(taken.overlay, picture.overlay)
     assert taken.document.source == "picture 1" and taken.document.X_SC_drawn is None
-    elsewhere = replace(picture, sight=replace(picture.sight, X_SC=camera_at(0.31)))
+    elsewhere = replace(picture, located=replace(picture.located, X_SC=camera_at(0.31)))
     steady = load_snapshot(actions.snapshot(picture=elsewhere)).document
     assert steady.X_SC_drawn is not None and steady.board == taken.document.board
     assert np.allclose(steady.X_SC_drawn.matrix(), camera_at(0.31))
@@ -94,7 +94,7 @@ def test_check_of_an_empty_board(scene: Scene, image: np.ndarray, tmp_path: Path
     assert not actions.checking
     shown = running.next_picture(picture.number, TIMEOUT)
     assert shown is not None and shown.placement is running.placement is not None
-    assert set(shown.placement.instances) == set(running.session.scene.instances)
+    assert set(shown.placement.instances) == set(running.processor.scene.instances)
     assert {placed.status for placed in shown.placement.instances.values()} <= {
         "not_seen",
         "uncertain",

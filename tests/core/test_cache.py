@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core import cache
-from burg_drake.core.cache import Arrays, cache_folder, kept
+from burg_drake.core.cache import Arrays, cache_folder, cached
 
 KEY = "0123456789abcdef" * 4
 ARRAYS = {"x": np.array([0.1, np.nan, -0.0]), "k": np.arange(6).reshape(2, 3), "b": np.array(True)}
@@ -45,11 +45,11 @@ def entry(folder: Path) -> Path:
 
 
 def test_what_is_kept_is_not_computed_again(folder: Path) -> None:
-    assert_same(kept("thing", KEY, compute))
-    assert_same(kept("thing", KEY, never))
+    assert_same(cached("thing", KEY, compute))
+    assert_same(cached("thing", KEY, never))
     for other in (("thing", KEY[::-1]), ("another", KEY)):
         with pytest.raises(AssertionError, match="once more"):
-            kept(*other, never)
+            cached(*other, never)
 
 
 def cut(path: Path) -> None:
@@ -74,12 +74,12 @@ def objects(path: Path) -> None:
 def test_a_damaged_entry_is_told_and_replaced(
     folder: Path, damage: Callable[[Path], None], caplog: pytest.LogCaptureFixture
 ) -> None:
-    kept("thing", KEY, compute)
+    cached("thing", KEY, compute)
     damage(entry(folder))
-    assert_same(kept("thing", KEY, compute))
+    assert_same(cached("thing", KEY, compute))
     (line,) = caplog.messages
     assert str(entry(folder)) in line and line.endswith("; it is computed anew")
-    assert_same(kept("thing", KEY, never))
+    assert_same(cached("thing", KEY, never))
 
 
 def test_an_entry_of_another_version_is_told_and_replaced(
@@ -87,24 +87,24 @@ def test_an_entry_of_another_version_is_told_and_replaced(
 ) -> None:
     kinds = ("thing", "another")
     for kind in kinds:
-        kept(kind, KEY, compute)
-    monkeypatch.setattr(cache, "_makers", lambda: ("another",))
+        cached(kind, KEY, compute)
+    monkeypatch.setattr(cache, "_code_version", lambda: ("another",))
     for kind in kinds:
-        assert_same(kept(kind, KEY, compute))
+        assert_same(cached(kind, KEY, compute))
     assert caplog.messages == [
         f"cache: what {folder} has was made by another version; what is needed is computed anew"
     ]
     for kind in kinds:
-        assert_same(kept(kind, KEY, never))
+        assert_same(cached(kind, KEY, never))
 
 
 def test_a_package_without_metadata_is_no_obstacle(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cache, "MAKERS", ("numpy", "built-from-source"))
-    monkeypatch.setattr(cache, "_makers", cache._makers.__wrapped__)
-    assert_same(kept("thing", KEY, compute))
-    assert_same(kept("thing", KEY, never))
+    monkeypatch.setattr(cache, "VERSIONED_PACKAGES", ("numpy", "built-from-source"))
+    monkeypatch.setattr(cache, "_code_version", cache._code_version.__wrapped__)
+    assert_same(cached("thing", KEY, compute))
+    assert_same(cached("thing", KEY, never))
 
 
 def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
@@ -113,9 +113,9 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     (tmp_path / "file").write_text("not a folder")
     for place in (tmp_path / "file", tmp_path / "file" / "below", Path("/proc/none")):
         monkeypatch.setenv("BURG_DRAKE_CACHE", str(place))
-        assert_same(kept("thing", KEY, compute))
+        assert_same(cached("thing", KEY, compute))
     monkeypatch.setenv("BURG_DRAKE_CACHE", "off")
-    assert_same(kept("thing", KEY, compute))
+    assert_same(cached("thing", KEY, compute))
     assert (tmp_path / "file").read_text() == "not a folder"
     assert not caplog.messages
 
@@ -127,21 +127,21 @@ def test_the_entries_longest_unused_go_first(folder: Path, monkeypatch: pytest.M
     killed.write_text("unfinished")
     os.utime(killed, (1.0, 1.0))
     for k in range(4):
-        kept(f"thing-{k}", KEY, compute)
+        cached(f"thing-{k}", KEY, compute)
         os.utime(folder / f"thing-{k}-{KEY[:32]}.npz", (100.0 * k, 100.0 * k))
     size = (folder / f"thing-0-{KEY[:32]}.npz").stat().st_size
-    kept("thing-0", KEY, never)  # marks it as in use
+    cached("thing-0", KEY, never)  # marks it as in use
     monkeypatch.setattr(cache, "MOST_BYTES", 3 * size)
-    kept("thing-4", KEY, compute)
+    cached("thing-4", KEY, compute)
     left = {path.name.removesuffix(f"-{KEY[:32]}.npz") for path in folder.iterdir()}
     assert left == {"thing-0", "thing-3", "thing-4", "notes.txt"}
 
 
 def test_several_processes_at_once(folder: Path) -> None:
     program = (
-        "import numpy as np; from burg_drake.core.cache import kept\n"
+        "import numpy as np; from burg_drake.core.cache import cached\n"
         "for k in range(30):\n"
-        "    x = kept('thing', f'{k % 5}' * 64, lambda: {'x': np.full(20_000, k % 5)})['x']\n"
+        "    x = cached('thing', f'{k % 5}' * 64, lambda: {'x': np.full(20_000, k % 5)})['x']\n"
         "    assert (x == k % 5).all() and len(x) == 20_000"
     )
     running = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.files.decimal_text import PLACES, on_grid, row_texts
+from burg_drake.core.files.decimal_text import PLACES, format_rows, rounded_to_places
 
 
 def values() -> np.ndarray:
@@ -13,29 +13,31 @@ def values() -> np.ndarray:
     whole = np.array([[0.0, -0.0, 1.0, -1.0, 8999.0, -9000.0, 9000.000000000001, 1e-12, -1e-12]])
     wide = rng.normal(size=(200, 9)) * 10.0 ** rng.integers(-13, 4, (200, 9))
     extreme = np.array([[1e300, -1e-300, 5e-324, 1e16, 123456.789, 0.1, 0.3, -2.5, 1e-13]])
-    return np.concatenate([whole, wide, on_grid(wide), extreme])
+    return np.concatenate([whole, wide, rounded_to_places(wide), extreme])
 
 
 @pytest.mark.parametrize("separator", [",", ", "])
 def test_rows_read_back_bit_by_bit(separator: str) -> None:
-    rows = row_texts(values(), separator)
+    rows = format_rows(values(), separator)
     read = np.array([[float(text) for text in row.split(separator)] for row in rows])
     np.testing.assert_array_equal(read.view(np.int64), values().view(np.int64))
 
 
 def test_numbers_on_the_grid_are_as_short_as_python_has_them() -> None:
-    grid = on_grid(values()[:-1])
+    grid = rounded_to_places(values()[:-1])
     grid = grid[np.abs(grid).max(axis=1) <= 9000.0]
     grid[np.abs(grid) < 1e-3] = 0.5  # for small ones Python has exponents
-    assert row_texts(grid) == [",".join(map(repr, row)) for row in grid.tolist()]
+    assert format_rows(grid) == [",".join(map(repr, row)) for row in grid.tolist()]
 
 
 def test_the_grid_is_the_nearest_decimal() -> None:
     given = values()[np.abs(values()).max(axis=1) < 9000.0]
     expected = [[float(f"{x:.{PLACES}f}") for x in row] for row in given.tolist()]
-    np.testing.assert_allclose(on_grid(given), expected, rtol=5e-16, atol=1.01 * 10.0**-PLACES)
+    np.testing.assert_allclose(
+        rounded_to_places(given), expected, rtol=5e-16, atol=1.01 * 10.0**-PLACES
+    )
 
 
 def test_no_rows_and_no_numbers() -> None:
-    assert row_texts(np.zeros((0, 3))) == []
-    assert row_texts(np.zeros((2, 0))) == ["", ""]
+    assert format_rows(np.zeros((0, 3))) == []
+    assert format_rows(np.zeros((2, 0))) == ["", ""]

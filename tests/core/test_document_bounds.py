@@ -95,7 +95,7 @@ def test_only_regular_files_of_some_size_are_read(tmp_path: Path) -> None:
         tmp_path / "large": "it has more than 16 MiB",
         tmp_path / "binary": "it is not a text file",
         tmp_path / "none": "No such file",
-        "a\0b": "it is no path",
+        "a\0b": "it is not a path",
     }.items():
         with pytest.raises(DocumentError, match=f"^cannot read .*: {said}"):
             read_text(place)

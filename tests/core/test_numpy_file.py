@@ -12,7 +12,7 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.numpy_file import npy_shape, open_npy, open_npz, write_npy
-from burg_drake.core.files.read_errors import reading
+from burg_drake.core.files.read_errors import reporting_read_errors
 
 
 def header(shape: tuple[int, ...], dtype: str = "<f8") -> bytes:
@@ -92,9 +92,12 @@ def test_errors_of_others_become_one_line_that_names_the_file() -> None:
         ValueError("9" * 1000): "9" * 200 + "...",
     }.items():
         message = rf"^a.b is not good: {re.escape(said)}$"
-        with pytest.raises(InvalidInputError, match=message), reading("a.b", "good"):
+        with pytest.raises(InvalidInputError, match=message), reporting_read_errors("a.b", "good"):
             raise error
-    with pytest.raises(InvalidInputError, match=r"^a.b: width is bad$"), reading("a.b", "good"):
+    with (
+        pytest.raises(InvalidInputError, match=r"^a.b: width is bad$"),
+        reporting_read_errors("a.b", "good"),
+    ):
         raise InvalidInputError("width is bad")
-    with pytest.raises(InvalidInputError, match=r"^in a.b$"), reading("a.b", "good"):
+    with pytest.raises(InvalidInputError, match=r"^in a.b$"), reporting_read_errors("a.b", "good"):
         raise InvalidInputError("in a.b")

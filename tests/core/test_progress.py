@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.terminal.progress import Pace, Progress, Reporter
+from burg_drake.core.terminal.progress import Progress, ProgressMeter, Reporter
 
 Capture = pytest.CaptureFixture[str]
 
@@ -32,7 +32,7 @@ def test_rate_and_time_left_count_from_when_the_clock_started() -> None:
 def test_setting_up_does_not_count() -> None:
     """Ten results are known from before, the first new one takes long to come."""
     clock, events = Clock(), list[Progress]()
-    pace = Pace(events.append, Progress("starting", 10, 31), "judging", clock=clock)
+    pace = ProgressMeter(events.append, Progress("starting", 10, 31), "judging", clock=clock)
     clock.now += 100.0
     pace.step()
     assert events[-1].remaining is None
@@ -47,7 +47,7 @@ def test_work_that_differs_is_weighed() -> None:
     """Two hard questions of 10 s, the rest of 1 s: by their number there would be 18 s left."""
     clock, events = Clock(), list[Progress]()
     expected = Progress("starting", total=21, left=60.0)
-    pace = Pace(events.append, expected, "testing", work=9 * 10.0 + 12.0, clock=clock)
+    pace = ProgressMeter(events.append, expected, "testing", work=9 * 10.0 + 12.0, clock=clock)
     assert events[-1].remaining == 60.0
     for cost in (1.0, 1.0, 1.0, 10.0):
         clock.now += cost
@@ -57,7 +57,7 @@ def test_work_that_differs_is_weighed() -> None:
 
 def test_what_costs_nothing_does_not_make_the_rest_look_cheap() -> None:
     clock, events = Clock(), list[Progress]()
-    pace = Pace(events.append, Progress("building", total=50), clock=clock)
+    pace = ProgressMeter(events.append, Progress("building", total=50), clock=clock)
     pace.skip(40, note="cached")
     clock.now += 30.0
     pace.step(note="mug built")
@@ -71,7 +71,7 @@ def test_without_a_terminal_there_is_a_line_every_half_minute(capsys: Capture) -
         reporter.show(Progress("sampling"))
         clock.now += 6.0
         event = Progress("starting", total=1000, outcomes=outcomes)
-        pace = Pace(reporter.show, event, "judging", clock=clock)
+        pace = ProgressMeter(reporter.show, event, "judging", clock=clock)
         for _ in range(1000):
             clock.now += 0.125
             pace.step(outcome=Outcome.LIFTED)
@@ -90,7 +90,7 @@ def test_without_a_terminal_there_is_a_line_every_half_minute(capsys: Capture) -
 def test_what_ends_within_seconds_says_that_it_is_starting(capsys: Capture) -> None:
     clock = Clock()
     with Reporter(True, clock=clock) as reporter:
-        pace = Pace(reporter.show, Progress("starting", total=4), "judging", clock=clock)
+        pace = ProgressMeter(reporter.show, Progress("starting", total=4), "judging", clock=clock)
         for _ in range(4):
             clock.now += 1.0
             pace.step()
@@ -99,7 +99,7 @@ def test_what_ends_within_seconds_says_that_it_is_starting(capsys: Capture) -> N
 
 def test_what_is_done_already_says_nothing(capsys: Capture) -> None:
     with Reporter(True, clock=Clock()) as reporter:
-        Pace(reporter.show, Progress("starting", 4, 4), "judging")
+        ProgressMeter(reporter.show, Progress("starting", 4, 4), "judging")
         reporter.show(Progress("building", 1, 2))
     assert capsys.readouterr().err == ""
 
@@ -108,7 +108,7 @@ def test_slow_work_is_told_by_the_minute(capsys: Capture) -> None:
     clock = Clock()
     with Reporter(True, clock=clock) as reporter:
         event = Progress("building", total=3, unit="objects", left=75.0)
-        pace = Pace(reporter.show, event, clock=clock)
+        pace = ProgressMeter(reporter.show, event, clock=clock)
         clock.now += 40.0
         pace.step(note="mug built")
     assert capsys.readouterr().err.splitlines() == [

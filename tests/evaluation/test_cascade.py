@@ -473,7 +473,7 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
         raise InvalidInputError("'left' and 'right' overlap")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.station.checks.require_sound_scene", refuse)
+        patch.setattr("burg_drake.station.checks.require_valid_scene", refuse)
         with pytest.raises(InvalidInputError, match="overlap"):
             evaluate(scene, station, tmp_path / "run", progress=False)
     assert not (tmp_path / "run").exists()

@@ -24,8 +24,11 @@ def test_short_forms() -> None:
     assert found.address == "tls://head.example.org:8786"
     for text, message in (
         ("local:0", "local:0 has no workers; give local:1 or more"),
-        ("head:8786", "'head:8786' is no cluster; give local:N, tls://HOST:PORT or a cluster.yaml"),
-        ("http://head", "'http://head' is no address of a scheduler; write tls://HOST:PORT"),
+        (
+            "head:8786",
+            "'head:8786' is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml",
+        ),
+        ("http://head", "'http://head' is not an address of a scheduler; write tls://HOST:PORT"),
         ("missing.yaml", "missing.yaml does not exist"),
     ):
         with pytest.raises(BurgError) as refused:

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
-from burg_drake.core.terminal.number_text import duration
+from burg_drake.core.terminal.number_text import format_duration
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.results.summary import (
     OutcomeCounts,
@@ -138,5 +138,5 @@ def test_many_objects_become_a_list(run: Run) -> None:
 
 
 def test_numbers_are_written_for_people() -> None:
-    texts = [duration(s) for s in (0.25, 0.0021, 3.5e-5, 12.34, 5000.0, np.nan)]
+    texts = [format_duration(s) for s in (0.25, 0.0021, 3.5e-5, 12.34, 5000.0, np.nan)]
     assert texts == ["250 ms", "2.1 ms", "35 µs", "12.3 s", "5,000 s", "-"]

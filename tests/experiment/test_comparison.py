@@ -270,7 +270,7 @@ def test_predicted_probability_comes_from_a_table_of_robustness(tmp_path: Path) 
     named = {c.name: c for c in compare(first, second).judgement.calibration}
     assert named["probability"].trials == 10 and named["probability"].without == 2
     (tmp_path / "bad.csv").write_text("id,outcome\na,b\n")
-    with pytest.raises(InvalidInputError, match="no table of robustness"):
+    with pytest.raises(InvalidInputError, match="not a table of robustness"):
         compare(first, second, robustness=tmp_path / "bad.csv")
 
 
@@ -339,7 +339,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert main(["compare", str(first.path), *wrong]) == 2
         assert capsys.readouterr().err.startswith("burg-drake: error: ")
     assert main(["compare", str(sheet), str(first.path)]) == 2
-    assert "is no run; give the run first" in capsys.readouterr().err
+    assert "is not a run; give the run first" in capsys.readouterr().err
     assert OFFERED == SUCCESSES and DEFAULT_LIMIT_MM == LIMIT_MM
 
 

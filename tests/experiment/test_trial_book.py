@@ -47,7 +47,7 @@ def test_writers_at_once_lose_nothing(tmp_path: Path) -> None:
     assert [trial.note for trial in sheet.trials] == [f"by {n}" for n in range(1, 41)]
     assert {trial.outcome for trial in sheet.trials} == {RealOutcome.SLIPPED}
     book = TrialBook(path)
-    assert len(book.entries()) == 40 and book.lacking() == []
+    assert len(book.entries()) == 40 and book.missing_values() == []
 
 
 def test_what_was_told_before_a_kill_is_there(tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str)
     book = TrialBook(path)
     assert book.sheet() == make_sheet()
     journalled = step == "atomic_write"
-    assert [found.number for found in book.lacking()] == [2] * journalled
+    assert [found.number for found in book.missing_values()] == [2] * journalled
     if journalled:
         (restored,) = book.restore()
         assert (restored.outcome, restored.note) == (RealOutcome.SLIPPED, "by 2")
@@ -146,15 +146,15 @@ def test_an_old_buffer_loses_nothing_and_an_edit_is_kept(tmp_path: Path) -> None
     book.record(3, outcome="lifted")
     edited = buffer.replace("- number: 3\n", "- number: 3\n    outcome: dropped\n")
     path.write_text(edited)
-    lost = {found.number: found for found in book.lacking()}
+    lost = {found.number: found for found in book.missing_values()}
     assert lost[2].values.keys() == {"outcome", "note", "time"}
     assert lost[3].edited == ("outcome",) and "outcome" not in lost[3].values
     book.restore([2])
     assert book.sheet().trial(2).note == "wet"
-    assert [found.number for found in book.lacking()] == [3]
+    assert [found.number for found in book.missing_values()] == [3]
     before = path.read_text()
     book.keep()
-    assert book.lacking() == [] and path.read_text() == before
+    assert book.missing_values() == [] and path.read_text() == before
     path.write_text(edited)
     book.restore()
     assert book.sheet().trial(2).note == "wet"
@@ -165,7 +165,7 @@ def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path) -> None:
     path = write_sheet(tmp_path)
     TrialBook(path).record(1, outcome="lifted")
     path.write_text(path.read_text().replace("mug-0001", "mug-0f01"))
-    assert TrialBook(path).lacking() == []
+    assert TrialBook(path).missing_values() == []
 
 
 TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=40)

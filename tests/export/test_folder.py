@@ -50,7 +50,7 @@ def test_an_earlier_export_is_replaced_whole(tmp_path: Path) -> None:
 def test_somebody_elses_folder_stays(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.tex").write_text("years of work")
-    with pytest.raises(InvalidInputError, match="has files in it and is no earlier export"):
+    with pytest.raises(InvalidInputError, match="has files in it and is not an earlier export"):
         export(tmp_path / "out", a="1")
     assert names(tmp_path / "out") == {"thesis.tex"}
 

@@ -212,7 +212,7 @@ MIRRORED = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
     [
         ((0, 0, 0, np.nan, np.eye(3), (0, 0, 0), 0), "row 1 has depth nan; it has to be in metres"),
         ((0, 0, 0, 20.0, np.eye(3), (0, 0, 0), 0), "row 1 has depth 20; it has to be in metres"),
-        ((0, 0, 0, 0.02, np.zeros((3, 3)), (0, 0, 0), 0), r"columns 4 to 15\[1\] is no rotation"),
+        ((0, 0, 0, 0.02, np.zeros((3, 3)), (0, 0, 0), 0), r"columns 4 to 15\[1\] is not a"),
         ((0, 0, 0, 0.02, MIRRORED, (0, 0, 0), 0), r"columns 4 to 15\[1\] is a mirror image"),
         ((0, 0, 0, 0.02, np.eye(3), (0, np.inf, 0), 0), r"columns 4 to 15\[1\] has NaN or inf"),
     ],

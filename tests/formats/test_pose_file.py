@@ -52,7 +52,7 @@ def test_a_colon_may_be_part_of_a_name(folder: Path) -> None:
         ("camera.yaml:0", "holds one pose; leave out ':0'"),
         ("flat.npy", r"has shape \(16,\); expected \(4, 4\) or"),
         ("stacked.npy", r"has shape \(1, 2, 4, 4\); expected \(4, 4\) or"),
-        ("skew.npy", r"pose 0\[0\] is no rotation"),
+        ("skew.npy", r"pose 0\[0\] is not a rotation"),
         ("missing.npy", "cannot read"),
         ("missing.yaml", "cannot read"),
         ("bad.yaml", "unknown key 'position'"),

@@ -50,8 +50,8 @@ def test_four_decimals_become_the_nearest_rotation_with_a_note(poses: Array) -> 
     [
         (lambda X: X.__setitem__((3, 0, 0), np.nan), r"file: key\[3\] has NaN or infinite"),
         (lambda X: X.__setitem__((3, 2, 3), np.inf), r"file: key\[3\] has NaN or infinite"),
-        (lambda X: X.__setitem__((3, slice(0, 3), 0), 0.0), r"file: key\[3\] is no rotation"),
-        (lambda X: X.__setitem__(3, X[3] * [[2.0], [2.0], [2.0], [1.0]]), r"\[3\] is no rotation"),
+        (lambda X: X.__setitem__((3, slice(0, 3), 0), 0.0), r"file: key\[3\] is not a rotation"),
+        (lambda X: X.__setitem__(3, X[3] * [[2.0], [2.0], [2.0], [1.0]]), r"\[3\] is not a"),
         (lambda X: X.__setitem__((3, 3, 0), 0.5), r"file: key\[3\] has a last row other than"),
         (lambda X: X.__setitem__((3, slice(0, 3), 0), -X[3, :3, 0]), r"\[3\] is a mirror image"),
     ],

@@ -47,8 +47,8 @@ def test_the_same_bytes_by_workers_and_after_a_kill(
     program = (
         "import burg_drake as burg\n"
         "from burg_drake.core.documents.schema import load_document\n"
-        "from burg_drake.scene.document.origin import Ingredients\n"
-        f"recipe = load_document({str(whole / 'recipe.yaml')!r}, Ingredients).recipe\n"
+        "from burg_drake.scene.document.origin import SamplingProvenance\n"
+        f"recipe = load_document({str(whole / 'recipe.yaml')!r}, SamplingProvenance).recipe\n"
         "library, station = burg.load_library('household'), burg.load_station('panda_tabletop')\n"
         f"burg.sample_scenes(recipe, library, station, {str(part)!r}, 12, workers=2)\n"
     )

@@ -51,7 +51,7 @@ def test_a_chain_leads_over_the_grasp_to_the_top_of_the_lift(search: ClosedFormL
     (chain,) = begin(search, ABOVE).propose([0])
     assert chain is not None
     X = panda_forward(chain.q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
-    goal = (ABOVE, swap_fingers(ABOVE))[chain.way]
+    goal = (ABOVE, swap_fingers(ABOVE))[chain.flip]
     np.testing.assert_allclose(X[chain.at_grasp], goal, atol=1e-9)
     np.testing.assert_allclose(X[0, :3, 3], goal[:3, 3] - 0.1 * goal[:3, 2], atol=1e-9)
     np.testing.assert_allclose(X[-1, :3, 3], goal[:3, 3] + (0.0, 0.0, 0.3), atol=1e-9)
@@ -138,9 +138,9 @@ def test_a_way_that_is_closed_is_not_proposed(search: ClosedFormLineSearch) -> N
     lines = begin(search, ABOVE, ABOVE)
     first, second = lines.propose([0, 1])
     assert first is not None and second is not None
-    lines.close(0, first.way)
+    lines.close(0, first.flip)
     other, same = lines.propose([0, 1])
     assert other is not None and same is not None
-    assert other.way != first.way and same.way == second.way
-    lines.close(0, other.way)
+    assert other.flip != first.flip and same.flip == second.flip
+    lines.close(0, other.flip)
     assert lines.propose([0]) == [None]

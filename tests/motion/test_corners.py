@@ -37,7 +37,7 @@ def test_limits_hold_and_one_is_used_up(seed: int) -> None:
     q, limits = corners(seed, 2 + seed % 4), arm()
     for is_free in (anything, None):
         motion = time_polyline(q, limits, deviation=0.2, is_free=is_free)
-        assert limits.stretch(motion.peaks()) == pytest.approx(1.0, abs=1e-6)
+        assert limits.time_scale(motion.peaks()) == pytest.approx(1.0, abs=1e-6)
         np.testing.assert_allclose(motion.q[[0, -1]], q[[0, -1]], atol=1e-9)
         np.testing.assert_allclose([motion.v[-1], motion.a[-1]], np.zeros((2, 7)), atol=1e-8)
         assert distance_to_polyline(dense(motion), q).max() <= (0.2 if is_free else 1e-9)

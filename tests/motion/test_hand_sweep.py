@@ -1,4 +1,5 @@
-"""The hand's straight ways against dense samples in Drake, and in scenes with known clearances."""
+"""The hand's straight segments against dense samples in Drake, and in scenes with known
+clearances."""
 
 from __future__ import annotations
 

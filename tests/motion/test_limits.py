@@ -97,7 +97,7 @@ def test_a_station_file_states_limits(tmp_path: Path) -> None:
 def test_stretching_by_the_factor_meets_the_tightest_limit() -> None:
     panda = limits(load_station("panda_tabletop"))
     peaks = tuple(np.random.default_rng(0).uniform(0.1, 9.0, 7) for _ in range(3))
-    factor = panda.stretch(peaks)
+    factor = panda.time_scale(peaks)
     v, a, j = (peak / factor ** (k + 1) for k, peak in enumerate(peaks))
     used = np.array([v / panda.velocity, a / panda.acceleration, j / panda.jerk])
     assert used.max() == pytest.approx(1.0, rel=1e-12)
@@ -107,4 +107,4 @@ def test_slowed_limits_are_those_of_the_slower_motion() -> None:
     panda = limits(load_station("panda_tabletop"))
     peaks = (panda.velocity, panda.acceleration, panda.jerk)
     half = tuple(peak * 0.5 ** (k + 1) for k, peak in enumerate(peaks))
-    assert panda.slowed(0.5).stretch(half) == pytest.approx(1.0, rel=1e-12)
+    assert panda.slowed(0.5).time_scale(half) == pytest.approx(1.0, rel=1e-12)

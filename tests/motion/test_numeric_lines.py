@@ -29,8 +29,8 @@ from burg_drake.station.document.station_document import load_station
 SETTINGS = ReachSettings()
 MOTION = GraspMotion()
 CLEARANCE = 2e-3
-"""Of the hand on its way [m]; lets it be beside the straight way by half of it, but by no more than
-`SETTINGS.deviation[1]`."""
+"""Of the hand on its way [m]; lets it be beside the straight segment by half of it, but by no more
+than `SETTINGS.deviation[1]`."""
 
 
 class Arm:
@@ -129,7 +129,7 @@ def test_the_hand_goes_straight(station: str, request: pytest.FixtureRequest) ->
     arm: Arm = request.getfixturevalue(station)
     X_AG = arm.X_AG(arm.grasps(8, seed=7))
     chains = arm.numeric().begin(X_AG, np.full((8, 2), CLEARANCE)).propose(range(8))
-    found = [(X[c.way], c) for X, c in zip(X_AG, chains, strict=True) if c is not None]
+    found = [(X[c.flip], c) for X, c in zip(X_AG, chains, strict=True) if c is not None]
     assert len(found) >= 5
     for X, chain in found:
         check_straight(arm, X, chain)
@@ -227,7 +227,7 @@ def test_a_verdict_does_not_depend_on_the_batch(ur5e: Arm) -> None:
         assert (chain is None) == (alone is None)
         if chain is not None and alone is not None:
             np.testing.assert_array_equal(chain.q, alone.q)
-            assert chain.way == alone.way
+            assert chain.flip == alone.flip
 
 
 def test_out_of_reach(ur5e: Arm) -> None:

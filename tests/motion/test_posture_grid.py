@@ -70,7 +70,7 @@ def doubts(grid: PostureGrid) -> np.ndarray:
 
 def cost_of(grid: PostureGrid, i: int, place: GridChain) -> float:
     places = [
-        (p, i, place.way, place.branch[p], place.parameter[p]) for p in range(len(place.branch))
+        (p, i, place.flip, place.branch[p], place.parameter[p]) for p in range(len(place.branch))
     ]
     q = np.array([grid.q[(slice(None), *at)] for at in places])
     doubt = sum(float(doubts(grid)[at]) for at in places)
@@ -156,17 +156,17 @@ def test_refused_postures_and_cut_steps_are_avoided(grid: PostureGrid) -> None:
         (place,) = grid.best(np.array([0]), DOUBT)
         if place is None or len(seen) == 8:
             break
-        step = (place.way, *place.branch[1:3].tolist(), *place.parameter[1:3].tolist())
+        step = (place.flip, *place.branch[1:3].tolist(), *place.parameter[1:3].tolist())
         assert step not in seen
         seen.append(step)
         grid.cut(0, 1, place)
     assert len(seen) == 8
     (place,) = grid.best(np.array([0]), DOUBT)
     assert place is not None
-    grid.refused[3, 0, place.way, place.branch[3], place.parameter[3]] = True
+    grid.refused[3, 0, place.flip, place.branch[3], place.parameter[3]] = True
     (other,) = grid.best(np.array([0]), DOUBT)
-    assert other is None or (other.way, other.branch[3], other.parameter[3]) != (
-        place.way,
+    assert other is None or (other.flip, other.branch[3], other.parameter[3]) != (
+        place.flip,
         place.branch[3],
         place.parameter[3],
     )
@@ -183,6 +183,6 @@ def test_a_chain_does_not_depend_on_the_batch(grid: PostureGrid) -> None:
             assert together[i] is None
             continue
         place = together[i]
-        assert place is not None and place.way == alone.way
+        assert place is not None and place.flip == alone.flip
         np.testing.assert_array_equal(place.branch, alone.branch)
         np.testing.assert_array_equal(place.parameter, alone.parameter)

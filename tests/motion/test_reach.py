@@ -157,7 +157,7 @@ def test_a_witness_leads_from_home_straight_to_the_grasp_and_straight_up(
 def on_line(
     rows: np.ndarray, X_WG: np.ndarray, direction: np.ndarray, begin: float, end: float
 ) -> float:
-    """How far the hand strays from its straight way [m, and rad on a lever of 0.1 m]."""
+    """How far the hand strays from its straight segment [m, and rad on a lever of 0.1 m]."""
     halfway = 0.5 * (rows[1:] + rows[:-1])
     X = grasp_by_dh(np.concatenate([rows, halfway]))
     p = X[:, :3, 3] - X_WG[:3, 3]

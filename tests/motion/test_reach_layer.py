@@ -11,7 +11,11 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rot_z, rotation_from_rpy, transform_points
 from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.workspace.reach_layer import ReachLayer, asked_where_needed, reach_from_above
+from burg_drake.motion.workspace.reach_layer import (
+    ReachLayer,
+    answers_by_refinement,
+    reach_from_above,
+)
 from burg_drake.motion.workspace.station_check import empty_scene
 from burg_drake.scene.document.scene import Board
 from burg_drake.station.document.station_document import Station, load_station
@@ -79,12 +83,12 @@ def test_points_that_are_asked() -> None:
         asked[j, i] += 1
         return disc[j, i][:, None]
 
-    found = asked_where_needed(40, 50, 1, ask)[..., 0]
+    found = answers_by_refinement(40, 50, 1, ask)[..., 0]
     assert (found == disc).mean() > 0.99
     assert asked.max() == 1
     assert asked.sum() < 0.35 * disc.size
     np.testing.assert_array_equal(
-        asked_where_needed(1, 1, 1, lambda j, i: disc[17:18, 21:22]), True
+        answers_by_refinement(1, 1, 1, lambda j, i: disc[17:18, 21:22]), True
     )
 
 

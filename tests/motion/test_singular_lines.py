@@ -1,5 +1,5 @@
-"""Grasps whose straight ways pass near postures with the upper arm upright or a folded wrist, where
-the redundant joint is a poor parameter.
+"""Grasps whose straight segments pass near postures with the upper arm upright or a folded wrist,
+where the redundant joint is a poor parameter.
 
 Each has been proven by `benchmarks/reach_prover.py`, which shares no inverse kinematics, no search
 and no collision checker with the reach check.

@@ -210,7 +210,7 @@ def test_a_csv_alone_is_the_motion(plan: Plan, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError) as error:
         load_plan(path, scene=scene)
     assert str(error.value) == (
-        f"{path} does not tell which scene and arm it is for; of a CSV that is in the file"
+        f"{path} does not say which scene and arm it is for; of a CSV that is in the file"
         " NAME.csv-metadata.json beside it"
     )
 
@@ -287,7 +287,7 @@ def test_files_that_are_no_plans(plan: Plan, tmp_path: Path) -> None:
     plan.to_json(path)
     document = json.loads(path.read_text())
     for change, message in (
-        ({"format": "else"}, "is no plan"),
+        ({"format": "else"}, "is not a plan"),
         ({"version": 9}, "has version 9; this release reads 1"),
     ):
         path.write_text(json.dumps(document | change))
@@ -407,7 +407,8 @@ def test_a_damaged_csv_is_refused(
     with pytest.raises(InvalidInputError) as error:
         load_plan(path)
     text = str(error.value)
-    assert text.startswith(f"{path}: the plan is damaged: {what}" if what else f"{path} is no plan")
+    expected = f"{path}: the plan is damaged: {what}" if what else f"{path} is not a plan"
+    assert text.startswith(expected)
     assert "\n" not in text
 
 
@@ -418,7 +419,7 @@ def test_a_damaged_file_beside_a_csv_is_named(plan: Plan, tmp_path: Path) -> Non
     for old, new, message in (
         ('"notes"', '"note"', "has no notes on a plan; write it again"),
         ("q_a", "q_c", "is of a table with other columns; write it again"),
-        ("burg_drake plan", "plan", "is no plan: it lacks format 'burg_drake plan'"),
+        ("burg_drake plan", "plan", "is not a plan: it lacks format 'burg_drake plan'"),
         ("{", "", "not valid JSON"),
     ):
         beside.write_text(text.replace(old, new))

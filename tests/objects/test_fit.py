@@ -8,7 +8,7 @@ import trimesh
 
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.objects.collision.fit import measure_fit, surface_distance, union_of
+from burg_drake.objects.collision.fit import measure_fit, surface_distance, union_mesh
 
 RADIUS = 0.03
 
@@ -49,7 +49,7 @@ def test_hull_of_an_l() -> None:
     """Two legs of length 1 and width 0.5: the hull adds a triangle that cuts the corner; the middle
     of its slope, (0.75, 0.75), is 0.25 from both legs."""
     legs = [box((1.0, 0.5, 0.3), (0.5, 0.25, 0)), box((0.5, 1.0, 0.3), (0.25, 0.5, 0))]
-    surface = union_of(legs)
+    surface = union_mesh(legs)
     fit = measure_fit(surface, [surface.convex_hull], 0.75 * 0.3)
     assert fit.volume_ratio == pytest.approx((0.75 + 0.125) / 0.75, rel=1e-4)
     assert fit.hausdorff == pytest.approx(0.25, abs=2e-3)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from burg_drake.core.frames import Array
-from burg_drake.objects.physics.landscape import Landscape
+from burg_drake.objects.physics.landscape import PotentialLandscape
 
 X, Y, Z = np.eye(3)
 SIZE = np.array([0.1, 0.08, 0.06])
@@ -19,7 +19,9 @@ def around(axis: Array, start: Array, angle: float) -> Array:
 
 
 def test_height_is_the_support_function() -> None:
-    box = Landscape(np.asarray(trimesh.creation.box(SIZE).vertices), np.array([0.0, 0.0, 0.01]))
+    box = PotentialLandscape(
+        np.asarray(trimesh.creation.box(SIZE).vertices), np.array([0.0, 0.0, 0.01])
+    )
     assert box.height(Z) == pytest.approx(0.02)
     np.testing.assert_allclose(box.height(np.stack([-Z, X])), [0.04, 0.05])
     tilted = around(X, -Z, 0.2)  # over the lower edge at y = +-0.04
@@ -27,14 +29,14 @@ def test_height_is_the_support_function() -> None:
 
 
 def test_every_direction_leads_to_the_face_below() -> None:
-    box = Landscape(np.asarray(trimesh.creation.box(SIZE).vertices), np.zeros(3))
+    box = PotentialLandscape(np.asarray(trimesh.creation.box(SIZE).vertices), np.zeros(3))
     np.testing.assert_allclose(box.basin(around(X, -Z, 0.3)), -Z, atol=1e-12)
     np.testing.assert_allclose(box.basin(around(X, -Y, 0.1)), -Y, atol=1e-12)
 
 
 def test_a_cylinder_rolls_on_its_side_only() -> None:
     points = np.asarray(trimesh.creation.cylinder(0.03, 0.1, sections=48).vertices)
-    cylinder = Landscape(points, np.zeros(3))
+    cylinder = PotentialLandscape(points, np.zeros(3))
     lying = cylinder.neutral(X)
     assert lying.span == pytest.approx(np.pi, abs=0.2)
     for turn in np.linspace(0.0, 6.0, 13):
@@ -46,7 +48,9 @@ def test_a_cylinder_rolls_on_its_side_only() -> None:
 
 
 def test_a_sphere_is_level_everywhere() -> None:
-    sphere = Landscape(np.asarray(trimesh.creation.icosphere(3, 0.02).vertices), np.zeros(3))
+    sphere = PotentialLandscape(
+        np.asarray(trimesh.creation.icosphere(3, 0.02).vertices), np.zeros(3)
+    )
     level = sphere.neutral(Z)
     rng = np.random.default_rng(0)
     for down in rng.normal(size=(20, 3)):
@@ -58,10 +62,10 @@ def test_a_prism_of_few_sides_does_not_roll() -> None:
     for sections, rolls in ((6, False), (12, False), (17, False), (19, True), (48, True)):
         points = np.asarray(trimesh.creation.cylinder(0.03, 0.1, sections=sections).vertices)
         side = np.array([np.cos(np.pi / sections), np.sin(np.pi / sections), 0.0])
-        assert Landscape(points, np.zeros(3)).rolls(side) is rolls, sections
+        assert PotentialLandscape(points, np.zeros(3)).rolls(side) is rolls, sections
 
 
 def test_a_half_ball_rocks_but_does_not_roll() -> None:
     ball = trimesh.creation.icosphere(4, 0.04)
     half = np.asarray(ball.vertices[ball.vertices[:, 2] < 1e-9])
-    assert not Landscape(half, np.array([0.0, 0.0, -0.015])).rolls(-Z)
+    assert not PotentialLandscape(half, np.array([0.0, 0.0, -0.015])).rolls(-Z)

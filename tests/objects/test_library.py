@@ -121,5 +121,5 @@ def test_damaged_meshes(library: ObjectLibrary, content: bytes) -> None:
 
 def test_a_folder_in_place_of_a_mesh(library: ObjectLibrary) -> None:
     (library.root / "box" / "mesh.obj").mkdir(parents=True)
-    with pytest.raises(UnknownNameError, match=r"box/mesh\.obj is no file; build the library"):
+    with pytest.raises(UnknownNameError, match=r"box/mesh\.obj is not a file; build the library"):
         library.surface("box")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.solids import decimated, farthest, is_closed, united
+from burg_drake.objects.meshes.solids import decimated, is_closed, one_sided_hausdorff, united
 
 
 def _box(*corners: float) -> trimesh.Trimesh:
@@ -106,5 +106,5 @@ def test_what_is_too_rough_stays() -> None:
 def test_farthest_is_exact_on_a_box() -> None:
     box = _box(0, 0, 0, 1, 1, 1)
     points = np.array([[0.5, 0.5, 0.9], [0.5, 0.5, 0.5], [2.0, 2.0, 0.5], [1.0, 0.2, 0.3]])
-    assert farthest(points, box) == pytest.approx(np.sqrt(2.0), rel=1e-9)
-    assert farthest(points[[0, 3]], box) == pytest.approx(0.1, rel=1e-9)
+    assert one_sided_hausdorff(points, box) == pytest.approx(np.sqrt(2.0), rel=1e-9)
+    assert one_sided_hausdorff(points[[0, 3]], box) == pytest.approx(0.1, rel=1e-9)

@@ -9,7 +9,7 @@ from trimesh.poses import compute_stable_poses
 
 from burg_drake.core.frames import Array, rotation_angle, transform_points
 from burg_drake.objects.library.entry import StablePose
-from burg_drake.objects.physics.landscape import Landscape
+from burg_drake.objects.physics.landscape import PotentialLandscape
 from burg_drake.objects.physics.stability import resting_pose, stable_poses
 
 
@@ -25,7 +25,7 @@ def _solid_angle_of_rectangle(a: float, b: float, d: float) -> float:
 
 def test_icosahedron() -> None:
     ico = trimesh.creation.icosahedron().apply_scale(0.05)
-    facets = Landscape(np.asarray(ico.vertices), np.zeros(3)).minima()
+    facets = PotentialLandscape(np.asarray(ico.vertices), np.zeros(3)).minima()
     assert len(facets) == 20
     np.testing.assert_allclose([f.probability for f in facets], 1.0 / 20.0, rtol=1e-9)
     np.testing.assert_allclose([f.height for f in facets], 0.05 * 0.7946544722917661, rtol=1e-9)
@@ -110,7 +110,7 @@ def test_probabilities_are_those_of_trimesh() -> None:
     for _ in range(5):
         hull = trimesh.convex.convex_hull(rng.normal(size=(10, 3)) * [0.05, 0.04, 0.03])
         center = np.asarray(hull.center_mass)
-        facets = Landscape(np.asarray(hull.vertices), center).minima(tilt_margin=0.0)
+        facets = PotentialLandscape(np.asarray(hull.vertices), center).minima(tilt_margin=0.0)
         X, probability = compute_stable_poses(hull, center_mass=center, n_samples=1)
         assert len(facets) == len(probability)
         np.testing.assert_allclose([f.probability for f in facets], probability, atol=1e-9)
@@ -178,14 +178,14 @@ def test_how_a_face_is_cut_into_triangles_does_not_matter() -> None:
     """Qhull cuts the hexagons otherwise in every orientation; what lands on one topples as one."""
     corners = 0.01 * LEANING
     center = np.asarray(trimesh.convex.convex_hull(corners).center_mass)
-    first = [m.probability for m in Landscape(corners, center).minima()]
+    first = [m.probability for m in PotentialLandscape(corners, center).minima()]
     assert first[0] == pytest.approx(first[1], abs=1e-9)  # mirror images of each other
     assert first[2] == pytest.approx(first[3], abs=1e-9)
     rng = np.random.default_rng(1)
     for _ in range(8):
         R = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
         turned = np.round(corners @ R.T, 9)
-        again = [m.probability for m in Landscape(turned, R @ center).minima()]
+        again = [m.probability for m in PotentialLandscape(turned, R @ center).minima()]
         assert again == pytest.approx(first, abs=1e-6)
 
 

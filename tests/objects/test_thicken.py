@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from burg_drake.objects.meshes.solids import is_closed, united
-from burg_drake.objects.meshes.walls import default_wall, separated, wall
+from burg_drake.objects.meshes.walls import default_wall, separated, thickened
 
 
 def _grid(height: np.ndarray, step: float) -> trimesh.Trimesh:
@@ -29,7 +29,7 @@ def _joined(*quads: list[list[float]]) -> trimesh.Trimesh:
 
 
 def test_a_square_sheet_becomes_a_slab_centred_on_it() -> None:
-    slab = wall(_grid(np.zeros((9, 9)), 0.025), 0.002)
+    slab = thickened(_grid(np.zeros((9, 9)), 0.025), 0.002)
     assert slab is not None and is_closed(slab)
     assert slab.volume == pytest.approx(0.2 * 0.2 * 0.002, rel=1e-9)
     np.testing.assert_allclose(slab.bounds, [[0, 0, -0.001], [0.2, 0.2, 0.001]], atol=1e-12)
@@ -42,7 +42,7 @@ def test_a_hemisphere_becomes_a_bowl(inverted: bool) -> None:
     sphere.remove_unreferenced_vertices()
     if inverted:
         sphere.invert()
-    bowl = wall(sphere, 0.004)
+    bowl = thickened(sphere, 0.004)
     assert bowl is not None and is_closed(bowl)
     # the mesh's rim zigzags about the equator, hence the area of the mesh rather than 2 pi r^2
     expected = sphere.area * 0.004 * (1.0 + 0.004**2 / (12.0 * 0.05**2))
@@ -58,7 +58,7 @@ def test_a_bent_sheet_keeps_its_thickness_at_the_bend() -> None:
     angle = _joined(
         [[0, 0, 0], [a, 0, 0], [a, a, 0], [0, a, 0]], [[0, 0, 0], [0, a, 0], [0, a, a], [0, 0, a]]
     )
-    bent = wall(angle, 0.002)
+    bent = thickened(angle, 0.002)
     assert bent is not None and is_closed(bent)
     assert bent.volume == pytest.approx(2.0 * a * a * 0.002, rel=1e-9)
     np.testing.assert_allclose(bent.bounds, [[-0.001, 0, -0.001], [a, a, a]], atol=1e-12)
@@ -71,7 +71,7 @@ def test_three_sheets_on_one_edge_become_walls_that_overlap_there() -> None:
         [[0, 0, 0], [0, a, 0], [-a, a, 0], [-a, 0, 0]],
         [[0, 0, 0], [0, 0, a], [0, a, a], [0, a, 0]],
     )
-    walls = wall(tee, t)
+    walls = thickened(tee, t)
     assert walls is not None and is_closed(walls)
     # half of the upright wall's foot lies in each of the two others
     whole, said = united(walls)
@@ -84,14 +84,14 @@ def test_three_sheets_on_one_edge_become_walls_that_overlap_there() -> None:
 def test_rough_sheets_become_walls() -> None:
     rng = np.random.default_rng(2)
     sheet = _grid(rng.normal(0.0, 5e-4, (40, 40)), 0.002)
-    rough = wall(sheet, 0.003)
+    rough = thickened(sheet, 0.003)
     assert rough is not None and is_closed(rough)
     assert rough.volume == pytest.approx(sheet.area * 0.003, rel=0.05)
 
 
 def test_a_crumpled_sheet_is_left_alone() -> None:
     sheet = _grid(np.random.default_rng(2).normal(0.0, 0.02, (30, 30)), 0.002)
-    assert wall(sheet, 0.01) is None
+    assert thickened(sheet, 0.01) is None
 
 
 def _strip(twists: int) -> trimesh.Trimesh:
@@ -114,9 +114,9 @@ def _strip(twists: int) -> trimesh.Trimesh:
 
 
 def test_a_band_becomes_a_wall_unless_it_has_only_one_side() -> None:
-    band = wall(_strip(2), 0.002)
+    band = thickened(_strip(2), 0.002)
     assert band is not None and band.volume == pytest.approx(_strip(2).area * 0.002, rel=0.02)
-    assert wall(_strip(1), 0.002) is None
+    assert thickened(_strip(1), 0.002) is None
 
 
 def test_fans_that_share_a_vertex_are_separated() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.objects.collision.fit import union_of
+from burg_drake.objects.collision.fit import union_mesh
 from burg_drake.objects.library.entry import Decomposition
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.check import check_library
@@ -24,7 +24,7 @@ def test_a_finer_cut_by_itself(tmp_path: Path, ring: trimesh.Trimesh) -> None:
     report = build_library([source], tmp_path, confirm=False)
     entry = report.library.entry("ring")
     pieces = [report.library.mesh(piece) for piece in entry.pieces]
-    assert union_of(pieces).volume < 1.1 * ring.volume
+    assert union_mesh(pieces).volume < 1.1 * ring.volume
     assert entry.decomposition == Decomposition(threshold=0.02)
     (note,) = report.notes["ring"]
     assert note.startswith("cut again with threshold 0.02 in place of 0.05, as the ")

@@ -159,10 +159,10 @@ KNOWN = (
         ("version: 1\nobjects:\n  mug: {mesh: ''}\n",
          "FILE:3: objects.mug: mesh is empty; give a mesh file"),
         ("version: 1\nobjects:\n  a: {mesh: a.obj}\n  My Mug: {mesh: b.obj}\n",
-         "FILE:4: objects: 'My Mug' is no object name; use a-z, 0-9 and underscores, such as"
-         " 'my_mug'"),
+         "FILE:4: objects: 'My Mug' is not a name for an object; use a-z, 0-9 and underscores, such"
+         " as 'my_mug'"),
         ("version: 1\nobjects:\n  '---': {mesh: a.obj}\n",
-         "FILE:3: objects: '---' is no object name; use a-z, 0-9 and underscores"),
+         "FILE:3: objects: '---' is not a name for an object; use a-z, 0-9 and underscores"),
         ("version: 1\nobjects:\n  a: {mesh: a.obj}\n  a: {mesh: b.obj}\n",
          "FILE:4: objects: key 'a' is given twice"),
         (one("    freight: 0.4\n"), f"FILE:5: objects.mug: unknown key 'freight'; known: {KNOWN}"),

@@ -46,8 +46,8 @@ def test_stems_without_letters() -> None:
             {"rgba": (1.0, 0.0, 0.0, 2.0)},
             "box: rgba is (1.0, 0.0, 0.0, 2.0); each must be in [0, 1]",
         ),
-        ({"name": "My Box"}, "'My Box' is no object name; use a-z, 0-9 and underscores"),
-        ({"name": "../x"}, "'../x' is no object name"),
+        ({"name": "My Box"}, "'My Box' is not a name for an object; use a-z, 0-9 and underscores"),
+        ({"name": "../x"}, "'../x' is not a name for an object"),
     ],
 )
 def test_numbers_that_no_object_has(change: dict, message: str) -> None:  # type: ignore[type-arg]

@@ -26,7 +26,7 @@ def message(picture: NDArray[np.uint8], image_message: Make) -> Any:
 def test_pose_and_header(
     scene: Scene, intrinsics: Intrinsics, message: Any, info_message: Make, X_SC: Array
 ) -> None:
-    sighting = BoardNode(scene).look(message, info_message(intrinsics))
+    sighting = BoardNode(scene).locate(message, info_message(intrinsics))
     assert sighting.estimate.valid, sighting.estimate.reason
     assert pytest.approx(X_SC, abs=1e-3) == sighting.estimate.X_SC
     assert sighting.stamp is message.header.stamp
@@ -36,7 +36,7 @@ def test_pose_and_header(
 def test_intrinsics_of_a_file_stand_in_for_camera_info(
     scene: Scene, intrinsics: Intrinsics, message: Any, X_SC: Array
 ) -> None:
-    sighting = BoardNode(scene, intrinsics=intrinsics).look(message, None)
+    sighting = BoardNode(scene, intrinsics=intrinsics).locate(message, None)
     assert pytest.approx(X_SC, abs=1e-3) == sighting.estimate.X_SC
 
 
@@ -48,14 +48,14 @@ def test_a_board_that_came_out_of_the_printer_smaller(
     small = board_image(scene.board, intrinsics, X_SC, scale=scale)
     message = image_message(small.tobytes(), (480, 640), "rgb8")
     node = BoardNode(scene, intrinsics=intrinsics, print_scale=scale)
-    assert pytest.approx(X_SC, abs=1e-3) == node.look(message, None).estimate.X_SC
+    assert pytest.approx(X_SC, abs=1e-3) == node.locate(message, None).estimate.X_SC
 
 
 def test_overlay_changes_the_image_where_objects_stand(
     scene: Scene, intrinsics: Intrinsics, message: Any, picture: NDArray[np.uint8]
 ) -> None:
     node = BoardNode(scene, intrinsics=intrinsics)
-    drawn = node.draw(node.look(message, None))
+    drawn = node.draw(node.locate(message, None))
     assert drawn is not None and drawn.shape == picture.shape
     assert 0.05 < (drawn != picture).any(axis=2).mean() < 0.8
 
@@ -78,7 +78,7 @@ def test_resolution_may_change(
     part.roi = type(part.roi)(
         **vars(part.roi) | dict(x_offset=40, y_offset=60, width=580, height=400)
     )
-    seen = [node.look(*pair) for pair in ((message, whole), (small, whole), (small, part))]
+    seen = [node.locate(*pair) for pair in ((message, whole), (small, whole), (small, part))]
     assert [sighting.estimate.valid for sighting in seen] == [True, False, True]
     assert seen[1].estimate.reason == (
         "the image has 580 x 400 pixels, its camera_info says 640 x 480"
@@ -92,7 +92,7 @@ def test_resolution_may_change(
 
 def test_without_camera_info_the_overlay_says_so(scene: Scene, message: Any) -> None:
     node = BoardNode(scene)
-    sighting = node.look(message, None)
+    sighting = node.locate(message, None)
     assert "no camera_info yet" in sighting.estimate.reason
     drawn = node.draw(sighting)
     assert drawn is not None
@@ -103,7 +103,7 @@ def test_without_camera_info_the_overlay_says_so(scene: Scene, message: Any) -> 
 def test_damaged_image(scene: Scene, intrinsics: Intrinsics, message: Any) -> None:
     node = BoardNode(scene, intrinsics=intrinsics)
     message.data = message.data[:1000]
-    sighting = node.look(message, None)
+    sighting = node.locate(message, None)
     assert sighting.estimate.reason.startswith("damaged image: 1000 bytes")
     assert node.draw(sighting) is None
 
@@ -120,7 +120,7 @@ def test_tiny_images(
     node = BoardNode(scene)
     height, width = shape
     image = image_message(bytes(3 * height * width), shape, "rgb8")
-    sighting = node.look(image, info_message(intrinsics, width=width, height=height))
+    sighting = node.locate(image, info_message(intrinsics, width=width, height=height))
     assert not sighting.estimate.valid and sighting.estimate.reason
     drawn = node.draw(sighting)
     assert drawn is not None and drawn.shape == (*shape, 3)

@@ -20,7 +20,7 @@ FOUND, LOST, BLURRED = (
 
 
 def told(account: StatusLog, *looks: tuple[float, Sighting]) -> list[str]:
-    lines = [account.looked(sighting, now) for now, sighting in looks]
+    lines = [account.record_image(sighting, now) for now, sighting in looks]
     return [line[0] for line in lines if line]
 
 
@@ -34,10 +34,10 @@ def test_a_change_is_told_once() -> None:
 
 def test_warnings_are_marked() -> None:
     account = StatusLog(0.0)
-    assert account.looked(LOST, 0.0) is None
-    news = account.looked(LOST, REASON_AFTER)
+    assert account.record_image(LOST, 0.0) is None
+    news = account.record_image(LOST, REASON_AFTER)
     assert news is not None and news[1]
-    news = account.looked(FOUND, 1.0)
+    news = account.record_image(FOUND, 1.0)
     assert news is not None and not news[1]
 
 
@@ -54,15 +54,15 @@ def test_reasons_that_alternate_do_not_flood_the_log() -> None:
 def test_silence_is_told_once_and_again_after_images() -> None:
     account = StatusLog(0.0)
     topics = {"/camera/image_raw": 0, "/camera/camera_info": 0}
-    assert account.waited(topics, 0.9 * HINT_AFTER) is None
-    assert account.waited(topics, 1.1 * HINT_AFTER) == (
+    assert account.record_silence(topics, 0.9 * HINT_AFTER) is None
+    assert account.record_silence(topics, 1.1 * HINT_AFTER) == (
         "nobody publishes /camera/image_raw and /camera/camera_info; is the camera running?"
         " Still waiting"
     )
-    assert account.waited(topics, 9.0 * HINT_AFTER) is None
-    account.looked(FOUND, 10.0 * HINT_AFTER)
-    assert account.waited({"/image": 1}, 10.5 * HINT_AFTER) is None
-    assert account.waited({"/image": 1}, 11.5 * HINT_AFTER) == (
+    assert account.record_silence(topics, 9.0 * HINT_AFTER) is None
+    account.record_image(FOUND, 10.0 * HINT_AFTER)
+    assert account.record_silence({"/image": 1}, 10.5 * HINT_AFTER) is None
+    assert account.record_silence({"/image": 1}, 11.5 * HINT_AFTER) == (
         "no images on /image, though it is published; still waiting"
     )
 
@@ -70,7 +70,7 @@ def test_silence_is_told_once_and_again_after_images() -> None:
 def test_rate() -> None:
     account = StatusLog(0.0)
     for number in range(60):
-        account.looked(FOUND if number % 4 else LOST, 0.5 * number)
+        account.record_image(FOUND if number % 4 else LOST, 0.5 * number)
     assert account.rate(0.9 * RATE_EVERY) is None
     assert account.rate(RATE_EVERY) == "2.0 images a second, 75 % with a pose"
     assert account.rate(RATE_EVERY + 1.0) is None

@@ -157,7 +157,7 @@ def test_what_is_enough_ends_the_search_and_changes_nothing_else(
         ahead = (aside < (2.0 * radius) ** 2) & (p[:, 2] > 0.0)
         ways = p[ahead, 2] - np.sqrt((2.0 * radius) ** 2 - aside[ahead])
         expected, enough = ways.min(initial=np.inf), rng.uniform(0.0, 0.3)
-        found = contact_distances(one, still, pairs, UP, np.inf, enough=enough).min()
+        found = contact_distances(one, still, pairs, UP, np.inf, stop_below=enough).min()
         if expected < enough:
             assert expected - 2e-6 < found < enough
             sooner += found > expected + 1e-3

@@ -9,7 +9,7 @@ import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.scene import Scene
-from burg_drake.scene.document.validation import read_vertices, require_sound, validate_scene
+from burg_drake.scene.document.validation import read_vertices, require_no_errors, validate_scene
 
 MakeScene = Callable[..., Scene]
 
@@ -100,13 +100,13 @@ def test_background_may_stand_anywhere(make_scene: MakeScene) -> None:
 
 def test_require_sound_lets_warnings_pass(make_scene: MakeScene) -> None:
     scene = make_scene(("cube", (0.3, 0.2, 0.02)))
-    require_sound(scene, validate_scene(scene))
+    require_no_errors(scene, validate_scene(scene))
 
 
 def test_require_sound_gives_one_line(make_scene: MakeScene) -> None:
     scene = make_scene(("cube", (0.0, 0.2, 0.0)), ("cube", (0.3, 0.2, -0.5)))
     with pytest.raises(InvalidInputError) as caught:
-        require_sound(scene, validate_scene(scene))
+        require_no_errors(scene, validate_scene(scene))
     assert str(caught.value) == (
         f"{scene.path}: 'cube_0' is out of bounds: 30.0 mm over the left edge of the board"
         f" (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"

@@ -77,7 +77,7 @@ def execute(trial: ArmTrial, X_OG: Array, **overrides: float) -> TrialResult:
 
 
 def sweeping(trial: ArmTrial) -> Plan:
-    """To the middle of the box with a turn about the base, in place of the straight way."""
+    """To the middle of the box with a turn about the base, in place of the straight segment."""
     plan = straight_plan(trial, trial.X_WG("box", CENTRE))
     q = np.repeat(plan.approach.q[-1:], 5, axis=0)
     q[:, 0] -= np.linspace(SWEEP, 0.0, 5)
@@ -360,7 +360,7 @@ def test_what_the_hand_touches_at_the_grasp_and_after(crowd: ArmTrial) -> None:
     ):
         for pair in ((one, other), (other, one)):
             touches = RobotContactWatch(crowd.diagram, crowd.hand.links, free["box"])
-            assert touches.look([BodyContact(*pair, np.zeros(3))], arrived) == ""
+            assert touches.update([BodyContact(*pair, np.zeros(3))], arrived) == ""
             assert touches.first == touched
 
 

@@ -220,7 +220,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     assert "the plan's lift begins 0.01 rad from where its close ends" in message(
         replace(plan, lift=away)
     )
-    assert "rad from where the arm is; bring the arm to where the plan begins" in message(
+    assert "rad from where it is now; bring the arm to where the plan begins" in message(
         plan, start=-1.0
     )
     assert message(plan, start=np.nan).startswith("plan.start_time is nan s; give the time at")

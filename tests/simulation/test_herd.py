@@ -39,7 +39,7 @@ def velocity_after(
     if locked:
         block.Lock(context)
     herd = BoardEdgeGuard(built, ObjectShapes(scene.library), margin=MARGIN, share=1.0)
-    herd.drive(context, [block.index()])
+    herd.push_back(context, [block.index()])
     V_WO = built.plant.EvalBodySpatialVelocityInWorld(context, block)
     assert V_WO.rotational() == pytest.approx(np.zeros(3) if locked else turning)
     return R_WS.T @ V_WO.Shift(-p_OcmO).translational()
@@ -78,6 +78,6 @@ def test_what_relaxes_beyond_the_edge_comes_back(make_scene) -> None:
     scene, station = make_scene(("block", WIDTH - EDGE / 2 + 0.02, 0.2, 0.0)), make_station()
     built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
     herd = BoardEdgeGuard(built, ObjectShapes(scene.library), margin=0.003, share=1.0)
-    relaxed = relax(built, ["block"], 1.0, before_window=herd.drive)
+    relaxed = relax(built, ["block"], 1.0, before_window=herd.push_back)
     X_SO = np.linalg.inv(station.document.X_WS.matrix()) @ relaxed.X_WO["block"]
     assert WIDTH - 0.02 < X_SO[0, 3] + EDGE / 2 < WIDTH

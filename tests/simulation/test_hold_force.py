@@ -82,7 +82,7 @@ def test_any_order_gives_the_same_bits(trial: HandTrial, tugged: HoldForces) -> 
 def test_a_trial_after_a_tug_is_as_if_there_had_been_none(trial: HandTrial) -> None:
     fresh = HandTrial(trial.diagram.scene, trial.diagram.station).run("block", CENTRE)
     grip = grip_of(trial)
-    assert not grip.bears(lambda t: np.array([0.0, 0.0, 1e3]), 0.2, 0.005)
+    assert not grip.withstands(lambda t: np.array([0.0, 0.0, 1e3]), 0.2, 0.005)
     assert repr(trial.run("block", CENTRE)) == repr(fresh)  # NaN is not equal to itself
 
 

@@ -16,7 +16,7 @@ from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.scene.document.validation import SceneIssue
 from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.checks.sound_scene import require_sound_scene
+from burg_drake.station.checks.valid_scene import require_valid_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import (
     Obstacle,
@@ -143,13 +143,13 @@ def test_the_arm_at_home_is_said_to_be(library: Path, panda: Station, tmp_path: 
         assert end == f"move 'cube_0', or change arm.home in {panda.path}"
 
 
-def test_require_sound_scene(library: Path, panda: Station, tmp_path: Path) -> None:
-    require_sound_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), panda)
+def test_require_valid_scene(library: Path, panda: Station, tmp_path: Path) -> None:
+    require_valid_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), panda)
     overlapping = scene_of(library, tmp_path, (0.2, 0.2, HEIGHT), (0.2, 0.21, HEIGHT))
     with pytest.raises(
         InvalidInputError, match=r"scene\.yaml: 'cube_0' and 'cube_1' overlap by 50"
     ):
-        require_sound_scene(overlapping, panda)
+        require_valid_scene(overlapping, panda)
 
 
 def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
@@ -158,7 +158,7 @@ def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
     edited = tmp_path / "library"
     shutil.copytree(library, edited)
     places = (0.2, 0.2, HEIGHT), (0.2 + EDGE + 1e-4, 0.2, HEIGHT)
-    require_sound_scene(scene_of(edited, tmp_path, *places), panda)
+    require_valid_scene(scene_of(edited, tmp_path, *places), panda)
     (model,) = edited.rglob("*.sdf")
     text = model.read_text()
     before, wider = (
@@ -168,7 +168,7 @@ def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
     assert before in text
     model.write_text(text.replace(before, wider))
     with pytest.raises(InvalidInputError, match="'cube_0' and 'cube_1' overlap by 9"):
-        require_sound_scene(scene_of(edited, tmp_path, *places), panda)
+        require_valid_scene(scene_of(edited, tmp_path, *places), panda)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from burg_drake.station.document.station_document import load_station
 def test_the_usual_motion_is_that_of_the_paper() -> None:
     motion = load_station("panda_tabletop").document.motion
     assert motion == GraspMotion(standoff=0.10, retreat=0.0, lift_height=0.30)
-    assert motion.least == 0.30 and motion.direction_W.tolist() == [0.0, 0.0, 1.0]
+    assert motion.shortest == 0.30 and motion.direction_W.tolist() == [0.0, 0.0, 1.0]
 
 
 def with_motion(tmp_path: Path, text: str) -> Path:
@@ -28,7 +28,7 @@ def with_motion(tmp_path: Path, text: str) -> Path:
 def test_a_station_states_its_usual_motion(tmp_path: Path) -> None:
     text = "{retreat: 0.05, lift_height: 0.2, least_lift: 0.02, lift_direction: [0, 3, 4]}"
     own, usual = load_station(with_motion(tmp_path, text)), load_station("panda_tabletop")
-    assert own.document.motion.least == 0.02 and own.document.motion.standoff == 0.10
+    assert own.document.motion.shortest == 0.02 and own.document.motion.standoff == 0.10
     assert own.document.motion.direction_W == pytest.approx([0.0, 0.6, 0.8])
     # Who asks says how the hand shall move: the station is the same one.
     assert own.content == usual.content != replace(usual, hand_model=own.path).content

@@ -135,7 +135,7 @@ def test_what_is_nowhere_is_said_with_what_was_searched(place: Path) -> None:
     )
     with pytest.raises(UnknownNameError, match=r"yaml: packages\.pads: nowhere does not exist"):
         load_station(station_file(place, "packages: {pads: nowhere}\n"))
-    with pytest.raises(InvalidInputError, match=r"packages\.pads: hands/hand\.yaml is no folder"):
+    with pytest.raises(InvalidInputError, match=r"packages\.pads: hands/hand\.yaml is not a"):
         load_station(station_file(place, "packages: {pads: hands/hand.yaml}\n"))
 
 

@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from burg_drake.ui.server.door import Door
+from burg_drake.ui.server.door import ServedPage
 
 PATIENCE = 60.0
 """For what a page has to say, on a busy machine [s]."""
@@ -43,7 +43,7 @@ def until(true: Callable[[], Any], what: str, patience: float = PATIENCE) -> Non
         time.sleep(0.02)
 
 
-def coming_in(door: Door) -> ClientConnection:
+def coming_in(door: ServedPage) -> ClientConnection:
     """A connection as a page has it."""
     return connect(
         f"ws://127.0.0.1:{door.port}/",
@@ -77,7 +77,7 @@ class PageClient:
         told: titles and lines of notifications, and titles of dialogs.
     """
 
-    def __init__(self, door: Door) -> None:
+    def __init__(self, door: ServedPage) -> None:
         self.nodes: dict[str, dict[str, Any]] = {}
         self.told: list[str] = []
         self._controls: dict[str, dict[str, Any]] = {}

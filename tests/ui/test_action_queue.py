@@ -22,10 +22,10 @@ def test_actions_run_in_order_and_errors_reach_who_asked() -> None:
         raise ZeroDivisionError("oops")
 
     for i in range(50):
-        queue.ask(lambda i=i: done.append(i))
+        queue.submit(lambda i=i: done.append(i))
         if i == 20:
-            queue.ask(refuse, "a page")
-            queue.ask(stumble, "another")
+            queue.submit(refuse, "a page")
+            queue.submit(stumble, "another")
     assert queue.idle(PATIENCE)
     assert done == list(range(50))
     assert said[0] == ("a page", "no")
@@ -37,11 +37,11 @@ def test_of_actions_with_a_key_only_the_newest_that_waits_is_done() -> None:
     done: list[int] = []
     gate = threading.Event()
     queue = ActionQueue(lambda who, line: None)
-    queue.ask(gate.wait)
+    queue.submit(gate.wait)
     for i in range(10):
-        queue.ask(lambda i=i: done.append(i), key="drag")
-    queue.ask(lambda: done.append(100))
-    queue.ask(lambda: done.append(200), key="drag")
+        queue.submit(lambda i=i: done.append(i), key="drag")
+    queue.submit(lambda: done.append(100))
+    queue.submit(lambda: done.append(200), key="drag")
     gate.set()
     assert queue.idle(PATIENCE)
     assert done == [9, 100, 200]
@@ -51,13 +51,13 @@ def test_of_actions_with_a_key_only_the_newest_that_waits_is_done() -> None:
 def test_what_is_typed_waits_for_more_but_holds_up_nobody() -> None:
     done: list[str] = []
     queue = ActionQueue(lambda who, line: None)
-    queue.ask(lambda: done.append("2"), key="field", after=3600.0)
-    queue.ask(lambda: done.append("25"), key="field", after=3600.0)
+    queue.submit(lambda: done.append("2"), key="field", after=3600.0)
+    queue.submit(lambda: done.append("25"), key="field", after=3600.0)
     assert not queue.idle(0.05)
-    queue.ask(lambda: done.append("save"))
+    queue.submit(lambda: done.append("save"))
     assert queue.idle(PATIENCE)
     assert done == ["25", "save"]
-    queue.ask(lambda: done.append("last"), key="field", after=3600.0)
+    queue.submit(lambda: done.append("last"), key="field", after=3600.0)
     queue.close()
     assert done[-1] == "last"
 
@@ -66,13 +66,13 @@ def test_what_only_shows_runs_at_once_and_does_not_end_typing() -> None:
     done: list[str] = []
     queue = ActionQueue(lambda who, line: None)
     shown = threading.Event()
-    queue.ask(lambda: done.append("2"), key="field", after=3600.0)
-    queue.ask(lambda: done.append("shown"), key="refresh", patient=True)
-    queue.ask(shown.set, key="other", patient=True)
+    queue.submit(lambda: done.append("2"), key="field", after=3600.0)
+    queue.submit(lambda: done.append("shown"), key="refresh", wait_for_typing=True)
+    queue.submit(shown.set, key="other", wait_for_typing=True)
     assert shown.wait(PATIENCE)
-    queue.ask(lambda: done.append("25"), key="field", after=3600.0)
+    queue.submit(lambda: done.append("25"), key="field", after=3600.0)
     assert not queue.idle(0.05)
-    queue.ask(lambda: done.append("save"))
+    queue.submit(lambda: done.append("save"))
     assert queue.idle(PATIENCE)
     assert done == ["shown", "25", "save"]
     queue.close()

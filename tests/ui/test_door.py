@@ -16,7 +16,7 @@ import viser
 from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.ui.server import admission
 from burg_drake.ui.server.access_test import require_guarded
-from burg_drake.ui.server.door import Door, serve
+from burg_drake.ui.server.door import ServedPage, serve
 
 HANDSHAKE = {
     "Connection": "Upgrade",
@@ -28,14 +28,14 @@ HANDSHAKE = {
 
 
 @pytest.fixture(scope="module")
-def door() -> Iterator[Door]:
+def door() -> Iterator[ServedPage]:
     with serve(port=0) as door:
         door.server.gui.add_markdown("Nothing here yet.")
         yield door
 
 
 @pytest.fixture
-def open_to_all() -> Iterator[Door]:
+def open_to_all() -> Iterator[ServedPage]:
     """A door that other machines can reach."""
     with serve("0.0.0.0", port=0) as door:
         door.server.gui.add_markdown("Nothing here yet.")
@@ -54,7 +54,7 @@ def elsewhere(tmp_path: Path) -> Iterator[str]:
 
 
 def answer(
-    door: Door, path: str = "/", *headers: tuple[str, str], host: str | None = "127.0.0.1"
+    door: ServedPage, path: str = "/", *headers: tuple[str, str], host: str | None = "127.0.0.1"
 ) -> tuple[int, dict[str, str], str]:
     """Status, headers and text of the answer to a request that is sent as it is given."""
     connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=60)
@@ -72,7 +72,7 @@ def answer(
         connection.close()
 
 
-def test_the_page_opens_in_a_browser(door: Door, page) -> None:
+def test_the_page_opens_in_a_browser(door: ServedPage, page) -> None:
     page.goto(f"{door.url}?websocket=ws://127.0.0.1:9/&darkMode")  # a trap, and an option of viser
     page.get_by_text("Nothing here yet.").wait_for()
     assert page.url == f"{door.url}?darkMode="
@@ -98,14 +98,14 @@ def test_the_page_opens_in_a_browser(door: Door, page) -> None:
     ],
 )
 def test_only_pages_of_this_machine_come_in(
-    door: Door, host: str, headers: dict[str, str], code: int, upgrade: bool
+    door: ServedPage, host: str, headers: dict[str, str], code: int, upgrade: bool
 ) -> None:
     handshake = HANDSHAKE if upgrade else {}
     found = answer(door, "/", *{**headers, **handshake}.items(), host=host)[0]
     assert found == (101 if upgrade and code == 200 else code)
 
 
-def test_what_is_neither_page_nor_browser_is_refused(door: Door) -> None:
+def test_what_is_neither_page_nor_browser_is_refused(door: ServedPage) -> None:
     own = ("Origin", "http://127.0.0.1")
     assert answer(door, "/", *HANDSHAKE.items())[0] == 403  # no browser leaves out the origin
     assert answer(door, "/other", own, *HANDSHAKE.items())[0] == 404
@@ -126,11 +126,11 @@ def test_what_is_neither_page_nor_browser_is_refused(door: Door) -> None:
         "/index.html?token=1",
     ],
 )
-def test_there_is_one_page_and_no_files(door: Door, path: str) -> None:
+def test_there_is_one_page_and_no_files(door: ServedPage, path: str) -> None:
     assert answer(door, path)[0] == 404
 
 
-def test_answers_forbid_frames_and_other_places(door: Door) -> None:
+def test_answers_forbid_frames_and_other_places(door: ServedPage) -> None:
     for path in ("/", "/other"):
         _, headers, _ = answer(door, path)
         policy = headers["Content-Security-Policy"]
@@ -148,7 +148,7 @@ CONNECT = """address => new Promise(done => {
 })"""
 
 
-def test_a_page_of_another_site_cannot_connect(door: Door, page, elsewhere: str) -> None:
+def test_a_page_of_another_site_cannot_connect(door: ServedPage, page, elsewhere: str) -> None:
     page.goto(elsewhere)
     address = f"127.0.0.1:{door.port}"
     assert page.evaluate(CONNECT, f"ws://{address}/") == "refused"
@@ -169,7 +169,7 @@ def test_a_page_of_another_site_can_connect_to_viser_itself(page, elsewhere: str
 
 
 def test_a_door_that_lets_others_in_does_not_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(admission, "require_own_host", lambda *headers, **served: None)
+    monkeypatch.setattr(admission, "require_local_host", lambda *headers, **served: None)
     threads = threading.active_count()
     with pytest.raises(MissingDependencyError, match="was not opened, because other web sites"):
         serve(port=7449)
@@ -178,7 +178,7 @@ def test_a_door_that_lets_others_in_does_not_open(monkeypatch: pytest.MonkeyPatc
         pass
 
 
-def test_a_token_opens_the_page_in_one_browser(open_to_all: Door, page, browser) -> None:
+def test_a_token_opens_the_page_in_one_browser(open_to_all: ServedPage, page, browser) -> None:
     door = open_to_all
     admitted: list[str] = []
     door.admission.on_admitted = admitted.append
@@ -203,7 +203,7 @@ def test_a_token_opens_the_page_in_one_browser(open_to_all: Door, page, browser)
     assert answer(door, "/", own, cookie, *HANDSHAKE.items())[0] == 101
 
 
-def test_without_a_token_nothing_opens(open_to_all: Door) -> None:
+def test_without_a_token_nothing_opens(open_to_all: ServedPage) -> None:
     own = ("Origin", "http://127.0.0.1")
     name = f"burg_drake_{open_to_all.port}"
     for cookie in ("", f"{name}=", f"{name}=x", "=;;", f"{name}={open_to_all.admission.token}"):
@@ -214,14 +214,14 @@ def test_without_a_token_nothing_opens(open_to_all: Door) -> None:
         assert answer(open_to_all, f"/{query}")[0] == 403
 
 
-def test_browsers_are_counted(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(admission, "MOST_CONNECTIONS", 0)
     own = ("Origin", "http://127.0.0.1")
     code, _, text = answer(door, "/", own, *HANDSHAKE.items())
     assert code == 503 and "too many browsers" in text
 
 
-def test_a_port_that_is_taken_is_named(door: Door) -> None:
+def test_a_port_that_is_taken_is_named(door: ServedPage) -> None:
     with pytest.raises(InvalidInputError, match=f"port {door.port} of 127.0.0.1 is taken"):
         serve(port=door.port)
     with pytest.raises(InvalidInputError, match=r"cannot be served on 192\.0\.2\.1"):
@@ -240,7 +240,7 @@ def test_the_terminal_stays_clean(capfd: pytest.CaptureFixture[str]) -> None:
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_browser_without_webgl_is_told(door: Door, playwright, chromium: str) -> None:
+def test_a_browser_without_webgl_is_told(door: ServedPage, playwright, chromium: str) -> None:
     browser = playwright.chromium.launch(
         executable_path=chromium, args=["--no-sandbox", "--disable-3d-apis"]
     )
@@ -251,7 +251,7 @@ def test_a_browser_without_webgl_is_told(door: Door, playwright, chromium: str) 
     browser.close()
 
 
-def test_a_browser_without_scripts_is_told(door: Door, browser) -> None:
+def test_a_browser_without_scripts_is_told(door: ServedPage, browser) -> None:
     with browser.new_context(java_script_enabled=False) as context:
         page = context.new_page()
         page.goto(door.url)

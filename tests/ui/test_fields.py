@@ -64,18 +64,18 @@ def test_what_is_typed_is_one_step_and_what_is_refused_is_set_back(page: SetupPa
     field = page._object._name
     for name in ("b", "bo", "bowl"):  # there is a bowl
         press(field, name)
-    page.actions.ask(page._refresh, patient=True)
+    page.actions.submit(page._refresh, wait_for_typing=True)
     settle(page)
     assert session.view.document == before and session.view.undo_label == undo_label
     assert field.handle.value == "marble"
     press(field, "glass")
-    page.actions.ask(lambda: None)  # as Enter does
+    page.actions.submit(lambda: None)  # as Enter does
     settle(page)
     assert session.view.selection == ("glass",) and field.handle.value == "glass"
     position = page._object._planar._position
     y = position.handle.value[1]
     press(position, (210.0, y))
-    page.actions.ask(lambda: None)
+    page.actions.submit(lambda: None)
     settle(page)
     assert session.view.X_SO("glass")[0, 3] == pytest.approx(0.21)
     np.testing.assert_allclose(1e3 * session.view.X_SO("glass")[1, 3], y, atol=5e-3)

@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from burg_drake.ui.server import guarded_viser
-from burg_drake.ui.server.door import Door, serve
+from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.server.messages import BURST, LARGEST_MESSAGE, RATE
 from burg_drake.ui.server.uploads import ALL_UPLOADS, LARGEST_UPLOAD
 from tests.ui.page_client import CAMERA, coming_in, send, unpacked
@@ -26,18 +26,18 @@ TIMEOUT = 60.0
 
 
 @pytest.fixture(scope="module")
-def door() -> Iterator[Door]:
+def door() -> Iterator[ServedPage]:
     with serve(port=0) as door:
         yield door
 
 
 @pytest.fixture(scope="module")
-def button(door: Door) -> viser.GuiUploadButtonHandle:
+def button(door: ServedPage) -> viser.GuiUploadButtonHandle:
     return door.server.gui.add_upload_button("Load a photo")
 
 
 @pytest.fixture
-def client(door: Door) -> Iterator[ClientConnection]:
+def client(door: ServedPage) -> Iterator[ClientConnection]:
     """A program that came in as a page does; it may send anything."""
     with coming_in(door) as client:
         send(client, "ViewerCameraMessage", **CAMERA)
@@ -72,7 +72,9 @@ def closed(client: ClientConnection) -> tuple[int, str]:
     return caught.value.rcvd.code, caught.value.rcvd.reason
 
 
-def test_a_browser_uploads_what_is_small_enough(door: Door, button, page, tmp_path: Path) -> None:
+def test_a_browser_uploads_what_is_small_enough(
+    door: ServedPage, button, page, tmp_path: Path
+) -> None:
     arrived = threading.Event()
     button.on_upload(lambda event: arrived.set())
     photo, film = tmp_path / "photo.png", tmp_path / "film.png"
@@ -107,7 +109,7 @@ def test_a_browser_uploads_what_is_small_enough(door: Door, button, page, tmp_pa
     ],
 )
 def test_a_file_that_no_page_sends_is_refused_before_it_comes(
-    door: Door, button, client: ClientConnection, fields: dict[str, Any], reason: str
+    door: ServedPage, button, client: ClientConnection, fields: dict[str, Any], reason: str
 ) -> None:
     announce(client, button, **fields)
     code, said = closed(client)
@@ -127,7 +129,7 @@ def test_many_files_at_once_are_bounded(button, client: ClientConnection) -> Non
     assert closed(client) == (1008, "too many files at once")
 
 
-def test_who_goes_away_leaves_nothing_behind(door: Door, button) -> None:
+def test_who_goes_away_leaves_nothing_behind(door: ServedPage, button) -> None:
     with coming_in(door) as client:  # viser would keep the parts of those who show no camera
         announce(client, button)
         assert closed(client)[0] == 1008
@@ -159,7 +161,9 @@ def wait_for(client: ClientConnection, key: str) -> None:
         pass
 
 
-def test_new_pages_hear_of_no_old_uploads(door: Door, button, client: ClientConnection) -> None:
+def test_new_pages_hear_of_no_old_uploads(
+    door: ServedPage, button, client: ClientConnection
+) -> None:
     announce(client, button, transfer_uuid="old")
     part(client, button, bytes(10), transfer_uuid="old")
     wait_for(client, "old")
@@ -171,7 +175,7 @@ def test_new_pages_hear_of_no_old_uploads(door: Door, button, client: ClientConn
 
 
 def test_a_flood_is_paced(
-    door: Door, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
+    door: ServedPage, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
 ) -> None:
     begun = time.monotonic()
     for _ in range(int(BURST + RATE)):
@@ -188,7 +192,7 @@ def test_a_flood_is_paced(
     assert told(caplog) == []
 
 
-def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnection) -> None:
+def test_nobody_opens_a_public_tunnel(door: ServedPage, button, client: ClientConnection) -> None:
     asked: list[Message] = []
     for kind in (ShareUrlRequest, FileTransferStartUpload):
         door.server._websock_server.register_handler(kind, lambda _, message: asked.append(message))
@@ -201,7 +205,7 @@ def test_nobody_opens_a_public_tunnel(door: Door, button, client: ClientConnecti
 
 
 def test_values_of_another_type_change_nothing(
-    door: Door, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
+    door: ServedPage, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
 ) -> None:
     slider = door.server.gui.add_slider("Length", 0.0, 1.0, 0.1, 0.5)
     for value in ("x", None, {}, []):
@@ -214,7 +218,7 @@ def test_values_of_another_type_change_nothing(
 
 
 def test_errors_of_a_page_are_told(
-    door: Door, client: ClientConnection, caplog: pytest.LogCaptureFixture
+    door: ServedPage, client: ClientConnection, caplog: pytest.LogCaptureFixture
 ) -> None:
     slider = door.server.gui.add_slider("Width", 0.0, 1.0, 0.1, 0.5)
 
@@ -230,7 +234,7 @@ def test_errors_of_a_page_are_told(
     assert "ZeroDivisionError: of the page" in caplog.text
 
 
-def test_only_values_of_controls_are_set(door: Door, client: ClientConnection) -> None:
+def test_only_values_of_controls_are_set(door: ServedPage, client: ClientConnection) -> None:
     slider = door.server.gui.add_slider("Size", 0.0, 1.0, 0.1, 0.5)
     send(client, "GuiUpdateMessage", uuid=slider._impl.uuid, updates={"update_cb": []})
     assert closed(client) == (1008, "only values of controls can be set")

@@ -18,11 +18,11 @@ from burg_drake.core.frames import make_pose, quaternion_from_rotation, rot_z
 from burg_drake.scene.document.scene import Board
 from burg_drake.scene.document.validation import validate_scene
 from burg_drake.station.document.station_document import load_station
-from burg_drake.ui.server.door import Door, serve
+from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from burg_drake.ui.view.board import sheet_picture
 from burg_drake.ui.view.object_pictures import ObjectPictures
-from burg_drake.ui.widgets.status_colors import LOOKS
+from burg_drake.ui.widgets.status_colors import STATUS_STYLES
 from tests.ui.page_client import PATIENCE, PageClient, until
 
 FILL, BOARD, DISPLAY, GRASPS = "Random configuration", "Board", "Display", "Grasps"
@@ -31,7 +31,7 @@ FREE = "x, y, yaw only"
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage, Door]]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage, ServedPage]]:
     """A page for all tests, without the library's pictures, which take a process of their own."""
     folder = tmp_path_factory.mktemp("scenes")
     with pytest.MonkeyPatch.context() as patch:
@@ -44,7 +44,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage
 
 
 @pytest.fixture
-def page(opened: tuple[SetupPage, Door]) -> SetupPage:
+def page(opened: tuple[SetupPage, ServedPage]) -> SetupPage:
     """The page on a new scene."""
     page, _ = opened
     page.actions.session.new("household", discard=True)
@@ -59,7 +59,7 @@ def session(page: SetupPage) -> ComposeSession:
 
 
 @pytest.fixture
-def client(page: SetupPage, opened: tuple[SetupPage, Door]) -> Iterator[PageClient]:
+def client(page: SetupPage, opened: tuple[SetupPage, ServedPage]) -> Iterator[PageClient]:
     with PageClient(opened[1]) as client:
         yield client
 
@@ -117,10 +117,10 @@ def test_the_board_has_the_size_that_was_chosen(
     until(lambda: session.view.document.board.size == (0.42, 0.594), "A2 upright")
     assert page.actions.queue.idle(PATIENCE)
     busy = threading.Event()  # what is chosen meanwhile waits, and is not lost
-    page.actions.ask(lambda: busy.wait(PATIENCE))
-    page.actions.ask(page._refresh, patient=True)
+    page.actions.submit(lambda: busy.wait(PATIENCE))
+    page.actions.submit(page._refresh, wait_for_typing=True)
     client.give(BOARD, "Lies", "across")
-    until(lambda: page._board_panel._way.value == "across", "the choice has arrived")
+    until(lambda: page._board_panel._orientation.value == "across", "the choice has arrived")
     busy.set()
     until(lambda: session.view.document.board.size == (0.594, 0.42), "A2 across")
 
@@ -163,7 +163,7 @@ def test_objects_have_the_colours_that_were_chosen(
 
     until(lambda: colors() == [None] * 3, "as they look")
     client.give(DISPLAY, "Objects", "by status")
-    red, green = LOOKS["collision"].color, LOOKS["ok"].color
+    red, green = STATUS_STYLES["collision"].color, STATUS_STYLES["ok"].color
     until(lambda: colors() == [red, red, green], "by status")
     session.undo()
     until(lambda: colors() == [green] * 3, "apart")

@@ -6,15 +6,15 @@ import cv2
 import numpy as np
 
 from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
-from burg_drake.ui.pointing.pointer import Eye
+from burg_drake.ui.pointing.pointer import PageCamera
 
 WIDTH, HEIGHT = 1200.0, 800.0
 FOV = 0.8
 
 
-def eye() -> Eye:
+def eye() -> PageCamera:
     X_SC = make_pose(rotation_from_rpy((-2.3, 0.1, 0.2)), (0.1, -0.6, 0.8))
-    return Eye(X_SC, FOV, WIDTH / HEIGHT)
+    return PageCamera(X_SC, FOV, WIDTH / HEIGHT)
 
 
 def test_points_are_seen_where_a_pinhole_camera_sees_them() -> None:

@@ -17,8 +17,8 @@ from burg_drake.compose.commands.placing import AddObject
 from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.session import ComposeSession
 from burg_drake.station.document.station_document import load_station
-from burg_drake.ui.pointing.pointer import Eye
-from burg_drake.ui.server.door import Door, serve
+from burg_drake.ui.pointing.pointer import PageCamera
+from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from tests.ui.page_client import until
 
@@ -31,7 +31,7 @@ class Setup:
 
     session: ComposeSession
     page: SetupPage
-    door: Door
+    door: ServedPage
     tab: Any
 
     @property
@@ -48,7 +48,7 @@ class Setup:
         """Where a point of the scene is on the tab [pixel]."""
         client = list(self.door.server.get_clients().values())[-1]
         box = self.tab.locator("canvas").first.bounding_box()
-        x, y = Eye.of(client.camera).on_screen(p_SQ)[0]
+        x, y = PageCamera.of(client.camera).on_screen(p_SQ)[0]
         return float(box["x"] + x * box["width"]), float(box["y"] + y * box["height"])
 
     def middle(self, name: str) -> Any:

@@ -23,7 +23,7 @@ from typing import Any
 from burg_drake.apps.ar.session_status import status
 from burg_drake.apps.web import PageHandler, PageServer, address, picture_number
 from burg_drake.cameras.live import LiveSession, ViewActions
-from burg_drake.core import LOCALHOST, RequestError, require_own_host
+from burg_drake.core import LOCALHOST, RequestError, require_local_host
 
 FIRST_PORT = 7100
 """Without a port the first free one from here on; Meshcat's begin at 7000."""
@@ -103,7 +103,7 @@ class ViewHandler(PageHandler):
 
     def admitted(self) -> tuple[str, dict[str, str]]:
         """Only this machine is meant, and only the page itself may be led to from elsewhere."""
-        require_own_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
+        require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
         return address(self.path)
 
     def _send_picture(self, query: dict[str, str]) -> None:

@@ -29,8 +29,8 @@ def status(live: LiveSession, actions: ViewActions, after: int = 0) -> dict[str,
     Returns:
         Plain data without NaN; what is not known is None.
     """
-    scene, recording = live.session.scene, actions.recording
-    style = live.session.style
+    scene, recording = live.processor.scene, actions.recording
+    style = live.processor.style
     return {
         "scene": {"name": scene.name, "objects": placing_order(scene)},
         "source": {
@@ -58,7 +58,7 @@ def status(live: LiveSession, actions: ViewActions, after: int = 0) -> dict[str,
 
 
 def _picture(live: LiveSession, picture: Picture) -> dict[str, Any]:
-    sight, board = picture.sight, live.session.scene.board
+    sight, board = picture.located, live.processor.scene.board
     estimate = sight.estimate
     return {
         "number": picture.number,

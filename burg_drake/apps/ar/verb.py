@@ -184,7 +184,7 @@ def _serve(
     server = ViewServer(live, actions, host=arguments.host, port=arguments.port)
     server.start()
     closing.callback(server.close)
-    scene = live.session.scene
+    scene = live.processor.scene
     print(f"{scene.name} over {live.source.name}: open {server.url} in a browser", flush=True)
     print("Press Ctrl-C to end.", flush=True)
     if arguments.open:

@@ -79,7 +79,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
     from burg_drake.core.files import require_writable
 
     if bool(arguments.images) == bool(arguments.camera):
-        raise InvalidInputError("give images of the target, or --camera; one of both")
+        raise InvalidInputError("give images of the target, or --camera; not both")
     for output in (arguments.output, arguments.report):
         if output:
             require_writable(output)
@@ -126,11 +126,11 @@ def _look(
     """Looks for the target in photos."""
     from burg_drake.cameras.calibration import find_target
     from burg_drake.core import InvalidInputError
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
 
     views, rejected = [], []
     with Reporter(True) as reporter:
-        pace = Pace(reporter.show, Progress("looking for the target", unit="images"))
+        pace = ProgressMeter(reporter.show, Progress("looking for the target", unit="images"))
         while True:
             try:
                 frame = source.read()
@@ -186,7 +186,7 @@ def _take(
 def _print(calibration: Calibration) -> None:
     """Prints views, what was left out, parameters and where the image was covered."""
     from burg_drake.cameras.calibration import coverage, image_grid, uncertainty
-    from burg_drake.core.terminal import TextTable, figure
+    from burg_drake.core.terminal import TextTable, format_number
 
     table = TextTable("views").names("image")
     table.numbers("corners", "rms [px]", "worst [px]", "tilt [deg]", "blur [px]")
@@ -195,10 +195,10 @@ def _print(calibration: Calibration) -> None:
         table.row(
             used.view.name,
             str(len(used.view.ids)),
-            figure(used.rms, 3),
-            figure(worst, 2),
-            figure(math.degrees(used.tilt), 0),
-            figure(used.view.blur, 2),
+            format_number(used.rms, 3),
+            format_number(worst, 2),
+            format_number(math.degrees(used.tilt), 0),
+            format_number(used.view.blur, 2),
         )
     table.show()
     for name, reason in calibration.rejected:

@@ -15,7 +15,7 @@ from burg_drake.apps.options import (
     positive,
     print_scale,
 )
-from burg_drake.core.terminal import TextTable, figure
+from burg_drake.core.terminal import TextTable, format_number
 
 if TYPE_CHECKING:
     from burg_drake.cameras.placement import Placement, PlacementCheck
@@ -135,11 +135,11 @@ def _cells(placement: Placement) -> list[str]:
     if placement.displacement is None or placement.displacement_sd is None:
         return ["-"] * 6 + [f"not seen: {placement.reason}"]
     x, y = (1e3 * way for way in placement.displacement)
-    way = [figure(value, 1) for value in (math.hypot(x, y), x, y)]
+    way = [format_number(value, 1) for value in (math.hypot(x, y), x, y)]
     turn = [None if a is None else math.degrees(a) for a in (placement.angle, placement.angle_sd)]
-    deviation = figure(1e3 * max(placement.displacement_sd), 1)
+    deviation = format_number(1e3 * max(placement.displacement_sd), 1)
     remark = f"uncertain: {placement.reason}" if placement.reason else ""
-    return [*way, deviation, *(figure(value, 1) for value in turn), remark]
+    return [*way, deviation, *(format_number(value, 1) for value in turn), remark]
 
 
 def _write_overlay(path: str, check: PlacementCheck, scene: Any, photo: Any) -> None:

@@ -149,7 +149,7 @@ def _others(first: str, paths: list[str]) -> tuple[str, str | None]:
             f"{len(paths) + 1} things to compare; give RUN TRIALS, RUN RUN, or RUN RUN TRIALS"
         )
     if Path(first).suffix in TRIALS and Path(first).is_file():
-        raise InvalidInputError(f"{shown(first)} is no run; give the run first, then the trials")
+        raise InvalidInputError(f"{shown(first)} is not a run; give the run first, then the trials")
     kinds = [Path(path).suffix in TRIALS for path in paths]
     if kinds == [True, False]:
         raise InvalidInputError(

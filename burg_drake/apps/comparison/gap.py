@@ -61,7 +61,7 @@ def add_to(verbs: Any) -> None:
         "The same command goes on where an interrupted one stopped. Every step is an ordinary run.",
         options=_add_options,
     )
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def _add_options(parser: Parser) -> None:
@@ -221,7 +221,7 @@ def _require_own(arguments: argparse.Namespace, run: Run) -> None:
     for option in (*options, *map(motion_option, given_motion(arguments))):
         raise InvalidInputError(
             f"{option} is about a scene; {run.path} is a run, which has grasps, station, engine and"
-            " motion of its own: leave it away"
+            " motion of its own: leave it out"
         )
 
 

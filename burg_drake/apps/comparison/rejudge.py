@@ -51,7 +51,7 @@ def rejudge_for(arguments: argparse.Namespace) -> Rejudging | None:
     trials = arguments.others[-1]
     if Path(trials).suffix not in (".yaml", ".yml"):
         raise InvalidInputError(
-            "--rejudge judges real trials again; give a trials file (.yaml), or leave it away"
+            "--rejudge judges real trials again; give a trials file (.yaml), or leave it out"
         )
     run = arguments.run_folder
     from burg_drake.core.workers import default_workers

@@ -141,7 +141,7 @@ def _sample(
     settings: SamplingSettings,
 ) -> tuple[dict[str, GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.evaluation.candidates import sample_library, sample_scene
 
     seed, only = arguments.seed, arguments.only
@@ -152,7 +152,7 @@ def _sample(
     sampled, seconds = {}, {}
     total = len(_objects(only, source))
     with Reporter(not arguments.quiet) as reporter:
-        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
+        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
         start = time.perf_counter()
         for name, grasps in stream:
             sampled[name], seconds[name] = grasps, time.perf_counter() - start
@@ -176,12 +176,12 @@ def sampled_table(
     sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int
 ) -> TextTable:
     """What sampling came to, by instance or object."""
-    from burg_drake.core.terminal import count, figure
+    from burg_drake.core.terminal import format_count, format_number
 
     table = TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
     for name, grasps in sampled.items():
         counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
-        table.row(name, *map(count, counts), figure(seconds[name], 2))
+        table.row(name, *map(format_count, counts), format_number(seconds[name], 2))
     return table
 
 

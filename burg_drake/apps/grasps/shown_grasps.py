@@ -93,5 +93,5 @@ def _outcomes(text: str) -> set[Outcome]:
     unknown = [name for name in names if name not in known]
     if unknown or not names:
         given = unknown[0] if unknown else text
-        raise argparse.ArgumentTypeError(f"{given!r} is no outcome; {nearest(given, known)}")
+        raise argparse.ArgumentTypeError(f"{given!r} is not an outcome; {nearest(given, known)}")
     return {Outcome(name) for name in names}

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from burg_drake.apps.terminal import QUANTILES as SHOWN_QUANTILES, print_numbers
-from burg_drake.core.terminal import TextTable, count, figure, percent
+from burg_drake.core.terminal import TextTable, format_count, format_number, format_percent
 from burg_drake.grasping.comparison import (
     FRICTION_NEEDED,
     QUANTILES,
@@ -41,7 +41,7 @@ def print_summary(
     numbers = {name: values for name, values in summary.numbers.items() if values.count}
     print_numbers("", {name: (of.count, _figures(of)) for name, of in numbers.items()}, frame)
     for name, share in summary.truths.items():
-        print(f"{name}: {share.count:,} of {share.total:,} ({percent(share.value)})")
+        print(f"{name}: {share.count:,} of {share.total:,} ({format_percent(share.value)})")
     for name, counts in summary.texts.items():
         if 1 < len(counts) < summary.overall.grasps or name == "outcome":
             print(f"{name}: {_occurrences(counts)}")
@@ -57,12 +57,12 @@ def summary_table(title: str, summary: SetSummary) -> TextTable:
     for name, one in _with_all(summary.objects, summary.overall):
         table.row(
             name or "-",
-            count(one.grasps),
-            count(one.instances or None),
-            count(one.duplicates),
-            figure(1e3 * one.width.mean, 1),
-            figure(one.score.mean, 3),
-            figure(1e3 * one.neighbour.mean, 1),
+            format_count(one.grasps),
+            format_count(one.instances or None),
+            format_count(one.duplicates),
+            format_number(1e3 * one.width.mean, 1),
+            format_number(one.score.mean, 3),
+            format_number(1e3 * one.neighbour.mean, 1),
         )
     return table
 
@@ -79,15 +79,15 @@ def comparison_table(comparison: SetComparison) -> TextTable:
     for name, one in _with_all(comparison.objects, comparison.overall):
         table.row(
             name or "-",
-            count(one.coverage.total),
-            count(one.precision.total),
-            percent(one.coverage.value),
-            percent(one.precision.value),
-            figure(1e3 * one.to_grasps.median, 1),
-            figure(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)], 1),
-            figure(1e3 * one.translation.median, 1),
-            figure(math.degrees(one.angle.median), 1),
-            figure(1e3 * one.to_reference.median, 1),
+            format_count(one.coverage.total),
+            format_count(one.precision.total),
+            format_percent(one.coverage.value),
+            format_percent(one.precision.value),
+            format_number(1e3 * one.to_grasps.median, 1),
+            format_number(1e3 * one.to_grasps.quantiles[QUANTILES.index(0.95)], 1),
+            format_number(1e3 * one.translation.median, 1),
+            format_number(math.degrees(one.angle.median), 1),
+            format_number(1e3 * one.to_reference.median, 1),
         )
     return table
 
@@ -101,8 +101,8 @@ def ranking_table(ranking: Ranking) -> TextTable:
         ranking.criteria, ranking.good, ranking.average_precision, top.by_criterion, strict=True
     )
     for name, good, ap, ap_top in rows:
-        of = f"{count(good)} of {count(ranking.grasps)}"
-        table.row(name, of, figure(ap, 3), figure(ap_top, 3))
+        of = f"{format_count(good)} of {format_count(ranking.grasps)}"
+        table.row(name, of, format_number(ap, 3), format_number(ap_top, 3))
     return table
 
 
@@ -110,8 +110,8 @@ def print_comparison(comparison: SetComparison) -> None:
     """Prints how two sets compare, by object."""
     comparison_table(comparison).show()
     overall = comparison.overall
-    print(f"coverage: B has {percent(overall.coverage.value)} of A")
-    print(f"precision: A has {percent(overall.precision.value)} of B")
+    print(f"coverage: B has {format_percent(overall.coverage.value)} of A")
+    print(f"precision: A has {format_percent(overall.precision.value)} of B")
     print(f"ids in both: {comparison.shared_ids:,}")
 
 

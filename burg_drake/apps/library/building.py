@@ -108,12 +108,14 @@ def _build(
     arguments: argparse.Namespace,
 ) -> int:
     from burg_drake.apps.library.viewing import print_library
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.core.workers import default_workers
     from burg_drake.pipeline import build_library
 
     with Reporter(not arguments.quiet) as reporter:
-        pace = Pace(reporter.show, Progress("building", total=len(sources), unit="objects"))
+        pace = ProgressMeter(
+            reporter.show, Progress("building", total=len(sources), unit="objects")
+        )
 
         def progress(name: str, state: str, done: int, total: int) -> None:
             """Objects that are up to date come first, and cost nothing."""

@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from burg_drake.core.terminal import TextTable, count, figure
+from burg_drake.core.terminal import TextTable, format_count, format_number
 
 if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectEntry, ObjectLibrary
@@ -84,14 +84,14 @@ def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:
     table.numbers("mass [g]", "size [mm]", "mu", "pieces", "poses")
     for name, entry in objects.items():
         size = [1e3 * (b - a) for a, b in zip(entry.lower, entry.upper, strict=True)]
-        mass = figure(1e3 * entry.mass, 1)
+        mass = format_number(1e3 * entry.mass, 1)
         marks = {"density": f"~{mass}", "fixed": "fixed"}
         table.row(
             name,
             marks.get(entry.mass_properties.source, mass),
-            " x ".join(figure(s, 0) for s in size),
-            figure(entry.friction),
-            count(len(entry.pieces)),
-            count(len(entry.stable_poses)),
+            " x ".join(format_number(s, 0) for s in size),
+            format_number(entry.friction),
+            format_count(len(entry.pieces)),
+            format_count(len(entry.stable_poses)),
         )
     return table

@@ -98,7 +98,7 @@ def how_it_ended(campaign: Campaign) -> int:
 
 def _scene_table(summary: Summary) -> Any:
     """The scenes in which the smallest share of the executed grasps was lifted."""
-    from burg_drake.core.terminal import count, percent
+    from burg_drake.core.terminal import format_count, format_percent
     from burg_drake.core.terminal import TextTable
 
     def share(group: Any) -> float:
@@ -110,8 +110,8 @@ def _scene_table(summary: Summary) -> Any:
     table = TextTable(title).names("scene")
     table.numbers(*summary.steps, "success")
     for group in groups:
-        success = percent(share(group)) if group.executed else "-"
-        table.row(group.name, *(count(group.funnel[name]) for name in summary.steps), success)
+        success = format_percent(share(group)) if group.executed else "-"
+        table.row(group.name, *(format_count(group.funnel[name]) for name in summary.steps), success)
     if more:
         table.caption = f"{more:,} more scenes are in the columns of the store"
     return table

@@ -54,7 +54,7 @@ def add_to(verbs: Any) -> None:
         "The same command goes on where an interrupted one stopped.",
         options=_add_options,
     )
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def _add_options(parser: Parser) -> None:
@@ -105,7 +105,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     from burg_drake.scene.document import load_scene
     from burg_drake.scene.document import scene_references
     from burg_drake.station.document import GraspMotion
-    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.checks import require_valid_scene
     from burg_drake.station.document import load_station
 
     require_file(arguments)
@@ -123,7 +123,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     for note in given.notes if given else ():
         print(f"note: {note}")
     if mode != "hand":
-        require_sound_scene(scene, station)
+        require_valid_scene(scene, station)
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
     with chosen_cluster(arguments) as executor:

@@ -55,8 +55,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
         "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
         "",
-        "A grasp is reachable if the open hand is clear, also on the straight way in, and with",
-        "the object in it on the straight ways back and up, the arm can follow them, and it finds",
+        "A grasp is reachable if the open hand is clear, also on the straight approach, and with",
+        "the object in it on the straight retreat and lift, the arm can follow them, and it finds",
         "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
         "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
         "does that.",
@@ -118,7 +118,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.document import GraspMotion
-    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.checks import require_valid_scene
     from burg_drake.station.document import load_station
 
     require_file(arguments)
@@ -131,10 +131,10 @@ def run_reach(arguments: argparse.Namespace) -> int:
         raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
     if arguments.plans:
         require_writable(Path(arguments.plans) / "plan")
-        arguments.after_interrupt = "; the same command goes on from here"
+        arguments.after_interrupt = "; run the same command to continue"
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    require_sound_scene(scene, station)
+    require_valid_scene(scene, station)
     motion = chosen_motion(arguments, station)
     grasps = _grasps(arguments, scene, station)
     if isinstance(output, Output):
@@ -205,7 +205,7 @@ def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> dict[str, GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import ProgressMeter, Progress, Reporter
     from burg_drake.evaluation.candidates import sample_scene
     from burg_drake.evaluation.candidates import chosen_instances
     from burg_drake.evaluation.candidates import SamplingSettings
@@ -215,7 +215,7 @@ def sampled_grasps(
     sampled = {}
     total = len(chosen_instances(scene, arguments.only))
     with Reporter(not arguments.quiet) as reporter:
-        pace = Pace(reporter.show, Progress("sampling", total=total, unit="objects"))
+        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
         for name, grasps in sample_scene(scene, station, count, seed, settings, arguments.only):
             sampled[name] = grasps
             pace.step(note=name)

@@ -26,7 +26,7 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
         asked: objects that it was asked about, of which some may have no grasp.
         motion: of the hand.
     """
-    from burg_drake.core.terminal import figure
+    from burg_drake.core.terminal import format_number
     from burg_drake.core.grasps import Outcome, Stage
     from burg_drake.evaluation.results import unclear_notes, unmoved_notes
 
@@ -44,13 +44,13 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
     clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
     seconds = float(grasps.column("cpu").sum())
     if clear and seconds > 0.0:
-        rate = f"{figure(clear / seconds)} clear grasps per CPU second"
-        print(f"{rate}; {figure(seconds)} CPU seconds without set-up")
+        rate = f"{format_number(clear / seconds)} clear grasps per CPU second"
+        print(f"{rate}; {format_number(seconds)} CPU seconds without set-up")
 
 
 def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
     """How many grasps of each object the arm can execute."""
-    from burg_drake.core.terminal import count, percent
+    from burg_drake.core.terminal import format_count, format_percent
     from burg_drake.core.grasps import Outcome, Stage
 
     table = TextTable("Grasps that the arm can execute").names("object")
@@ -61,8 +61,8 @@ def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcom
             table.gap()
         clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
         good = counts[Outcome.REACHABLE]
-        share = percent(good / clear) if clear else "-"
-        table.row(name, count(counts.total()), count(clear), count(good), share)
+        share = format_percent(good / clear) if clear else "-"
+        table.row(name, format_count(counts.total()), format_count(clear), format_count(good), share)
     return table
 
 
@@ -72,7 +72,7 @@ def outcome_table(
     """Outcomes by object where they fit, with what was mostly in the way."""
     from rich.console import Console
 
-    from burg_drake.core.terminal import count, percent
+    from burg_drake.core.terminal import format_count, format_percent
     from burg_drake.core.grasps import Outcome
 
     room = Console().width - 70
@@ -84,8 +84,8 @@ def outcome_table(
     for outcome in sorted(total, key=order.index):
         mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(BLOCKERS)
-        counts = [count(n) if (n := by_object[name][outcome]) else "·" for name in names]
-        share = percent(total[outcome] / len(grasps))
-        way = ", ".join(f"{name} ({count(n)})" for name, n in blockers)
-        table.row(outcome.value, *counts, count(total[outcome]), share, way)
+        counts = [format_count(n) if (n := by_object[name][outcome]) else "·" for name in names]
+        share = format_percent(total[outcome] / len(grasps))
+        way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
+        table.row(outcome.value, *counts, format_count(total[outcome]), share, way)
     return table

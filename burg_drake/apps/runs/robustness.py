@@ -42,7 +42,7 @@ def add_to(verbs: Any) -> None:
         "commands found about the same grasps with the same settings.",
         options=_add_options,
     )
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def _add_options(parser: Parser) -> None:

@@ -77,14 +77,14 @@ def _show(status: Status, as_json: bool, *, again: bool = False) -> None:
 def status_lines(status: Status) -> list[str]:
     """The status for people; always as many lines for the same run, but for its failures."""
     from burg_drake.core import listing
-    from burg_drake.core.terminal import figure, percent
+    from burg_drake.core.terminal import format_number, format_percent
     from burg_drake.core.grasps import Outcome
 
-    share = f" ({percent(status.judged / status.total)})" if status.total else ""
+    share = f" ({format_percent(status.judged / status.total)})" if status.total else ""
     about = "about " if status.kind == "campaign" and not status.complete else ""
     head = f"{status.judged:,} of {about}{status.total:,} grasps judged{share}"
     if status.rate:
-        head += f", {figure(status.rate)}/s"
+        head += f", {format_number(status.rate)}/s"
     if status.left is not None and not status.complete:
         left = int(status.left)
         head += f", {left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"

@@ -84,7 +84,7 @@ def run_sample(arguments: argparse.Namespace) -> int:
     recipe = recipe_of(arguments, library, station, output.parent if single else output)
     if single:
         return _one(arguments, recipe, library, station)
-    arguments.after_interrupt = "; what is done is kept, and the same command goes on from there"
+    arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     return _many(arguments, recipe, library, station)
 
 
@@ -93,13 +93,13 @@ def _one(
 ) -> int:
     """Writes one file."""
     from burg_drake.core.files import require_writable
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.generation import SceneSampler
     from burg_drake.scene.document import save_scene
 
     require_writable(arguments.output)
     with Reporter(not arguments.quiet) as reporter:
-        pace = Pace(
+        pace = ProgressMeter(
             reporter.show, Progress("sampling", 0, recipe.attempts, unit="attempts at most")
         )
         sampled = SceneSampler(recipe, library, station).sample(0, refused=pace.step)
@@ -118,15 +118,15 @@ def _many(
     arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
 ) -> int:
     """Fills a folder."""
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.generation import sample_scenes
 
     with Reporter(not arguments.quiet) as reporter:
-        paces: list[Pace] = []
+        paces: list[ProgressMeter] = []
 
         def begin(known: int) -> None:
             event = Progress("starting", known, arguments.count, unit="scenes")
-            paces.append(Pace(reporter.show, event, "sampling"))
+            paces.append(ProgressMeter(reporter.show, event, "sampling"))
 
         found = sample_scenes(
             recipe,

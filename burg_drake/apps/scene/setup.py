@@ -18,7 +18,7 @@ from burg_drake.apps.terminal import (
 
 if TYPE_CHECKING:
     from burg_drake.compose import ComposeSession
-    from burg_drake.ui.server import Door
+    from burg_drake.ui.server import ServedPage
 
 DEFAULT_LIBRARY = "household"
 LARGEST_PICTURE = 1 << 27
@@ -100,7 +100,7 @@ def _open(arguments: argparse.Namespace) -> ComposeSession:
 
 def _serve(
     arguments: argparse.Namespace, session: ComposeSession, closing: contextlib.ExitStack
-) -> Door:
+) -> ServedPage:
     """Serves the page until all is closed."""
     from burg_drake.ui import SetupPage
     from burg_drake.ui.server import serve
@@ -112,7 +112,7 @@ def _serve(
     return door
 
 
-def _tell(door: Door, session: ComposeSession) -> None:
+def _tell(door: ServedPage, session: ComposeSession) -> None:
     view = session.view
     count = len(view.instances)
     objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
@@ -133,5 +133,5 @@ def _say_what_is_left(session: ComposeSession) -> None:
         )
 
 
-def _tell_next(door: Door, address: str) -> None:
+def _tell_next(door: ServedPage, address: str) -> None:
     print(f"opened by {address}; another browser: open {door.url}", flush=True)

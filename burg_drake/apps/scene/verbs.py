@@ -20,7 +20,7 @@ from burg_drake.apps.options import (
     positive,
 )
 from burg_drake.apps.scene import export, importing, sample
-from burg_drake.core.terminal import TextTable, figure
+from burg_drake.core.terminal import TextTable, format_number
 
 if TYPE_CHECKING:
     from burg_drake.simulation.rest import Displacement
@@ -149,7 +149,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     """Settles a scene; 1 if an object still moves, is gone, or lies where it must not."""
     from burg_drake.apps.scene.references import require_another_file
     from burg_drake.core.files import require_writable
-    from burg_drake.core.terminal import Pace, Progress, Reporter
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.scene.document import load_scene
     from burg_drake.simulation.settling import settle_scene
     from burg_drake.station.checks import check_scene
@@ -161,7 +161,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     station = load_station(arguments.station)
     with Reporter(not arguments.quiet) as reporter:
         whole = Progress("settling", 0.0, arguments.time_limit, unit="s at most")
-        pace = Pace(reporter.show, whole)
+        pace = ProgressMeter(reporter.show, whole)
         settled = settle_scene(
             scene,
             station,
@@ -201,7 +201,11 @@ def displacement_table(displacements: Mapping[str, Displacement]) -> TextTable:
     """How far each object has come."""
     table = TextTable().names("object").numbers("moved [mm]", "turned [deg]")
     for name, moved in displacements.items():
-        table.row(name, figure(1e3 * moved.distance, 1), figure(math.degrees(moved.angle), 1))
+        table.row(
+            name,
+            format_number(1e3 * moved.distance, 1),
+            format_number(math.degrees(moved.angle), 1),
+        )
     return table
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from rich.console import Console
 
 from burg_drake.core.grasps import PLAIN, describe
-from burg_drake.core.terminal import TextTable, count, figure
+from burg_drake.core.terminal import TextTable, format_count, format_number
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 
@@ -50,5 +50,7 @@ def number_table(title: str, heads: list[str], rows: Rows, frame: str = "object"
         column = describe(name)
         unit, size = SHOWN.get(column.unit, (column.unit, 1.0)) if column else ("", 1.0)
         label = f"{name} [{unit}]" if unit not in ("", PLAIN) else name
-        table.row(label, count(known), *(figure(figures[head] / size) for head in heads))
+        table.row(
+            label, format_count(known), *(format_number(figures[head] / size) for head in heads)
+        )
     return table

@@ -53,7 +53,7 @@ def add_to(group: Any) -> None:
     )
     add_retry_failed(parser, "trials")
     add_quiet(parser)
-    parser.set_defaults(after_interrupt="; the same command goes on from here")
+    parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
 def run_export(arguments: argparse.Namespace) -> int:

@@ -160,7 +160,7 @@ def _time(text: str) -> str:
         return (moment if moment.tzinfo else moment.astimezone()).isoformat()
     except (ValueError, OverflowError) as error:
         raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is no time; give ISO 8601 such as 2026-05-04T16:30"
+            f"{quoted(text)} is not a time; give ISO 8601 such as 2026-05-04T16:30"
         ) from error
 
 

@@ -53,7 +53,7 @@ def run_show(arguments: argparse.Namespace) -> int:
         print(f"note: {note}")
     if sheet.next is not None:
         print(f"next is {sheet.next.number}: {sheet.next.grasp}")
-    lacking = book.lacking()
+    lacking = book.missing_values()
     _print_lacking(arguments.trials, lacking)
     return 1 if any(found.values for found in lacking) else 0
 

@@ -20,7 +20,7 @@ def address(target: str) -> tuple[str, dict[str, str]]:
     """Path and query of what is asked for; of a repeated field the last value.
 
     Raises:
-        RequestError: it is no address.
+        RequestError: it is not an address.
     """
     try:
         url = urlsplit(target)

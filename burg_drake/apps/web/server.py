@@ -24,8 +24,8 @@ from burg_drake.core import (
     BurgError,
     InvalidInputError,
     RequestError,
+    address_in_use_error,
     page_url,
-    taken,
 )
 
 PORTS = 50
@@ -80,7 +80,9 @@ class PageServer(ThreadingHTTPServer):
                         f"the {self.title} cannot be served on {host}: {error.strerror or error}"
                     ) from error
         else:
-            raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
+            raise InvalidInputError(
+                address_in_use_error(host, ports, any_of_them=port is None)
+            ) from failure
 
     @property
     def url(self) -> str:

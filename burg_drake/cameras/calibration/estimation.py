@@ -26,7 +26,7 @@ from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
 
 AUTO = "auto"
 LEAST_VIEWS = 3
-"""Fewer do not tell a camera."""
+"""Fewer do not determine a camera."""
 BLURRED = 0.08
 """Blur of a view, as a share of a square's side, from which markers smear into the corners."""
 SAME = 0.005
@@ -120,7 +120,7 @@ def calibrate(
         names: of the images; numbers from 0 if not given.
 
     Raises:
-        InvalidInputError: too few images show the target, or they do not tell a camera.
+        InvalidInputError: too few images show the target, or they do not determine a camera.
         UnknownNameError: no such model.
     """
     views, rejected = [], []
@@ -151,7 +151,7 @@ def calibrate_views(
         rejected: images that are no views, and why.
 
     Raises:
-        InvalidInputError: fewer than `LEAST_VIEWS` can be used, or they do not tell a camera.
+        InvalidInputError: fewer than `LEAST_VIEWS` can be used, or they do not determine a camera.
         UnknownNameError: no such model.
     """
     if model not in (AUTO, *MODELS):

@@ -53,8 +53,8 @@ class LensFit:
         """Bayesian information criterion, or Akaike's, which is more generous to large models: the
         lowest of several models is best supported."""
         n = sum(r.size for r in self.residuals)
-        price = np.log(n) if bayesian else 2.0
-        return float(n * np.log(self.squares / n) + price * len(self.covariance))
+        penalty = np.log(n) if bayesian else 2.0
+        return float(n * np.log(self.squares / n) + penalty * len(self.covariance))
 
 
 def fit_lens(
@@ -69,7 +69,7 @@ def fit_lens(
         start: a fit of a simpler model to begin from.
 
     Raises:
-        InvalidInputError: the views do not tell a camera.
+        InvalidInputError: the views do not determine a camera.
     """
     count, flags = MODELS[model]
     width, height = views[0].size
@@ -85,11 +85,12 @@ def fit_lens(
         )
     except cv2.error as error:
         raise InvalidInputError(
-            f"{len(views)} views of the target do not tell a camera; take more, tilted to all sides"
+            f"{len(views)} views of the target do not determine a camera; take more, tilted to"
+            " all sides"
         ) from error
     k = np.asarray(k, dtype=float).ravel()[: max(count, 5)]
     if not (np.isfinite(K).all() and np.isfinite(k).all() and K[0, 0] > 0.0 and K[1, 1] > 0.0):
-        raise InvalidInputError("the views of the target do not tell a camera; tilt it more")
+        raise InvalidInputError("the views of the target do not determine a camera; tilt it more")
     residuals, reduced = [], []
     for p, q, rotation, translation in zip(points, pixels, rotations, translations, strict=True):
         expected, J = cv2.projectPoints(p.astype(float), rotation, translation, K, k)

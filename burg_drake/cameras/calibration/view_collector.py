@@ -46,11 +46,11 @@ class ViewCollector:
         if view.blur > BLURRED * view.side:
             return False, "blurred: more light, or focus"
         if any(displacement(view, other) < DIFFERENT for other in self.views):
-            return False, self.wish(frame.image.shape[1], frame.image.shape[0])
+            return False, self.missing_view(frame.image.shape[1], frame.image.shape[0])
         self.views.append(view)
-        return True, self.wish(frame.image.shape[1], frame.image.shape[0])
+        return True, self.missing_view(frame.image.shape[1], frame.image.shape[0])
 
-    def wish(self, width: int, height: int) -> str:
+    def missing_view(self, width: int, height: int) -> str:
         """What view is wanted next."""
         empty = uncovered(coverage(self.views, (width, height)))
         if empty:

@@ -52,9 +52,9 @@ class ViewActions:
         live.keep_awake(lambda: self.recording is not None)
 
     @property
-    def session(self) -> FrameProcessor:
+    def processor(self) -> FrameProcessor:
         """What looks at the frames."""
-        return self.live.session
+        return self.live.processor
 
     def snapshot(self, folder: str | Path | None = None, picture: Picture | None = None) -> Path:
         """Saves a picture.
@@ -69,27 +69,27 @@ class ViewActions:
         picture = picture or self._newest()
         if picture is None:
             raise InvalidInputError("there is no picture yet")
-        sight = picture.sight
+        located = picture.located
         document = describe_snapshot(
-            self.session.scene,
-            self.session.intrinsics,
-            sight.estimate,
-            source=sight.frame.name,
+            self.processor.scene,
+            self.processor.intrinsics,
+            located.estimate,
+            source=located.frame.name,
             taken=_now(),
-            time=sight.frame.time,
-            X_SC_drawn=sight.X_SC,
+            time=located.frame.time,
+            X_SC_drawn=located.X_SC,
             placement=picture.placement,
         )
         snapshot = Snapshot(
             document=document,
-            image=sight.frame.image,
+            image=located.frame.image,
             overlay=picture.overlay,
-            depth=sight.frame.depth,
+            depth=located.frame.depth,
         )
         with self._lock:  # two at once must not choose the same number
-            place = Path(folder) if folder is not None else self._free("snapshot")
+            place = Path(folder) if folder is not None else self._free_path("snapshot")
             save_snapshot(snapshot, place)
-        self.live.events.tell(f"snapshot {place}")
+        self.live.events.add(f"snapshot {place}")
         return place
 
     def start_recording(self, path: str | Path | None = None) -> Path:
@@ -106,19 +106,19 @@ class ViewActions:
             if self.recording is not None:
                 raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
             if path is None:
-                path = self._free("recording", ".mp4", taken=self._is_recorded)
+                path = self._free_path("recording", ".mp4", taken=self._is_recorded)
             rate = self.live.source.fps or DEFAULT_RATE
             self.recording = Recording(
                 path,
-                self.session.intrinsics,
-                scene_document(self.session.scene),
+                self.processor.intrinsics,
+                scene_document(self.processor.scene),
                 source=self.live.source.name,
                 started=_now(),
                 frames_per_second=min(max(rate, LOWEST_RATE), HIGHEST_RATE),
                 plain=self._plain,
             )
-            self.live.attend()
-            self.live.events.tell(f"recording {path}")
+            self.live.request_pictures()
+            self.live.events.add(f"recording {path}")
             return self.recording.path
 
     def stop_recording(self) -> Path | None:
@@ -133,10 +133,10 @@ class ViewActions:
                 return None
             path = recording.close()
         if path is None:
-            self.live.events.tell(f"{recording.path}: nothing was recorded")
+            self.live.events.add(f"{recording.path}: nothing was recorded")
         else:
             seconds = recording.frames / recording.frames_per_second
-            self.live.events.tell(f"recorded {path}, {seconds:.1f} s")
+            self.live.events.add(f"recorded {path}, {seconds:.1f} s")
         return path
 
     def start_check(self) -> None:
@@ -146,13 +146,13 @@ class ViewActions:
             InvalidInputError: there is no picture with a pose, or a check is at work.
         """
         picture = self._newest()
-        if picture is None or not picture.sight.estimate.valid:
+        if picture is None or not picture.located.estimate.valid:
             raise InvalidInputError(
                 "a placement check needs a picture that shows where the board is"
             )
         with self._lock:
             if self.checking:
-                raise InvalidInputError("a placement check is at work already")
+                raise InvalidInputError("a placement check is already running")
             self.checking = True
             self._check = threading.Thread(
                 target=self._measure, args=(picture,), name="placement check", daemon=True
@@ -166,18 +166,18 @@ class ViewActions:
 
     def _newest(self) -> Picture | None:
         """The newest picture; of a session that idled, the next one."""
-        stale = self.live.attend()
+        stale = self.live.request_pictures()
         return self.live.next_picture(stale, FRESH) if stale else self.live.picture
 
     def _measure(self, picture: Picture) -> None:
         try:
-            check = self.session.check(picture.sight)
+            check = self.processor.check(picture.located)
         except BurgError as error:
-            self.live.events.tell(f"placement check: {error}", bad=True)
+            self.live.events.add(f"placement check: {error}", bad=True)
         else:
             self.live.placement = check
             measured = sum(placed.status != "not_seen" for placed in check.instances.values())
-            self.live.events.tell(
+            self.live.events.add(
                 f"placement of {measured} of {len(check.instances)} objects measured"
                 + (f"; {check.reason}" if check.reason else "")
             )
@@ -188,29 +188,29 @@ class ViewActions:
         with self._lock:
             if self.recording is None:
                 return
-            sight = picture.sight
+            located = picture.located
             try:
                 self.recording.add(
-                    picture.overlay, sight.estimate, sight.frame.time, sight.frame.image
+                    picture.overlay, located.estimate, located.frame.time, located.frame.image
                 )
             except Exception as error:  # whatever it is, the view goes on
-                self.live.events.tell(f"recording ended: {error}", bad=True)
-                self._save_what_there_is()
+                self.live.events.add(f"recording ended: {error}", bad=True)
+                self._finish_on_close()
 
-    def _save_what_there_is(self) -> None:
+    def _finish_on_close(self) -> None:
         """Finishes a recording that cannot go on; whoever reads the events learns where it is."""
         try:
             self.stop_recording()
         except Exception as error:
-            self.live.events.tell(str(error), bad=True)
+            self.live.events.add(str(error), bad=True)
 
     def _is_recorded(self, path: Path) -> bool:
         return RecordingFiles(path, self._plain).existing() is not None
 
-    def _free(
+    def _free_path(
         self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
     ) -> Path:
-        return numbered(self.folder, f"{self.session.scene.name}_{what}", suffix, taken=taken)
+        return numbered(self.folder, f"{self.processor.scene.name}_{what}", suffix, taken=taken)
 
 
 def _now() -> str:

@@ -38,7 +38,7 @@ class EventLog:
         self._events: deque[Event] = deque(maxlen=KEPT)
         self._count = 0
 
-    def tell(self, text: str, *, bad: bool = False) -> None:
+    def add(self, text: str, *, bad: bool = False) -> None:
         """Adds an event."""
         with self._lock:
             self._count += 1

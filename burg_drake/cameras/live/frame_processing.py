@@ -98,7 +98,7 @@ class FrameProcessor:
         self._filter: PoseFilter | None = None
         self._track: Track | None = None
 
-    def look(self, frame: Frame, *, steady: bool = False) -> LocatedFrame:
+    def locate(self, frame: Frame, *, steady: bool = False) -> LocatedFrame:
         """Estimates where the camera was.
 
         Args:
@@ -115,28 +115,28 @@ class FrameProcessor:
         if not steady:
             self._track = None
         elif estimate.valid:
-            X_SC = self._followed(estimate)
+            X_SC = self._filtered(estimate)
         return LocatedFrame(frame=frame, estimate=estimate, X_SC=X_SC, milliseconds={"pose": ms})
 
-    def _followed(self, estimate: BoardEstimate) -> Array:
+    def _filtered(self, estimate: BoardEstimate) -> Array:
         """The filtered pose, after one more estimate."""
         from burg_drake.cameras.systems import PoseFilter, Track
 
         if self._filter is None:
             self._filter = PoseFilter(period=1.0)  # of a Drake diagram; here frames set the pace
-        self._track = self._filter.follow(self._track or Track(), estimate)
+        self._track = self._filter.update(self._track or Track(), estimate)
         assert self._track.X_SC is not None
         return self._track.X_SC
 
     def draw(
-        self, sight: LocatedFrame, settings: ViewSettings, placement: PlacementCheck | None = None
+        self, located: LocatedFrame, settings: ViewSettings, placement: PlacementCheck | None = None
     ) -> NDArray[np.uint8]:
         """The frame with the scene drawn over it, or with a line that says why not.
 
         Returns:
             (H, W, 3) RGB.
         """
-        image, estimate = sight.frame.image, sight.estimate
+        image, estimate = located.frame.image, located.estimate
         if not estimate.valid:
             return self._overlay.notice(image, pose_line(estimate, self.scene.board))
         style = replace(
@@ -146,19 +146,19 @@ class FrameProcessor:
             footprints=settings.footprints,
             shown=(settings.guide,) if settings.guide else None,
         )
-        return self._overlay.draw(image, sight.X_SC, placement=placement, style=style)
+        return self._overlay.draw(image, located.X_SC, placement=placement, style=style)
 
-    def check(self, sight: LocatedFrame) -> PlacementCheck:
+    def check(self, located: LocatedFrame) -> PlacementCheck:
         """Measures how far the objects stand from their places; takes a while."""
         from burg_drake.cameras.placement import check_placement
 
-        depth = sight.frame.depth
+        depth = located.frame.depth
         return check_placement(
             self.scene,
-            sight.frame.image,
+            located.frame.image,
             self.intrinsics,
             depth=None if depth is None else depth.astype(np.float32),
-            estimate=sight.estimate,
+            estimate=located.estimate,
             scale=self._board_pose.scale,
         )
 
@@ -183,7 +183,7 @@ def checked_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
 
     Raises:
         InvalidInputError: an opacity outside 0 to 1.
-        UnknownNameError: `guide` is no instance of the scene.
+        UnknownNameError: `guide` is not an instance of the scene.
     """
     if not 0.0 <= settings.opacity <= 1.0:
         raise InvalidInputError(f"opacity {settings.opacity:g} is not a number from 0 to 1")

@@ -99,10 +99,10 @@ class FrameReader:
         try:
             frame = self.source.read()
         except CameraLost as error:
-            self._lost(str(error))
+            self._report_loss(str(error))
             return True
         except InvalidInputError as error:
-            self._events.tell(str(error), bad=True)
+            self._events.add(str(error), bad=True)
             return True
         if frame is not None:
             if self._paced:
@@ -120,7 +120,7 @@ class FrameReader:
 
     def _hand_over(self, frame: Frame) -> None:
         if self.state == "lost":
-            self._events.tell(f"{self.source.name} is back")
+            self._events.add(f"{self.source.name} is back")
         self.state, self.fault = "running", ""
         with self._changed:
             if not self.source.live:
@@ -128,8 +128,8 @@ class FrameReader:
             self._next = frame
         self._on_change()
 
-    def _lost(self, fault: str) -> None:
+    def _report_loss(self, fault: str) -> None:
         if self.state != "lost" and not self._closed.is_set():
-            self._events.tell(fault, bad=True)
+            self._events.add(fault, bad=True)
         self.state, self.fault = "lost", fault
         self._on_change()

@@ -20,7 +20,7 @@ class Picture:
 
     Attributes:
         number: counts pictures; changed settings make a new one of the same frame.
-        sight: the frame and its estimate.
+        located: the frame and its estimate.
         overlay: (H, W, 3) RGB.
         jpeg: the overlay, encoded.
         settings, placement: that it was drawn with.
@@ -28,7 +28,7 @@ class Picture:
     """
 
     number: int
-    sight: LocatedFrame
+    located: LocatedFrame
     overlay: NDArray[np.uint8]
     jpeg: bytes
     settings: ViewSettings

@@ -33,7 +33,7 @@ from burg_drake.core import BurgError
 
 RATE_OVER = 2.0
 """The rate of frames is counted over the last of these [s]."""
-LASTING = 1.0
+REPORT_AFTER = 1.0
 """A pose that comes or goes is an event when it lasts that long [s]."""
 LOOK = 0.5
 """Between two looks of who waits for the end of a session [s]."""
@@ -58,7 +58,7 @@ class LiveSession:
     """A running session; `start` it, and `close` it.
 
     Args:
-        session: what looks at frames and draws.
+        processor: what looks at frames and draws.
         source: of the frames; closed with this.
         events: are told what happens to camera and pose, never once a frame.
         settings: to begin with.
@@ -69,7 +69,7 @@ class LiveSession:
     Attributes:
         picture: the newest; None before the first.
         counts: of frames so far.
-        last_sight: the last frame that gave a pose; before one did, the last frame.
+        last_located: the last frame that gave a pose; before one did, the last frame.
 
     Raises:
         InvalidInputError: the source has another resolution than the intrinsics.
@@ -77,7 +77,7 @@ class LiveSession:
 
     def __init__(
         self,
-        session: FrameProcessor,
+        processor: FrameProcessor,
         source: FrameSource,
         *,
         events: EventLog,
@@ -85,11 +85,11 @@ class LiveSession:
         paced: bool = True,
         idle_after: float = math.inf,
     ) -> None:
-        session.intrinsics.require_size(*source.size, source.name)
-        self.session, self.source, self.events = session, source, events
+        processor.intrinsics.require_size(*source.size, source.name)
+        self.processor, self.source, self.events = processor, source, events
         self.picture: Picture | None = None
         self.counts = Counts()
-        self.last_sight: LocatedFrame | None = None
+        self.last_located: LocatedFrame | None = None
         self.reader = FrameReader(
             source,
             paced=paced,
@@ -100,7 +100,7 @@ class LiveSession:
         self._idle_after = idle_after if source.live else math.inf
         self._asked, self._waiting = math.inf, 0
         self._awake: list[Callable[[], bool]] = []
-        self._settings = checked_settings(session.scene, settings)
+        self._settings = checked_settings(processor.scene, settings)
         self._placement: PlacementCheck | None = None
         self._on_frame: list[Callable[[Picture], None]] = []
         self._changed = threading.Condition(threading.RLock())
@@ -108,9 +108,9 @@ class LiveSession:
         self._limit: int | None = None
         self._failure: BaseException | None = None
         self._moments: deque[float] = deque()
-        self._told: tuple[bool, bool] | None = None
+        self._reported: tuple[bool, bool] | None = None
         self._same_since = (0.0, (False, False))
-        self._worker = threading.Thread(target=self._work, name="live session", daemon=True)
+        self._worker = threading.Thread(target=self._run, name="live session", daemon=True)
 
     def start(self, frames: int | None = None) -> None:
         """Begins to look at frames, no more than `frames` of them if given."""
@@ -141,7 +141,7 @@ class LiveSession:
         unasked = not self._waiting and time.monotonic() - self._asked > self._idle_after
         return unasked and not any(reason() for reason in self._awake)
 
-    def attend(self) -> int:
+    def request_pictures(self) -> int:
         """Somebody wants pictures from now on; wakes the session where it idles.
 
         Returns:
@@ -166,7 +166,7 @@ class LiveSession:
             InvalidInputError: no such setting, or not such a value.
         """
         with self._changed:
-            self._settings = changed_settings(self.session.scene, self._settings, settings)
+            self._settings = changed_settings(self.processor.scene, self._settings, settings)
             self._redraw = True
             self._changed.notify_all()
 
@@ -193,7 +193,7 @@ class LiveSession:
         Of a session that idles it is the next one.
         """
         with self._changed:
-            after = max(after, self.attend())
+            after = max(after, self.request_pictures())
             self._waiting += 1
             try:
                 self.reader.wake()
@@ -238,15 +238,15 @@ class LiveSession:
         with self._changed:
             self._changed.notify_all()
 
-    def _work(self) -> None:
+    def _run(self) -> None:
         try:
             while not self._closed:
-                self._work_once()
+                self._run_once()
         except BaseException as error:  # ends the thread; who waits for it raises it
             self._failure = error
         self._wake()
 
-    def _work_once(self) -> None:
+    def _run_once(self) -> None:
         """Waits for something to do, and does it."""
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._redraw or self._wants_frame)
@@ -255,11 +255,11 @@ class LiveSession:
             frame = self.reader.take() if self._wants_frame else None
             self._busy, self._redraw = True, False
         try:
-            sight = self._look(frame) if frame is not None else None
-            if sight is not None:
-                self._show(sight, new=True)
+            located = self._process(frame) if frame is not None else None
+            if located is not None:
+                self._publish(located, new=True)
             elif self.picture is not None:
-                self._show(self.picture.sight, new=False)
+                self._publish(self.picture.located, new=False)
         finally:
             with self._changed:
                 self._busy = False
@@ -270,58 +270,58 @@ class LiveSession:
         frozen = self._settings.frozen and self.picture is not None
         return not (self.reader.is_empty or frozen or self._enough)
 
-    def _look(self, frame: Frame) -> LocatedFrame | None:
+    def _process(self, frame: Frame) -> LocatedFrame | None:
         try:
-            sight = self.session.look(frame, steady=self._settings.steady)
+            located = self.processor.locate(frame, steady=self._settings.steady)
         except BurgError as error:  # one image of a folder may have another size
-            self.events.tell(f"{error}; left out", bad=True)
+            self.events.add(f"{error}; left out", bad=True)
             self.counts = replace(self.counts, frames=self.counts.frames + 1, reason=str(error))
             return None
-        estimate, counts = sight.estimate, self.counts
+        estimate, counts = located.estimate, self.counts
         self.counts = Counts(
             frames=counts.frames + 1,
             valid=counts.valid + estimate.valid,
             reason=counts.reason if estimate.valid else estimate.reason,
         )
         if estimate.valid or not counts.valid:
-            self.last_sight = sight
+            self.last_located = located
         now = time.monotonic()
         self._moments.append(now)
         while now - self._moments[0] > RATE_OVER:
             self._moments.popleft()
-        self._tell_of_pose(sight, now)
-        return sight
+        self._report_pose(located, now)
+        return located
 
-    def picture_of(self, sight: LocatedFrame, placement: PlacementCheck | None) -> Picture:
+    def picture_of(self, located: LocatedFrame, placement: PlacementCheck | None) -> Picture:
         """Draws a picture with the settings as they are."""
         settings = self._settings
-        overlay, drawing = timed(lambda: self.session.draw(sight, settings, placement))
+        overlay, drawing = timed(lambda: self.processor.draw(located, settings, placement))
         jpeg, encoding = timed(lambda: encode_jpeg(overlay))
         return Picture(
             number=1 if self.picture is None else self.picture.number + 1,
-            sight=sight,
+            located=located,
             overlay=overlay,
             jpeg=jpeg,
             settings=settings,
             placement=placement,
-            milliseconds={**sight.milliseconds, "overlay": drawing, "jpeg": encoding},
+            milliseconds={**located.milliseconds, "overlay": drawing, "jpeg": encoding},
         )
 
-    def _show(self, sight: LocatedFrame, *, new: bool) -> None:
-        picture = self.picture_of(sight, self._placement)
+    def _publish(self, located: LocatedFrame, *, new: bool) -> None:
+        picture = self.picture_of(located, self._placement)
         with self._changed:
             self.picture = picture
             self._changed.notify_all()
         for listener in self._on_frame if new else ():
             listener(picture)
 
-    def _tell_of_pose(self, sight: LocatedFrame, now: float) -> None:
+    def _report_pose(self, located: LocatedFrame, now: float) -> None:
         """An event when the pose comes or goes, and stays so for a while."""
-        state = (sight.estimate.valid, bool(sight.estimate.reason))
+        state = (located.estimate.valid, bool(located.estimate.reason))
         if self._same_since[1] != state:
             self._same_since = (now, state)
-        lasting = now - self._same_since[0] >= LASTING
-        if self._told is None or (state != self._told and lasting):
-            self._told = state
-            line = pose_line(sight.estimate, self.session.scene.board)
-            self.events.tell(f"{sight.frame.name}: {line}", bad=not state[0])
+        lasting = now - self._same_since[0] >= REPORT_AFTER
+        if self._reported is None or (state != self._reported and lasting):
+            self._reported = state
+            line = pose_line(located.estimate, self.processor.scene.board)
+            self.events.add(f"{located.frame.name}: {line}", bad=not state[0])

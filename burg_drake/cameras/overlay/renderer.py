@@ -121,17 +121,17 @@ class Overlay:
         if not shape.names:
             return drawn
         lines = visible_lines(shape, self._view, X_SC)
-        surface = camera.look(X_SC, lines, _shades(shape))
+        surface = camera.render(X_SC, lines, _shades(shape))
         marks = _marks(shape, placement, style)
-        sight = _DrawState(shape, inverse(X_SC), lines, surface, marks)
+        state = _DrawState(shape, inverse(X_SC), lines, surface, marks)
         colors = np.array([self._colors[name] for name in shape.names], dtype=float)
         fill(drawn, surface, colors, style.opacity)
-        inks = [_outlines(sight, _bright(colors), style.outline_width), *self._arrows(sight)]
+        inks = [_outlines(state, _bright(colors), style.outline_width), *self._arrows(state)]
         if style.footprints:
-            inks.append(self._footprints(sight, standing, stander, _bright(colors)))
+            inks.append(self._footprints(state, standing, stander, _bright(colors)))
         stroke(drawn, inks)
         if style.names or marks:
-            self._write(drawn, sight, style.names)
+            self._write(drawn, state, style.names)
         return drawn
 
     def notice(self, image: Bytes, text: str) -> Bytes:
@@ -159,36 +159,36 @@ class Overlay:
             self._shown[shown] = (SurfaceCamera(shape, self._view), *footprints(shape))
         return self._shown[shown]
 
-    def _footprints(self, sight: _DrawState, lines: Array, owner: Indices, colors: Array) -> Ink:
+    def _footprints(self, state: _DrawState, lines: Array, owner: Indices, colors: Array) -> Ink:
         """Where objects stand, as far as no other object is seen there."""
-        ends, line = clip_lines(transform_points(sight.X_CS, lines), self._view)
+        ends, line = clip_lines(transform_points(state.X_CS, lines), self._view)
         pixels, owner = self.intrinsics.project(ends), owner[line]
-        height, width = sight.surface.owner.shape
+        height, width = state.surface.owner.shape
         x, y = np.round(pixels.mean(axis=1)).astype(int).T
         at = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
-        there = sight.surface.owner[at]
+        there = state.surface.owner[at]
         seen = (there == owner) | (there == NOTHING)
         return _ink(
             pixels[seen], colors[owner[seen]], FOOTPRINT_WIDTH, FOOTPRINT_OPACITY, INNER_RIM
         )
 
-    def _arrows(self, sight: _DrawState) -> list[Ink]:
+    def _arrows(self, state: _DrawState) -> list[Ink]:
         inks = []
-        for note in sight.marks.values():
-            ends, _ = clip_lines(transform_points(sight.X_CS, note.lines), self._view)
+        for note in state.marks.values():
+            ends, _ = clip_lines(transform_points(state.X_CS, note.lines), self._view)
             colors = np.tile(np.array(COLORS[note.verdict], dtype=float), (len(ends), 1))
             inks.append(_ink(self.intrinsics.project(ends), colors, ARROW_WIDTH, 1.0, RIM))
         return inks
 
-    def _write(self, drawn: Bytes, sight: _DrawState, names: bool) -> None:
+    def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
         """Names of what can be seen, and how it stands."""
-        owner = sight.surface.owner
-        seen = np.bincount(owner[owner != NOTHING], minlength=len(sight.shape.names))
+        owner = state.surface.owner
+        seen = np.bincount(owner[owner != NOTHING], minlength=len(state.shape.names))
         boxes, plates = [], []
         for number in np.flatnonzero(seen >= SEEN):
-            ends = sight.lines.ends[sight.lines.owner == number].reshape(-1, 2)
-            name = sight.shape.names[number]
-            note = sight.marks.get(name)
+            ends = state.lines.ends[state.lines.owner == number].reshape(-1, 2)
+            name = state.shape.names[number]
+            note = state.marks.get(name)
             words = [name] * names + ([note.text] if note else [])
             if len(ends) and words:
                 size = self.intrinsics.width - 1, self.intrinsics.height - 1
@@ -216,7 +216,7 @@ def instance_labels(scene: Scene, intrinsics: Intrinsics, X_SC: Array) -> NDArra
     """
     shape, view = build_scene_mesh(scene), FieldOfView(intrinsics)
     lines = visible_lines(shape, view, X_SC)
-    return SurfaceCamera(shape, view).look(X_SC, lines, _shades(shape)).owner
+    return SurfaceCamera(shape, view).render(X_SC, lines, _shades(shape)).owner
 
 
 def _marks(
@@ -232,12 +232,12 @@ def _marks(
     }
 
 
-def _outlines(sight: _DrawState, colors: Array, width: float) -> Ink:
+def _outlines(state: _DrawState, colors: Array, width: float) -> Ink:
     """Outlines and inner lines; the former say by their colour how an object stands."""
-    lines, rims = sight.lines, np.array(colors)
-    for number, name in enumerate(sight.shape.names):
-        if name in sight.marks:
-            rims[number] = COLORS[sight.marks[name].verdict]
+    lines, rims = state.lines, np.array(colors)
+    for number, name in enumerate(state.shape.names):
+        if name in state.marks:
+            rims[number] = COLORS[state.marks[name].verdict]
     outer = lines.kind == OUTLINE
     chosen = np.where(outer[:, None], rims[lines.owner], colors[lines.owner])
     widths = width * np.where(outer, 1.0, INNER_WIDTH)

@@ -31,7 +31,7 @@ RIM = 0.04
 """How far beside the silhouette it is looked at for that, as a share of the image's width."""
 WEAK = 0.7
 """Agreement below which an object is looked for once more, when the others have their places."""
-WORTH_A_TRY = 0.2
+PROMISING = 0.2
 """The same as `SUPPORTED` of a place that is only roughly known."""
 SUPPORTED = 0.35
 """Mean evidence in the silhouette below which an object is not there."""
@@ -127,7 +127,7 @@ def _assigned(
     while waiting:
         rated = {n: _rating(view, shapes[n], found, evidence) for n, found in waiting.items()}
         name = max(rated, key=lambda n: rated[n])
-        if rated[name] < WORTH_A_TRY:
+        if rated[name] < PROMISING:
             break
         assigned[name] = [found.q for found in waiting.pop(name)]
         window = _cover(view, shapes[name], assigned[name][0], evidence)
@@ -140,7 +140,7 @@ def _assigned(
 def _candidates(view: PinholeView, shape: TargetShape, evidence: Array) -> list[SearchResult]:
     """Where an object may be; if it is not near its target's angle, the best of all first."""
     found = find_places(view, shape, evidence)
-    if _rating(view, shape, found, evidence) >= WORTH_A_TRY:
+    if _rating(view, shape, found, evidence) >= PROMISING:
         return found
     return sorted(found, key=lambda f: -_support(view, shape, f.q, evidence, None)[0])
 
@@ -200,9 +200,9 @@ def _best(
         rating = found.agreement + found.coverage + support
         rating -= _disagreement(aligner, shape, found.q, others)
         if abs((found.q[2] + np.pi) % (2.0 * np.pi) - np.pi) > TURNED:
-            rating -= aligner.better
+            rating -= aligner.required_gain
         rated.append((rating, found))
-        if rating > aligner.convincing:
+        if rating > aligner.convincing_rating:
             break
     if not rated:
         return None

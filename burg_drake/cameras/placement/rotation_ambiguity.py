@@ -69,7 +69,7 @@ def with_rotation_ambiguity(
         if exact is None:
             continue
         more = aligner.misfit(shape, exact.q, others, window)[0] - least
-        worse = max(more, 0.0) / slack + _worse(found, exact, aligner.fine)
+        worse = max(more, 0.0) / slack + _worse(found, exact, aligner.residual_floor)
         if worse < 1.0 and not shape.looks_alike(found.q, exact.q):
             fitting.append(exact.q - found.q)
     if not fitting:

@@ -33,12 +33,12 @@ class CoarsePose:
     Attributes:
         X_SC: one or two (4, 4) poses above the sheet, the better first; none if there is no such.
         inliers: (N,) markers that stand where the board has them.
-        growth: size of the markers against their distances, by the document 1.
+        marker_scale: size of the markers against their distances, by the document 1.
     """
 
     X_SC: list[Array]
     inliers: NDArray[np.bool_]
-    growth: float
+    marker_scale: float
 
 
 def coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePose:
@@ -57,12 +57,12 @@ def coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePo
         if inliers.any():
             poses, errors = _planar_poses(p_SQ[inliers], straight[inliers], intrinsics.K)
     rivals = [X for X, e in zip(poses, errors, strict=True) if e <= RIVAL[0] * errors[0] + RIVAL[1]]
-    growth = 1.0
+    marker_scale = 1.0
     if not rivals or 2 * inliers.sum() < len(p_SQ):
-        growth = _growth_by_centers(p_SQ, straight)
+        marker_scale = _marker_scale_by_centers(p_SQ, straight)
     elif inliers.sum() > 3:
-        growth = _growth(p_SQ[inliers], straight[inliers], intrinsics, rivals[0])
-    return CoarsePose(rivals, inliers, growth)
+        marker_scale = _marker_scale(p_SQ[inliers], straight[inliers], intrinsics, rivals[0])
+    return CoarsePose(rivals, inliers, marker_scale)
 
 
 def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], list[float]]:
@@ -103,7 +103,7 @@ def _agreeing(p_SQ: Array, straight: Array) -> NDArray[np.bool_]:
     return np.asarray(fits.reshape(-1, 4).all(axis=1))
 
 
-def _growth_by_centers(p_SQ: Array, straight: Array) -> float:
+def _marker_scale_by_centers(p_SQ: Array, straight: Array) -> float:
     """Size of the markers on a plane on which their centres stand as they should; 1 if there is no
     such."""
     import cv2
@@ -125,7 +125,7 @@ def _sides(corners: Array) -> Array:
     return np.asarray(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1))
 
 
-def _growth(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -> float:
+def _marker_scale(p_SQ: Array, straight: Array, intrinsics: Intrinsics, X_SC: Array) -> float:
     """Size of the markers, fitted together with the pose: linear least squares of small changes."""
     pinhole = Intrinsics(
         width=intrinsics.width,

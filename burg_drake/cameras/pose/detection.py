@@ -18,11 +18,11 @@ from burg_drake.cameras.pose.quadrilaterals import LEAST_CONTRAST, dark_quadrila
 from burg_drake.core import Array
 from burg_drake.scene.document import MarkerLayout, marker_dictionary
 
-FIRST_LOOK = ((13,), 15.0)
+FIRST_SEARCH = ((13,), 15.0)
 """Threshold windows [pixels], and a contrast that markers in fair light have [8-bit levels]: finds
 as many markers on boards at 0.5 to 1 m as OpenCV's own values (windows 3, 13 and 23, and 7 levels),
 in less than half the time."""
-SECOND_LOOK = ((5, 21, 37), 5.0)
+SECOND_SEARCH = ((5, 21, 37), 5.0)
 """For dark or blurred images, or very large markers."""
 SMALLEST = 0.06
 """Least perimeter of a marker, as a share of the image's longer side; cells of a pixel cannot be
@@ -84,15 +84,15 @@ class MarkerDetector:
     def detect(self, grey: NDArray[np.uint8]) -> Detection:
         """Finds markers in an image (H, W). One that is seen twice counts as not seen."""
         found = Detection()
-        for windows, constant in (FIRST_LOOK, SECOND_LOOK):
-            again = self._look(grey, windows, constant)
+        for windows, constant in (FIRST_SEARCH, SECOND_SEARCH):
+            again = self._search(grey, windows, constant)
             if len(again.index) >= len(found.index):
                 found = again
             if len(found.index) >= self._enough:
                 break
         return found
 
-    def _look(
+    def _search(
         self, grey: NDArray[np.uint8], windows: tuple[int, ...], constant: float
     ) -> Detection:
         perimeter = SMALLEST * max(grey.shape)
@@ -114,9 +114,9 @@ class MarkerDetector:
         first = (np.arange(4) + turns[:, None]) % 4
         corners = np.take_along_axis(squares[fits], first[..., None], axis=1)
         index, corners = _without_duplicates(index, corners)
-        return Detection(index, self._exact(grey, corners), int((~fits).sum()))
+        return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()))
 
-    def _exact(self, grey: NDArray[np.uint8], corners: Array) -> Array:
+    def _refined_corners(self, grey: NDArray[np.uint8], corners: Array) -> Array:
         """Corners where the lines of both of their sides meet."""
         import cv2
 
@@ -195,7 +195,7 @@ def _opencv_detector(dictionary: Any) -> Any:
     import cv2
 
     parameters = cv2.aruco.DetectorParameters()
-    (window,), constant = FIRST_LOOK
+    (window,), constant = FIRST_SEARCH
     parameters.adaptiveThreshWinSizeMin = parameters.adaptiveThreshWinSizeMax = window
     parameters.adaptiveThreshConstant = constant
     parameters.minMarkerPerimeterRate = SMALLEST

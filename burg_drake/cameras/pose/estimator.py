@@ -28,7 +28,7 @@ from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.scene.document import Board
 
-OTHER_GROWTH = 0.05
+OTHER_MARKER_SCALE = 0.05
 """From this deviation on, markers are too large or too small for their distances to look for their
 edges; corners tell it to some hundredths, edges to some thousandths [-]."""
 DECIDED = 30.0
@@ -95,11 +95,11 @@ class BoardPose:
                 " same camera"
             )
         try:
-            return self._look(grey, depth, X_SC_known)
+            return self._estimate_coarse_to_fine(grey, depth, X_SC_known)
         except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
             return BoardEstimate(reason="what is in sight of the board does not determine a pose")
 
-    def _look(
+    def _estimate_coarse_to_fine(
         self,
         grey: NDArray[np.uint8],
         depth: NDArray[np.floating[Any]] | None,
@@ -108,9 +108,9 @@ class BoardPose:
         """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
         if not len(seen.index):
-            return BoardEstimate(reason=self._why_nothing(grey, seen))
+            return BoardEstimate(reason=self._no_markers_reason(grey, seen))
         coarse = coarse_pose(self._p_SQ[seen.index], seen.corners, self.intrinsics)
-        wrong = self._why_another(seen, coarse)
+        wrong = self._other_board_reason(seen, coarse)
         if wrong:
             return BoardEstimate(reason=wrong)
         found = seen.index[coarse.inliers]
@@ -118,9 +118,9 @@ class BoardPose:
         if refined is None:
             return BoardEstimate(reason=wrong)
         printed = deformation(refined)
-        if printed.growth:
-            return BoardEstimate(reason=self._other_size(1.0 + printed.growth))
-        return self._estimate(grey, refined, printed.stretch, depth, X_SC_known)
+        if printed.marker_scale_error:
+            return BoardEstimate(reason=self._other_size_reason(1.0 + printed.marker_scale_error))
+        return self._estimate(grey, refined, printed.aspect_error, depth, X_SC_known)
 
     def _refine(
         self, grey: NDArray[np.uint8], poses: list[Array], found: NDArray[np.intp]
@@ -150,7 +150,7 @@ class BoardPose:
         self,
         grey: NDArray[np.uint8],
         refined: RefinedPose,
-        stretch: float,
+        aspect_error: float,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
@@ -172,7 +172,7 @@ class BoardPose:
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,
-            reason=blank or _warnings(error, stretch),
+            reason=blank or _warnings(error, aspect_error),
             reprojection_error=error,
             covariance=refined.covariance,
             ids=tuple(int(i) for i in self._layout.ids[used]),
@@ -198,7 +198,7 @@ class BoardPose:
         error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
         return used, self.intrinsics.project(p_C) + shift[:, None], error
 
-    def _why_nothing(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+    def _no_markers_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
         """Why no marker of the board was found."""
         layout = self._layout
         other = other_markers(grey, layout) if seen.candidates else None
@@ -213,10 +213,10 @@ class BoardPose:
             )
         return f"{start} in sight, this one has {layout.dictionary}"
 
-    def _why_another(self, seen: Detection, coarse: CoarsePose) -> str:
+    def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
-        if abs(coarse.growth - 1.0) > OTHER_GROWTH:
-            return self._other_size(coarse.growth)
+        if abs(coarse.marker_scale - 1.0) > OTHER_MARKER_SCALE:
+            return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
             return (
@@ -225,11 +225,11 @@ class BoardPose:
             )
         return ""
 
-    def _other_size(self, growth: float) -> str:
+    def _other_size_reason(self, marker_scale: float) -> str:
         markers = self.board.markers
         return (
-            f"another board: its markers are {growth:.2f} times as large for their distances as"
-            f" this one's (side {1e3 * markers.side:g} mm, spacing {1e3 * markers.spacing:g} mm)"
+            f"another board: its markers are {marker_scale:.2f} times as large for their distances"
+            f" as this one's (side {1e3 * markers.side:g} mm, spacing {1e3 * markers.spacing:g} mm)"
         )
 
 
@@ -284,12 +284,12 @@ def _scale_warning(scale: float) -> str:
     )
 
 
-def _warnings(error: float, stretch: float) -> str:
+def _warnings(error: float, aspect_error: float) -> str:
     """What is doubtful about a pose; empty if all is well."""
-    if stretch:
+    if aspect_error:
         return (
-            f"the board is printed {1.0 + stretch:.3f} times as long along y as along x: measure"
-            " its rulers and print it anew with what they measure, or check the intrinsics"
+            f"the board is printed {1.0 + aspect_error:.3f} times as long along y as along x:"
+            " measure its rulers and print it anew with what they measure, or check the intrinsics"
         )
     if error > DOUBTFUL_RESIDUAL:
         return (

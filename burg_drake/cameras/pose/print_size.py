@@ -19,9 +19,9 @@ from burg_drake.core import Array
 
 SIGNIFICANT = 6.0
 """Standard deviations from which on a deviation is told."""
-LEAST_STRETCH = 0.003
+LEAST_ASPECT_ERROR = 0.003
 """Unequal scale that is not worth telling; printers feed paper within about that [-]."""
-LEAST_GROWTH = 0.01
+LEAST_MARKER_SCALE_ERROR = 0.01
 """Size of markers against their distances that is not worth telling: ink spreads, and in blurred
 images, for which it rises with the blur's width, light does [-]."""
 LEAST_DEVIATION = 0.01
@@ -36,12 +36,12 @@ class Deformation:
     significant.
 
     Attributes:
-        stretch: how much longer it is along y than along x, as a share.
-        growth: how much larger its markers are for their distances, as a share.
+        aspect_error: how much longer it is along y than along x, as a share.
+        marker_scale_error: how much larger its markers are for their distances, as a share.
     """
 
-    stretch: float = 0.0
-    growth: float = 0.0
+    aspect_error: float = 0.0
+    marker_scale_error: float = 0.0
 
 
 def deformation(refined: RefinedPose) -> Deformation:
@@ -62,9 +62,12 @@ def deformation(refined: RefinedPose) -> Deformation:
     if not (spread > 0.0).all():  # singular but for rounding
         return Deformation()
     sd = np.sqrt(spread) * [2.0, 1.0]
-    least = [LEAST_STRETCH, LEAST_GROWTH * np.sqrt(variance_factor_of_blur(refined.blur))]
-    told = np.abs(value) > np.maximum(SIGNIFICANT * sd, least)
-    return Deformation(*(float(v) for v in np.where(told, value, 0.0)))
+    least = [
+        LEAST_ASPECT_ERROR,
+        LEAST_MARKER_SCALE_ERROR * np.sqrt(variance_factor_of_blur(refined.blur)),
+    ]
+    significant = np.abs(value) > np.maximum(SIGNIFICANT * sd, least)
+    return Deformation(*(float(v) for v in np.where(significant, value, 0.0)))
 
 
 def scale_by_depth(

@@ -38,7 +38,7 @@ KNOWN = 0.5
 """Standard deviation of an edge's predicted place up to which it is looked for [pixels]."""
 FEW = 0.25
 """Markers in the image that were not read and are not worth a look, as a share of those read."""
-IN_SIGHT = 0.2
+EXPECTED_EDGES = 0.2
 """Share of a marker's edges that must look as they should for it to take part."""
 SURE = 3
 """Read markers from which on a pose puts the others well; with fewer, most of a marker's edges must
@@ -113,16 +113,16 @@ class EdgeRefinement:
         read[markers] = True
         found = np.flatnonzero(read[self._edges.marker])
         blur = self._first_blur(grey, X_SC, found[:FIRST])
-        result = self._round(grey, X_SC, found[:FIRST], blur)
+        result = self._iterate(grey, X_SC, found[:FIRST], blur)
         if result and np.abs(result.fits.offset - result.residual).max() > LONG:
-            result = self._round(grey, result.X_SC, found[:FIRST], result.blur)
-        others = self._unread(result, read) if result else read
+            result = self._iterate(grey, result.X_SC, found[:FIRST], result.blur)
+        others = self._missed_markers(result, read) if result else read
         if result and others.sum() > FEW * read.sum():
             unread = np.flatnonzero(others[self._edges.marker])
             which = np.concatenate([found[:FIRST], unread[:LATER]])
-            result = self._round(grey, result.X_SC, which, result.blur)
+            result = self._iterate(grey, result.X_SC, which, result.blur)
             found = found if result is None else self._seen(result, found)
-        return result and self._round(grey, result.X_SC, found[:LAST], result.blur)
+        return result and self._iterate(grey, result.X_SC, found[:LAST], result.blur)
 
     def _first_blur(self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp]) -> float:
         """The blur with which edges are most like what they should be."""
@@ -134,7 +134,7 @@ class EdgeRefinement:
         unlike = fit_edges(grey, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
         return BLURS[int(np.argmin(np.median(unlike, axis=1)))]
 
-    def _unread(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _missed_markers(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) other markers that the image may show, whose place the pose tells well enough."""
         at, variance = predicted_places(
             self._corners, self._intrinsics, result.X_SC, result.covariance
@@ -148,12 +148,12 @@ class EdgeRefinement:
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         read = np.unique(self._edges.marker[found])
-        share = IN_SIGHT if len(read) >= SURE else 0.5
+        share = EXPECTED_EDGES if len(read) >= SURE else 0.5
         seen = np.asarray(good > share * np.maximum(np.bincount(marker, minlength=n), 1))
         seen[read] = True
         return np.flatnonzero(seen[self._edges.marker])
 
-    def _round(
+    def _iterate(
         self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp], blur: float
     ) -> RefinedPose | None:
         views = view_edges(self._edges, which, self._intrinsics, X_SC)

@@ -52,7 +52,7 @@ class SurfaceCamera:
         self._nodes = np.ix_(rows[: blocks[0] + 1], columns[: blocks[1] + 1])
         self._x, self._y = np.moveaxis(directions[self._nodes][..., :2], 2, 0).copy()
 
-    def look(self, X_SC: Array, lines: VisibleLines, shades: NDArray[np.uint8]) -> SurfaceImage:
+    def render(self, X_SC: Array, lines: VisibleLines, shades: NDArray[np.uint8]) -> SurfaceImage:
         """The surfaces from a pose of the camera.
 
         Args:
@@ -62,8 +62,8 @@ class SurfaceCamera:
         """
         owner, shade = self._at_nodes(X_SC, shades)
         corners = np.stack([owner[:-1, :-1], owner[:-1, 1:], owner[1:, :-1], owner[1:, 1:]])
-        mixed = (corners != corners[0]).any(axis=0) | self._crossed(lines)
-        image = SurfaceImage(_blown_up(corners[0], self._size), self._spread(shade))
+        mixed = (corners != corners[0]).any(axis=0) | self._outline_blocks(lines)
+        image = SurfaceImage(_upsampled(corners[0], self._size), self._interpolate(shade))
         image.shade[image.owner == NOTHING] = 0
         blocks = np.argwhere(mixed)
         within = np.stack(np.meshgrid(*[np.arange(BLOCK)] * 2, indexing="ij"), -1).reshape(1, -1, 2)
@@ -77,14 +77,14 @@ class SurfaceCamera:
         self, X_SC: Array, shades: NDArray[np.uint8]
     ) -> tuple[NDArray[np.int16], NDArray[np.uint8]]:
         """Owner and shade at the nodes; rays are cast where there may be something."""
-        looking = self._may_show(X_SC)
+        looking = self._candidate_nodes(X_SC)
         owner = np.full(looking.shape, NOTHING, np.int16)
         shade = np.zeros(looking.shape, np.uint8)
         directions = self._directions[self._nodes][looking]
         owner[looking], shade[looking] = self._cast(X_SC, directions, shades)
         return owner, shade
 
-    def _may_show(self, X_SC: Array) -> NDArray[np.bool_]:
+    def _candidate_nodes(self, X_SC: Array) -> NDArray[np.bool_]:
         """Nodes that look into the smallest upright rectangle around an instance's box."""
         showing = np.zeros(self._x.shape, bool)
         X_CS = inverse(X_SC)
@@ -116,7 +116,7 @@ class SurfaceCamera:
         shade = np.where(missed, 0, shades[face]).astype(np.uint8)
         return owner.reshape(directions.shape[:-1]), shade.reshape(directions.shape[:-1])
 
-    def _crossed(self, lines: VisibleLines) -> NDArray[np.bool_]:
+    def _outline_blocks(self, lines: VisibleLines) -> NDArray[np.bool_]:
         """Blocks that an outline runs through, or within a pixel of; it is cut into short bits."""
         rows, columns = (-(-n // BLOCK) for n in self._size)
         crossed = np.zeros((rows, columns), bool)
@@ -127,7 +127,7 @@ class SurfaceCamera:
             crossed[row[kept], column[kept]] = True
         return crossed
 
-    def _spread(self, shade: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _interpolate(self, shade: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Shades between the nodes."""
         import cv2
 
@@ -139,6 +139,6 @@ class SurfaceCamera:
         return np.asarray(spread, np.uint8)
 
 
-def _blown_up(owner: NDArray[np.int16], size: tuple[int, ...]) -> NDArray[np.int16]:
+def _upsampled(owner: NDArray[np.int16], size: tuple[int, ...]) -> NDArray[np.int16]:
     whole = np.repeat(np.repeat(owner, BLOCK, axis=0), BLOCK, axis=1)
     return np.ascontiguousarray(whole[: size[0], : size[1]])

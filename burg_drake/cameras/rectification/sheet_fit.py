@@ -47,7 +47,7 @@ class SheetFit:
     Attributes:
         H: (3, 3) homography from x and y of the scene frame [m] to undistorted image coordinates,
             which have their origin in the image's middle and half its diagonal as their unit.
-        bend: what a lens adds to a distance r from the middle: `r (1 + bend r^2)`.
+        distortion: what a lens adds to a distance r from the middle: `r (1 + bend r^2)`.
         middle: (2,) [pixels].
         radius: half the image's diagonal [pixels].
         error: root mean square distance of the markers' corners from their places on the sheet [m].
@@ -55,7 +55,7 @@ class SheetFit:
     """
 
     H: Array
-    bend: float
+    distortion: float
     middle: Array
     radius: float
     error: float
@@ -64,7 +64,7 @@ class SheetFit:
     def project(self, p_SQ: Array) -> Array:
         """(N, 2) pixels of points (N, 2) on the sheet [m]; far outside of the image for what no
         camera could see there."""
-        return _project(self.H, self.bend, p_SQ) * self.radius + self.middle
+        return _project(self.H, self.distortion, p_SQ) * self.radius + self.middle
 
 
 class SheetFinder:
@@ -86,7 +86,7 @@ class SheetFinder:
         grey = grey_image(image)
         seen = self._detector.detect(grey)
         if not len(seen.index):
-            raise InvalidInputError(self._why_nothing(grey, seen.candidates))
+            raise InvalidInputError(self._no_markers_reason(grey, seen.candidates))
         size = np.array(grey.shape[::-1], dtype=float)
         middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
         p_SQ = self._layout.p_SQ[seen.index][..., :2]
@@ -100,10 +100,10 @@ class SheetFinder:
                 " this one has them; are columns, rows and first_id right?"
             )
         if 2 * fit < len(self._layout.ids):
-            self._require_no_strangers(grey, fit)
+            self._require_no_foreign_markers(grey, fit)
         p_SQ, corners = p_SQ[kept].reshape(-1, 2), corners[kept].reshape(-1, 2)
-        H, bend = _fitted(p_SQ, corners, fit, 1.0 / radius)
-        off = _project(H, bend, p_SQ) - corners
+        H, distortion = _fitted(p_SQ, corners, fit, 1.0 / radius)
+        off = _project(H, distortion, p_SQ) - corners
         scale = self._layout.side / float(side_lengths(corners.reshape(-1, 4, 2)).mean())
         error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
         if error > FAR_OFF * self._layout.side:
@@ -113,23 +113,23 @@ class SheetFinder:
                 " spacing right, and does the sheet lie flat?"
             )
         ids = tuple(int(i) for i in self._layout.ids[seen.index[kept]])
-        return SheetFit(H, bend, middle, radius, error, ids)
+        return SheetFit(H, distortion, middle, radius, error, ids)
 
-    def _require_no_strangers(self, grey: NDArray[np.uint8], fit: int) -> None:
+    def _require_no_foreign_markers(self, grey: NDArray[np.uint8], fit: int) -> None:
         """Refuses a sheet that has more markers which are not this board's than fit: a part of the
         first row is the same on boards of several sizes."""
         layout = self._layout
         other = other_markers(grey, layout)
         if other is None or other.dictionary.lower() != layout.dictionary.lower():
             return
-        strangers = set(other.ids) - set(layout.ids.tolist())
-        if len(strangers) > fit:
+        foreign_markers = set(other.ids) - set(layout.ids.tolist())
+        if len(foreign_markers) > fit:
             raise InvalidInputError(
-                f"the image shows another board: {len(strangers)} markers in sight have ids beyond"
-                f" {layout.ids[-1]}, the last of this one; is its size right?"
+                f"the image shows another board: {len(foreign_markers)} markers in sight have ids"
+                f" beyond {layout.ids[-1]}, the last of this one; is its size right?"
             )
 
-    def _why_nothing(self, grey: NDArray[np.uint8], candidates: int) -> str:
+    def _no_markers_reason(self, grey: NDArray[np.uint8], candidates: int) -> str:
         layout = self._layout
         other = other_markers(grey, layout) if candidates else None
         if other is None:
@@ -184,9 +184,9 @@ def _homography(x: Array) -> Array:
     return np.append(x[:8], 1.0).reshape(3, 3)
 
 
-def _project(H: Array, bend: float, p_SQ: Array) -> Array:
+def _project(H: Array, distortion: float, p_SQ: Array) -> Array:
     q = np.column_stack([p_SQ, np.ones(len(p_SQ))]) @ H.T
     ahead = q[:, 2:] > 1e-3 * np.abs(q[:, 2]).max()
     flat = np.where(ahead, q[:, :2] / np.where(ahead, q[:, 2:], 1.0), 1e3)
-    bent: Array = flat * (1.0 + bend * (flat**2).sum(axis=1, keepdims=True))
+    bent: Array = flat * (1.0 + distortion * (flat**2).sum(axis=1, keepdims=True))
     return bent

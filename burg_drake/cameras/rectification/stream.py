@@ -12,12 +12,12 @@ from burg_drake.cameras.sources import CameraLost, FrameSource
 from burg_drake.core import InvalidInputError
 
 PERIOD = 1.0
-"""From one look to the next [s]."""
+"""From one observation to the next [s]."""
 
 
 @dataclass(frozen=True, eq=False)
-class BoardLook:
-    """What one look at the board gave.
+class BoardObservation:
+    """What one frame shows of the board.
 
     Attributes:
         picture: the top view; None if there is none.
@@ -28,25 +28,25 @@ class BoardLook:
     reason: str
 
 
-def board_looks(
+def board_observations(
     source: FrameSource,
     rectifier: BoardRectifier,
     *,
     period: float = PERIOD,
     stop: threading.Event | None = None,
-) -> Iterator[BoardLook]:
-    """Looks at the board, again and again.
+) -> Iterator[BoardObservation]:
+    """Observes the board, again and again.
 
     Args:
         source: of a live camera the newest frame is taken each time; of files each one in turn.
             The caller closes it.
         rectifier: makes the views.
-        period: time from one look to the next, at least [s]; of files nothing is waited for.
-        stop: ends the looks, also while one is waited for.
+        period: least time from one observation to the next [s]; files are read without pauses.
+        stop: ends the observations, also while one is waited for.
 
     Yields:
-        A look a frame, also where the frame does not show the board, cannot be read or the camera
-        is away: then `reason` says so, and the next look may find it again.
+        An observation a frame, also where the frame does not show the board, cannot be read or the
+        camera is away: then `reason` says so, and the next observation may find it again.
     """
     stop = stop or threading.Event()
     while not stop.is_set():
@@ -56,8 +56,8 @@ def board_looks(
             if frame is None:
                 return
             picture = rectifier.picture(frame.image)
-            yield BoardLook(picture, picture.note)
+            yield BoardObservation(picture, picture.note)
         except (CameraLost, InvalidInputError) as error:
-            yield BoardLook(None, str(error))
+            yield BoardObservation(None, str(error))
         if source.live:
             stop.wait(max(0.0, period - (time.monotonic() - started)))

@@ -29,14 +29,14 @@ class Track:
         X_SC: (4, 4) filtered pose; None before the first.
         information: (6, 6) sum of the estimates' inverse covariances, faded by age.
         covariance: (6, 6) of `X_SC`.
-        strange: estimates in a row that were not near it.
+        rejected_in_a_row: estimates in a row that were not near it.
         age: updates since the last estimate that was.
     """
 
     X_SC: Array | None = None
     information: Array = field(default_factory=lambda: np.zeros((6, 6)))
     covariance: Array = field(default_factory=lambda: np.full((6, 6), np.nan))
-    strange: int = 0
+    rejected_in_a_row: int = 0
     age: int = 0
 
 
@@ -103,7 +103,7 @@ class PoseFilter(LeafSystem):
         self.DeclareVectorOutputPort("valid", 1, self._calc_valid, state)
         self.DeclareVectorOutputPort("covariance", 36, self._calc_covariance, state)
 
-    def follow(self, track: Track, estimate: BoardEstimate) -> Track:
+    def update(self, track: Track, estimate: BoardEstimate) -> Track:
         """What the filter remembers after one more estimate."""
         aged = replace(track, age=track.age + 1)
         if not estimate.valid:
@@ -115,8 +115,12 @@ class PoseFilter(LeafSystem):
             return fresh
         step = _difference(track.X_SC, estimate.X_SC)
         if step @ np.linalg.solve(track.covariance + R, step) > GATE:
-            strange = track.strange + 1
-            return fresh if strange >= self._patience else replace(aged, strange=strange)
+            rejected_in_a_row = track.rejected_in_a_row + 1
+            return (
+                fresh
+                if rejected_in_a_row >= self._patience
+                else replace(aged, rejected_in_a_row=rejected_in_a_row)
+            )
         information = self._keep * track.information + seen
         gain = np.asarray(np.linalg.solve(information, seen))
         rest = np.eye(6) - gain
@@ -124,7 +128,7 @@ class PoseFilter(LeafSystem):
         return Track(perturbed_pose(track.X_SC, gain @ step), information, covariance)
 
     def _update(self, context: Context, state: State) -> None:
-        track = self.follow(self._track(context), self._input.Eval(context))
+        track = self.update(self._track(context), self._input.Eval(context))
         state.get_mutable_abstract_state(int(self._state)).set_value(track)
 
     def _track(self, context: Context) -> Track:

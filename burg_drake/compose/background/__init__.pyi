@@ -1,5 +1,5 @@
 from .grasp_counts import (
-    Counted as Counted,
+    CountedGrasps as CountedGrasps,
     GraspWatch as GraspWatch,
 )
 from .process import (

@@ -50,7 +50,7 @@ class CountGrasps:
 
 
 @dataclass(frozen=True)
-class Counted:
+class CountedGrasps:
     """What a watch has found.
 
     Attributes:
@@ -76,7 +76,7 @@ class GraspWatch:
     """
 
     def __init__(
-        self, station: Station, grasps_per_object: int, on_counts: Callable[[Counted], None]
+        self, station: Station, grasps_per_object: int, on_counts: Callable[[CountedGrasps], None]
     ) -> None:
         self._station, self._grasps_per_object = station, grasps_per_object
         self._on_counts = on_counts
@@ -84,7 +84,7 @@ class GraspWatch:
         self._timer: threading.Timer | None = None
         self._newest = -1
 
-    def tell(self, scene: Scene, revision: int, first: tuple[str, ...]) -> None:
+    def update(self, scene: Scene, revision: int, first: tuple[str, ...]) -> None:
         """The scene has changed; nothing if this revision is known.
 
         Args:
@@ -118,10 +118,10 @@ class GraspWatch:
             if job.cancelled:
                 return
             if job.error is not None:
-                self._on_counts(Counted(revision, {}, error=job.error))
+                self._on_counts(CountedGrasps(revision, {}, error=job.error))
             elif job.done:
-                self._on_counts(Counted(revision, job.result, complete=True))
+                self._on_counts(CountedGrasps(revision, job.result, complete=True))
             elif job.partial is not None:
-                self._on_counts(Counted(revision, job.partial))
+                self._on_counts(CountedGrasps(revision, job.partial))
 
-        self._worker.ask(task, changed)
+        self._worker.submit(task, changed)

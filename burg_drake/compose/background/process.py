@@ -68,7 +68,7 @@ class BackgroundJob(Generic[T]):
         self.task = task
         self._worker, self._on_change = worker, on_change
         self._result: list[T] = []
-        self._told = threading.Event()
+        self._notify = threading.Event()
         self.future: WorkerFuture[T] | None = None
 
     @property
@@ -92,7 +92,7 @@ class BackgroundJob(Generic[T]):
             TimeoutError: it is not there by then.
             BurgError: it cannot be done, or was cancelled.
         """
-        if not self._told.wait(timeout):
+        if not self._notify.wait(timeout):
             raise TimeoutError(f"nothing after {timeout:g} s")
         return self.result
 
@@ -113,7 +113,7 @@ class BackgroundJob(Generic[T]):
             self._result.append(result)
         self.done = True
         self._on_change(self)
-        self._told.set()
+        self._notify.set()
 
 
 CLOSE = 5.0
@@ -133,7 +133,7 @@ class BackgroundWorker:
         """Identifier of the process, if it was started."""
         return next(iter(self._pool.processes), None)
 
-    def ask(
+    def submit(
         self,
         task: BackgroundTask[T],
         on_change: Callable[[BackgroundJob[T]], None] = lambda job: None,

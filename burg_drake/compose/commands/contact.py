@@ -42,7 +42,9 @@ class SnapToContact:
         axis, sign = DIRECTIONS[self.direction]
         spans = np.array([bounds(state, name)[:, axis] for name in names])
         edge = state.document.board.size[axis] - spans.max() if sign > 0 else spans.min()
-        return _travelled(state, names, sign * np.eye(3)[axis], max(float(edge), 0.0), surroundings)
+        return _moved_to_contact(
+            state, names, sign * np.eye(3)[axis], max(float(edge), 0.0), surroundings
+        )
 
 
 @dataclass(frozen=True)
@@ -67,20 +69,22 @@ class PutDown:
             if heights[name] < 0.0:
                 state = state.moved({name: _shifted(state, name, (0, 0, -heights[name]))})
             else:
-                way = (0.0, 0.0, -1.0)
-                state = _travelled(state, (name,), np.array(way), heights[name], surroundings)
+                down = (0.0, 0.0, -1.0)
+                state = _moved_to_contact(
+                    state, (name,), np.array(down), heights[name], surroundings
+                )
         return state.select(names)
 
 
-def _travelled(
+def _moved_to_contact(
     state: State, names: tuple[str, ...], direction: Array, limit: float, around: Surroundings
 ) -> State:
     """Instances moved together along a direction (3,) as far as they go, at most `limit` [m]."""
     scene = known_scene(state, around.path)
-    way = around.checker.check(state).travel(scene, names, direction, limit)
-    if way <= 0.0:
+    distance = around.checker.check(state).travel(scene, names, direction, limit)
+    if distance <= 0.0:
         return state.select(names)
-    X_SO = {name: _shifted(state, name, way * direction) for name in names}
+    X_SO = {name: _shifted(state, name, distance * direction) for name in names}
     return state.moved(X_SO).select(names)
 
 

@@ -11,8 +11,8 @@ from .bounds_on_board import (
 from .checker import (
     SceneChecker as SceneChecker,
     known_scene as known_scene,
-    lost as lost,
-    with_lost as with_lost,
+    missing_objects as missing_objects,
+    with_missing_objects as with_missing_objects,
 )
 from .free_place import (
     free_offset as free_offset,

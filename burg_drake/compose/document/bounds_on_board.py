@@ -10,7 +10,7 @@ import numpy as np
 from burg_drake.compose.document.state import State
 from burg_drake.core import Array, rotation_angle, transform_points
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.arrangement import convex_polygon, without_short_sides
+from burg_drake.scene.arrangement import convex_polygon, simplified
 from burg_drake.scene.document import read_vertices
 
 ROUNDED = 2e-4
@@ -71,7 +71,7 @@ def shadow(state: State, name: str) -> Array:
 def object_shadow(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
     """(N, 2) what an object covers of the board, and at most `ROUNDED` more [m]."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
-    return without_short_sides(convex_polygon(p_SV[:, :2]), ROUNDED)
+    return simplified(convex_polygon(p_SV[:, :2]), ROUNDED)
 
 
 def yaw_between(R_SA: Array, R_SB: Array) -> float:

@@ -63,30 +63,30 @@ class SceneChecker:
         return self._shapes
 
 
-def lost(state: State) -> tuple[str, ...]:
+def missing_objects(state: State) -> tuple[str, ...]:
     """Instances whose object is not in the library any more."""
     return tuple(n for n, i in state.instances.items() if i.object not in state.library.objects)
 
 
 def known_scene(state: State, path: Path) -> Scene:
     """The scene without lost instances."""
-    names = lost(state)
+    names = missing_objects(state)
     if not names:
         return state.scene(path)
-    gone = [state.instance(name) for name in names]
+    missing = [state.instance(name) for name in names]
     document = replace(
         state.document,
-        instances=tuple(i for i in state.document.instances if i not in gone),
-        background=tuple(i for i in state.document.background if i not in gone),
+        instances=tuple(i for i in state.document.instances if i not in missing),
+        background=tuple(i for i in state.document.background if i not in missing),
     )
     return Scene(document, state.library, path)
 
 
-def with_lost(document: SceneDocument, state: State) -> SceneDocument:
+def with_missing_objects(document: SceneDocument, state: State) -> SceneDocument:
     """What became of a `known_scene`, with the instances that it was without."""
-    gone = [state.instance(name) for name in lost(state)]
+    missing = [state.instance(name) for name in missing_objects(state)]
     return replace(
         document,
-        instances=(*document.instances, *(i for i in state.document.instances if i in gone)),
-        background=(*document.background, *(i for i in state.document.background if i in gone)),
+        instances=(*document.instances, *(i for i in state.document.instances if i in missing)),
+        background=(*document.background, *(i for i in state.document.background if i in missing)),
     )

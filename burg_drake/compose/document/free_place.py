@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from burg_drake.compose.document.bounds_on_board import shadow
-from burg_drake.compose.document.checker import lost
+from burg_drake.compose.document.checker import missing_objects
 from burg_drake.compose.document.state import State
 from burg_drake.core import Array
 from burg_drake.scene.arrangement import distances, no_fit_polygon
@@ -61,13 +61,13 @@ def free_offset(polygons: Sequence[Array], state: State) -> Array | None:
     corners = np.concatenate(list(polygons))
     lower, upper = corners.min(axis=0) + offsets, corners.max(axis=0) + offsets
     offsets = offsets[((lower >= 0.0) & (upper <= size)).all(axis=1)]
-    gone = lost(state)
+    missing = missing_objects(state)
     for name in state.instances:
-        if name in gone:
+        if name in missing:
             continue
         other = shadow(state, name)
         for polygon in polygons:
             if len(offsets):
-                way = distances(no_fit_polygon(other, polygon), offsets)
-                offsets = offsets[way >= CLEARANCE]
+                distance = distances(no_fit_polygon(other, polygon), offsets)
+                offsets = offsets[distance >= CLEARANCE]
     return offsets[0] if len(offsets) else None

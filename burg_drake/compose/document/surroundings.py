@@ -38,7 +38,7 @@ class Surroundings:
         """Refuses a name for an instance.
 
         Raises:
-            FieldError: it is no name, or something else is called so.
+            FieldError: it is not a name, or something else is called so.
         """
         require_name(name)
         if name in state.instances:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from burg_drake.compose.background import (
     BackgroundJob,
     BackgroundWorker,
-    Counted,
+    CountedGrasps,
     GraspWatch,
     Settle,
     SettlingProposal,
 )
-from burg_drake.compose.document import known_scene, with_lost
+from burg_drake.compose.document import known_scene, with_missing_objects
 from burg_drake.compose.editing.editor import Editor
 from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.storage import Opened
@@ -52,10 +52,10 @@ class BackgroundEditor(Editor):
         Args:
             time_limit: simulated time allowed [s].
         """
-        with self._alone():
+        with self._exclusive():
             self._drop_settling()
             scene = known_scene(self._history.state, self._storage.place)
-            self._settling = self._settler.ask(
+            self._settling = self._settler.submit(
                 Settle(scene, self.station, time_limit), self._settled
             )
             self._publish()
@@ -70,7 +70,7 @@ class BackgroundEditor(Editor):
         Raises:
             InvalidInputError: there is none, or the scene has changed since it was made.
         """
-        with self._alone():
+        with self._exclusive():
             proposal = proposal or self._proposal
             if proposal is None:
                 raise InvalidInputError("there is no proposal to accept; settle the scene first")
@@ -81,13 +81,13 @@ class BackgroundEditor(Editor):
                 )
             self._proposal = None
             self._drag = None
-            state = replace(before, document=with_lost(proposal.document, before))
+            state = replace(before, document=with_missing_objects(proposal.document, before))
             moved = [n for n, i in state.instances.items() if i != before.instance(n)]
             return self._edit(proposal.label, state.select(moved))
 
     def revert(self) -> SessionView:
         """Drops the proposal, and what is being done for one."""
-        with self._alone():
+        with self._exclusive():
             self._drop_settling()
             return self._publish()
 
@@ -99,7 +99,7 @@ class BackgroundEditor(Editor):
         Args:
             grasps_per_object: grasps that are sampled for each object; no more counting if None.
         """
-        with self._alone():
+        with self._exclusive():
             watch, self._grasp_watch = self._grasp_watch, None
             if grasps_per_object is not None:
                 self._grasp_watch = GraspWatch(self.station, grasps_per_object, self._counted)
@@ -108,14 +108,14 @@ class BackgroundEditor(Editor):
             watch.close()
         return view
 
-    def _end_beside(self) -> None:
+    def _end_background(self) -> None:
         """Ends all processes."""
         self.watch_grasps(None)
         self._settler.close()
 
-    def _counted(self, found: Counted) -> None:
+    def _counted(self, found: CountedGrasps) -> None:
         """Called by the worker's thread."""
-        with self._alone():
+        with self._exclusive():
             if self._grasp_watch is None:
                 return
             if found.error is not None:
@@ -129,7 +129,7 @@ class BackgroundEditor(Editor):
 
     def _settled(self, job: BackgroundJob[SettlingProposal]) -> None:
         """Called by the worker's thread."""
-        with self._alone():
+        with self._exclusive():
             if job is not self._settling:
                 return
             if job.done:
@@ -146,10 +146,10 @@ class BackgroundEditor(Editor):
         if job is not None:
             job.cancel()
 
-    def _dressed(self, view: SessionView) -> SessionView:
+    def _with_background(self, view: SessionView) -> SessionView:
         if self._grasp_watch is not None:
             scene = known_scene(self._history.state, self._storage.place)
-            self._grasp_watch.tell(scene, self._revision, self._state.selection)
+            self._grasp_watch.update(scene, self._revision, self._state.selection)
         working = None
         if self._settling is not None:
             share, word = self._settling.progress

@@ -41,20 +41,20 @@ class Editor:
         self._lock = threading.RLock()
         self._depth = 0
         self._callbacks: list[Callback] = []
-        self._told = 0
+        self._last_reported = 0
         self._checker = SceneChecker(self.station)
         self._amending = Amending()
         self._planar = True
         self._serial = self._revision = 0
         self._notices: tuple[str, ...] = ()
         self._dismissed: set[str] = set()
-        self._trouble: str | None = None
+        self._check_problem: str | None = None
         self._history: History
         self._storage: Storage
         self._state: State
         self._drag: Drag | None
         self._view: SessionView
-        with self._alone():
+        with self._exclusive():
             self._begin(opened)
 
     @property
@@ -91,8 +91,8 @@ class Editor:
         Raises:
             BurgError: it cannot be taken; one clear line says why.
         """
-        with self._alone():
-            self._look_around()
+        with self._exclusive():
+            self._update_surroundings()
             selected = replace(self._history.state, selection=self._state.selection)
             state = command.apply(selected, self._surroundings)
             self._drag = None
@@ -104,7 +104,7 @@ class Editor:
         Raises:
             InvalidInputError: there is none.
         """
-        return self._go(lambda: self._history.undo())
+        return self._go_to_step(lambda: self._history.undo())
 
     def redo(self) -> SessionView:
         """Takes the step again that was undone last.
@@ -112,7 +112,7 @@ class Editor:
         Raises:
             InvalidInputError: there is none.
         """
-        return self._go(lambda: self._history.redo())
+        return self._go_to_step(lambda: self._history.redo())
 
     def select(self, names: Iterable[str]) -> SessionView:
         """Selects instances, and no others; this is no step.
@@ -120,26 +120,26 @@ class Editor:
         Raises:
             UnknownNameError: one is not there.
         """
-        with self._alone():
+        with self._exclusive():
             self._amending.end()
             return self._show(self._state.select(names))
 
     def restrict_movement(self, planar: bool) -> SessionView:
         """Whether what is moved from now on keeps its height and tilt."""
-        with self._alone():
+        with self._exclusive():
             self._planar = planar
             return self._publish()
 
     def notify(self, notice: str) -> SessionView:
         """Adds a line to what the user should know."""
-        with self._alone():
+        with self._exclusive():
             if notice not in self._notices:
                 self._notices += (notice,)
             return self._publish()
 
     def dismiss(self, notice: str) -> SessionView:
         """The user has read a notice."""
-        with self._alone():
+        with self._exclusive():
             self._notices = tuple(n for n in self._notices if n != notice)
             self._dismissed.add(notice)
             return self._publish()
@@ -151,7 +151,7 @@ class Editor:
             InvalidInputError: no instance is given.
             UnknownNameError: one is not there.
         """
-        with self._alone():
+        with self._exclusive():
             held = require_some(names, self._history.state)
             self._drag = None
             self._show(self._history.state.select(held))
@@ -169,13 +169,13 @@ class Editor:
         Raises:
             InvalidInputError: a pose is none, or the drag is over.
         """
-        with self._alone():
+        with self._exclusive():
             self._require(drag)
             return self._show(move.apply(self._history.state, self._surroundings))
 
     def drop(self, drag: Drag) -> SessionView:
         """Makes a drag a step; see `Drag.end`."""
-        with self._alone():
+        with self._exclusive():
             self._require(drag)
             self._drag = None
             state = replace(self._state, library=self._history.state.library)
@@ -183,7 +183,7 @@ class Editor:
 
     def put_back(self, drag: Drag) -> SessionView:
         """Ends a drag without a step; see `Drag.cancel`."""
-        with self._alone():
+        with self._exclusive():
             if not self.holds(drag):
                 return self._view
             self._drag = None
@@ -199,10 +199,10 @@ class Editor:
         self._revision += 1
         self._publish()
 
-    def _look_around(self) -> None:
+    def _update_surroundings(self) -> None:
         """Called before each step: has anything around the session changed?"""
 
-    def _dressed(self, view: SessionView) -> SessionView:
+    def _with_background(self, view: SessionView) -> SessionView:
         """A view with what else there is to say."""
         return view
 
@@ -218,7 +218,7 @@ class Editor:
         return self._history.state.document != self._storage.saved
 
     @contextlib.contextmanager
-    def _alone(self) -> Iterator[None]:
+    def _exclusive(self) -> Iterator[None]:
         """Keeps other threads out; then tells of the new view, when nothing is locked any more."""
         view: SessionView | None = None
         try:
@@ -228,8 +228,8 @@ class Editor:
                     yield
                 finally:
                     self._depth -= 1
-                    if self._depth == 0 and self._serial != self._told:
-                        view, self._told = self._view, self._serial
+                    if self._depth == 0 and self._serial != self._last_reported:
+                        view, self._last_reported = self._view, self._serial
                         callbacks = tuple(self._callbacks)
         finally:
             if view is not None:
@@ -251,9 +251,9 @@ class Editor:
             self._revision += 1
         step = HistoryStep(label, state)
         self._amending.begin(field, step)
-        return self._take(step)
+        return self._add_step(step)
 
-    def _take(self, step: HistoryStep) -> SessionView:
+    def _add_step(self, step: HistoryStep) -> SessionView:
         before = self._history.state
         if step.state.document == before.document and step.state.library is before.library:
             return self._show(step.state)
@@ -262,8 +262,8 @@ class Editor:
         self._revision += 1
         return self._show(step.state)
 
-    def _go(self, there: Callable[[], State]) -> SessionView:
-        with self._alone():
+    def _go_to_step(self, there: Callable[[], State]) -> SessionView:
+        with self._exclusive():
             state = there()
             self._drag = None
             self._amending.end()
@@ -279,15 +279,15 @@ class Editor:
         try:
             issues = self._checker.issues(self._state, self._storage.place)
         except BurgError as error:
-            self._trouble = f"the scene cannot be checked: {error}"
+            self._check_problem = f"the scene cannot be checked: {error}"
             return None
-        self._trouble = None
+        self._check_problem = None
         return issues
 
     def _publish(self) -> SessionView:
         self._serial += 1
         issues = self._issues()
-        self._view = self._dressed(
+        self._view = self._with_background(
             SessionView(
                 serial=self._serial,
                 revision=self._revision,
@@ -307,12 +307,12 @@ class Editor:
         return self._view
 
     def _all_notices(self) -> tuple[str, ...]:
-        journal = self._storage.trouble
-        troubles = (
-            self._trouble,
+        journal = self._storage.problem
+        problems = (
+            self._check_problem,
             journal and f"{journal}; until then changes are kept in memory alone",
         )
-        return self._notices + tuple(t for t in troubles if t and t not in self._dismissed)
+        return self._notices + tuple(t for t in problems if t and t not in self._dismissed)
 
     def _require(self, drag: Drag) -> None:
         if self._drag is not drag:

@@ -23,7 +23,7 @@ class LibraryWatch:
         self.library = library
         self._stamp = _stamp(library.root)
 
-    def look(self) -> ObjectLibrary | None:
+    def reload_if_changed(self) -> ObjectLibrary | None:
         """The library, if it was changed since; None if not.
 
         Raises:
@@ -44,15 +44,15 @@ def changes_notice(state: State, library: ObjectLibrary) -> str:
     """One line on what a changed library means for a scene."""
     placed = [*state.document.instances, *state.document.background]
     used = list(dict.fromkeys(i.object for i in placed))
-    gone = [name_of(i) for i in placed if i.object not in library.objects]
+    missing = [name_of(i) for i in placed if i.object not in library.objects]
     other = [
         name
         for name in used
         if name in library.objects and library.content[name] != state.library.content.get(name)
     ]
     parts = []
-    if gone:
-        parts.append(f"it has no object any more for {listing(gone)}")
+    if missing:
+        parts.append(f"it has no object any more for {listing(missing)}")
     if other:
         parts.append(f"{listing(other)} {'is' if len(other) == 1 else 'are'} built anew")
     return f"library {library.root} has changed: {'; '.join(parts) or 'no object of this scene'}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from burg_drake.compose.document import State, lost
+from burg_drake.compose.document import State, missing_objects
 from burg_drake.core import Array
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Instance, SceneDocument, SceneIssue
@@ -107,13 +107,13 @@ def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, St
     """
     if issues is None:
         return dict.fromkeys(state.instances, "unknown")
-    said: dict[str, set[Status]] = {name: set() for name in state.instances}
+    found_statuses: dict[str, set[Status]] = {name: set() for name in state.instances}
     for issue in issues:
         for name in (issue.instance, issue.other):
-            if name in said:
-                said[name].add(STATUS[issue.kind])
+            if name in found_statuses:
+                found_statuses[name].add(STATUS[issue.kind])
     found: dict[str, Status] = {
         name: next((status for status in WORST_FIRST if status in all_said), "ok")
-        for name, all_said in said.items()
+        for name, all_said in found_statuses.items()
     }
-    return found | dict.fromkeys(lost(state), "unknown")
+    return found | dict.fromkeys(missing_objects(state), "unknown")

@@ -20,7 +20,7 @@ LARGEST = 1 << 30
 """Bytes of a journal; a step takes some hundred."""
 
 
-class LibraryGone(InvalidInputError):
+class LibraryMissing(InvalidInputError):
     """A journal needs a library that is not where it was."""
 
 
@@ -57,13 +57,13 @@ class SessionJournal:
     Attributes:
         path: of the file.
         origin: what the session was opened with, where that was no file of its own.
-        trouble: why the last steps are not on the disk; None if they are.
+        problem: why the last steps are not on the disk; None if they are.
     """
 
     def __init__(self, path: Path, origin: str = "") -> None:
         self.path = path
         self.origin = origin
-        self.trouble: str | None = None
+        self.problem: str | None = None
         self._writer: JournalWriter | None = None
 
     def step(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
@@ -83,9 +83,9 @@ class SessionJournal:
         try:
             atomic_write(self.path, "".join(lines))
         except InvalidInputError as error:
-            self._writer, self.trouble = None, str(error)
+            self._writer, self.problem = None, str(error)
         else:
-            self._writer, self.trouble = writer, None
+            self._writer, self.problem = writer, None
 
     def remove(self) -> None:
         """Takes it off the disk: all that it has is in the scene's file, or is not wanted."""
@@ -107,7 +107,7 @@ class SessionJournal:
             _append(self.path, line(self._writer).encode())
         except OSError as error:
             self._writer = None
-            self.trouble = f"cannot write {self.path}: {error.strerror or error}"
+            self.problem = f"cannot write {self.path}: {error.strerror or error}"
 
 
 def recover(path: Path) -> Recovered | None:
@@ -131,7 +131,7 @@ def recover(path: Path) -> Recovered | None:
     try:
         reader = JournalReader(_libraries(lines))
     except BurgError as error:
-        raise LibraryGone(
+        raise LibraryMissing(
             f"{error}; the last session of this scene, whose steps are in {path}, used it: bring it"
             " back, or delete that file"
         ) from error
@@ -142,7 +142,7 @@ def recover(path: Path) -> Recovered | None:
         except (BurgError, ValueError, KeyError, TypeError, IndexError, AttributeError):
             damaged = True
             break
-    aside = _put_aside(path) if damaged else None
+    aside = _set_aside_damaged(path) if damaged else None
     return Recovered(reader.history, reader.saved, reader.known, reader.origin, aside)
 
 
@@ -178,7 +178,7 @@ def _append(path: Path, line: bytes) -> None:
             raise
 
 
-def _put_aside(path: Path) -> Path:
+def _set_aside_damaged(path: Path) -> Path:
     number = 1
     while (aside := path.with_name(f"{path.name}.damaged_{number}")).exists():
         number += 1

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from burg_drake.compose.commands import board_size
 from burg_drake.compose.document import History, State
-from burg_drake.compose.storage.journal import LibraryGone, Recovered, journal_path, recover
+from burg_drake.compose.storage.journal import LibraryMissing, Recovered, journal_path, recover
 from burg_drake.compose.storage.scene_file import fingerprint
 from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.storage.scene_storage import Storage
@@ -134,7 +134,7 @@ def _unsaved(
                 )
             if found.origin == origin and found.saved is None:
                 return _recovered(place, None, found, lock, notices)
-        except LibraryGone as error:
+        except LibraryMissing as error:
             notices += (str(error),)
         except BaseException:
             lock.release()
@@ -177,5 +177,5 @@ def _folder(folder: str | Path | None) -> Path:
     """
     path = Path.cwd() if folder is None else Path(folder)
     if not path.is_dir():
-        raise InvalidInputError(f"{path} is no folder; give one for the scenes")
+        raise InvalidInputError(f"{path} is not a folder; give one for the scenes")
     return path.resolve()

@@ -44,7 +44,7 @@ def scene_path(name: str, folder: Path) -> Path:
         folder: that was opened.
 
     Raises:
-        FieldError: it is no name: it would lead elsewhere, or hide the file.
+        FieldError: it is not a name: it would lead elsewhere, or hide the file.
         InvalidInputError: there is a link of that name, which leads elsewhere.
     """
     stem = name.removesuffix(".yaml").removesuffix(".yml")

@@ -37,9 +37,9 @@ class Storage:
         self._journal = SessionJournal(journal_path(place), origin)
 
     @property
-    def trouble(self) -> str | None:
+    def problem(self) -> str | None:
         """Why steps are not in the journal; None if they are."""
-        return self._journal.trouble
+        return self._journal.problem
 
     def announce(self, address: str) -> None:
         """Says where the session's page is, for those who find the scene in use."""

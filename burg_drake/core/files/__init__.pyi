@@ -18,8 +18,8 @@ from .bounded_text import (
     read_text as read_text,
 )
 from .decimal_text import (
-    on_grid as on_grid,
-    row_texts as row_texts,
+    format_rows as format_rows,
+    rounded_to_places as rounded_to_places,
 )
 from .hdf5 import (
     Hdf5File as Hdf5File,
@@ -34,14 +34,14 @@ from .numpy_file import (
     write_npy as write_npy,
 )
 from .read_errors import (
-    DAMAGED as DAMAGED,
-    reading as reading,
-    reason as reason,
+    READ_ERRORS as READ_ERRORS,
+    reporting_read_errors as reporting_read_errors,
+    short_message as short_message,
     without_warnings as without_warnings,
 )
 from .stored_array import (
     NUMBERS as NUMBERS,
-    Allowance as Allowance,
+    ReadBudget as ReadBudget,
     Shape as Shape,
     StoredArray as StoredArray,
     require_grasps as require_grasps,

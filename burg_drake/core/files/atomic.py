@@ -22,14 +22,14 @@ def open_regular(path: str | Path) -> BinaryIO:
     """Opens a file for reading bytes; a folder, device or pipe is refused, as it may never end.
 
     Raises:
-        InvalidInputError: it is not there, cannot be read, or is no file.
+        InvalidInputError: it is not there, cannot be read, or is not a file.
     """
     try:
         mode = os.stat(path).st_mode
         if stat.S_ISREG(mode):
             return open(path, "rb", opener=_open_at_once)
     except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is no path"  # with NUL
+        why = error.strerror if isinstance(error, OSError) else "it is not a path"  # with NUL
         raise InvalidInputError(f"cannot read {shown(str(path), 500)}: {why}") from error
     kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
     raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
@@ -130,7 +130,7 @@ def require_writable(path: str | Path) -> None:
 
 
 def _refuse_what_is_no_file(path: Path) -> None:
-    """Refuses what is there and is no file: a folder, or a device that a file would replace."""
+    """Refuses what is there and is not a file: a folder, or a device that a file would replace."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")
     if path.exists() and not path.is_file():

@@ -27,18 +27,18 @@ PAD = b"\0"
 """Where a number has no character."""
 
 
-def on_grid(values: Array) -> Array:
+def rounded_to_places(values: Array) -> Array:
     """The nearest numbers with 12 decimals; what is beyond 9000 in size stays as it is."""
     small = np.abs(values) <= LARGEST
     units = np.rint(np.where(small, values, 0.0) * 10.0**PLACES)
     return np.where(small, units / 10.0**PLACES + 0.0, values)  # no negative zeros
 
 
-def row_texts(values: Array, separator: str = ",") -> list[str]:
+def format_rows(values: Array, separator: str = ",") -> list[str]:
     """Each row of finite numbers (T, n) as text, which reads back bit by bit.
 
     Args:
-        values: on the grid, see `on_grid`, for the most part: others take longer.
+        values: on the grid, see `rounded_to_places`, for the most part: others take longer.
         separator: of the numbers of a row, one or two characters.
     """
     bits = np.ascontiguousarray(values).view(np.int64)

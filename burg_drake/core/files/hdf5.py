@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.atomic import open_regular
-from burg_drake.core.files.stored_array import Allowance, StoredArray, text_array
+from burg_drake.core.files.stored_array import ReadBudget, StoredArray, text_array
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
@@ -47,7 +47,7 @@ class Hdf5File:
     def __init__(self, path: Path, file: Any) -> None:
         self.path = path
         self._file = file
-        self._allowance = Allowance(path)
+        self._allowance = ReadBudget(path)
 
     def __contains__(self, key: str) -> bool:
         return self._find(key) is not None

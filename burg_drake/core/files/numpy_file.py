@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.atomic import atomic_write, open_regular
-from burg_drake.core.files.read_errors import DAMAGED, reading, without_warnings
-from burg_drake.core.files.stored_array import Allowance, Shape, StoredArray
+from burg_drake.core.files.read_errors import READ_ERRORS, reporting_read_errors, without_warnings
+from burg_drake.core.files.stored_array import ReadBudget, Shape, StoredArray
 
 HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
@@ -41,7 +41,7 @@ class NpzFile:
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.path = path
         self._archive = archive
-        self._allowance = Allowance(path)
+        self._allowance = ReadBudget(path)
         self.names = [
             name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")
         ]
@@ -82,7 +82,7 @@ def open_npy(path: Path) -> Iterator[StoredArray]:
     Raises:
         InvalidInputError: the file cannot be read, is cut off, or holds Python objects.
     """
-    with reading(path, KIND), open_regular(path) as stream:
+    with reporting_read_errors(path, KIND), open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         shape, dtype = _header(stream, str(path), size)
 
@@ -90,7 +90,7 @@ def open_npy(path: Path) -> Iterator[StoredArray]:
             stream.seek(0)
             return np.lib.format.read_array(stream, allow_pickle=False)
 
-        yield _stored(str(path), shape, dtype, load, Allowance(path))
+        yield _stored(str(path), shape, dtype, load, ReadBudget(path))
 
 
 def npy_shape(path: Path) -> Shape | None:
@@ -98,7 +98,7 @@ def npy_shape(path: Path) -> Shape | None:
     try:
         with open_regular(path) as stream, without_warnings():
             shape, _, dtype = HEADERS[np.lib.format.read_magic(stream)](stream)
-    except (OSError, InvalidInputError, *DAMAGED):
+    except (OSError, InvalidInputError, *READ_ERRORS):
         return None
     return shape if dtype.kind in "fiu" else None
 
@@ -117,16 +117,16 @@ def _header(stream: IO[bytes], where: str, size: int) -> tuple[Shape, np.dtype[A
         raise InvalidInputError(f"{where} holds Python objects, which are not read")
     if any(length < 0 for length in shape):
         raise InvalidInputError(f"{where} has shape {shape}; lengths cannot be negative")
-    told, there = dtype.itemsize * math.prod(shape), size - stream.tell()
-    if told > there:
+    announced, available = dtype.itemsize * math.prod(shape), size - stream.tell()
+    if announced > available:
         raise InvalidInputError(
             f"{where} is damaged or cut off: an array of shape {shape} and type {dtype} has"
-            f" {told} bytes, the file has {there}"
+            f" {announced} bytes, the file has {available}"
         )
     return shape, dtype
 
 
 def _stored(
-    where: str, shape: Shape, dtype: np.dtype[Any], load: Any, allowance: Allowance
+    where: str, shape: Shape, dtype: np.dtype[Any], load: Any, allowance: ReadBudget
 ) -> StoredArray:
     return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)

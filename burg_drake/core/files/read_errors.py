@@ -14,7 +14,7 @@ from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
 
-DAMAGED = (
+READ_ERRORS = (
     ArithmeticError,
     AttributeError,
     EOFError,
@@ -46,7 +46,7 @@ def without_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def reading(path: str | Path, kind: str) -> Iterator[None]:
+def reporting_read_errors(path: str | Path, kind: str) -> Iterator[None]:
     """Makes one line that names the file of every error that reading it ends with.
 
     Args:
@@ -64,12 +64,14 @@ def reading(path: str | Path, kind: str) -> Iterator[None]:
             raise
         raise InvalidInputError(f"{path}: {error}") from error
     except OSError as error:
-        raise InvalidInputError(f"cannot read {path}: {error.strerror or reason(error)}") from error
-    except DAMAGED as error:
-        raise InvalidInputError(f"{path} is not {kind}: {reason(error)}") from error
+        raise InvalidInputError(
+            f"cannot read {path}: {error.strerror or short_message(error)}"
+        ) from error
+    except READ_ERRORS as error:
+        raise InvalidInputError(f"{path} is not {kind}: {short_message(error)}") from error
 
 
-def reason(error: Exception) -> str:
+def short_message(error: Exception) -> str:
     """What an error says, in one line that is not too long."""
     text = str(error).partition("\n")[0] or type(error).__name__
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."

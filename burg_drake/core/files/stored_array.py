@@ -35,7 +35,7 @@ TYPES = {
 """Kinds in words."""
 
 
-class Allowance:
+class ReadBudget:
     """Memory that the arrays of a file may still take.
 
     Attributes:
@@ -85,7 +85,7 @@ class StoredArray:
     type: str
     itemsize: int
     load: Callable[[], NDArray[Any]]
-    allowance: Allowance
+    allowance: ReadBudget
 
     def read(self, kinds: str, *shapes: Shape) -> NDArray[Any]:
         """The data, if it is what is expected.
@@ -128,11 +128,11 @@ def require_grasps(where: str, n: int) -> None:
     """
     if n > MOST_GRASPS:
         raise InvalidInputError(
-            f"{where} has {n:,} grasps; a file may have {MOST_GRASPS:,}. Divide it"
+            f"{where} has {n:,} grasps; a file may have {MOST_GRASPS:,}; split it"
         )
 
 
-def text_array(where: str, texts: list[str], allowance: Allowance) -> NDArray[np.str_]:
+def text_array(where: str, texts: list[str], allowance: ReadBudget) -> NDArray[np.str_]:
     """(N,) texts, which numpy keeps as long as the longest one.
 
     Raises:

@@ -4,7 +4,7 @@ from .column import (
     Column as Column,
 )
 from .columns import (
-    GIVEN as GIVEN,
+    INPUT_PREFIX as INPUT_PREFIX,
     describe as describe,
 )
 from .csv_metadata_file import (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 TEXT: Final = ""
-"""Unit of what is no number."""
+"""Unit of what is not a number."""
 PLAIN: Final = "1"
 """Unit of numbers without one: ratios, counts, labels."""
 

@@ -143,7 +143,7 @@ _FAMILIES = tuple(
     (re.compile(re.sub("[A-Z]{2,}", lambda part: _PARTS[part[0]], name)), column)
     for name, column in FAMILIES.items()
 )
-GIVEN = "given_"
+INPUT_PREFIX = "given_"
 """Columns of results that came with the grasps begin with this."""
 
 
@@ -154,7 +154,7 @@ def describe(name: str) -> Column | None:
     for pattern, column in _FAMILIES:
         if pattern.fullmatch(name):
             return column
-    if name.startswith(GIVEN):
-        theirs = describe(name.removeprefix(GIVEN)) or Column(TEXT, "not known here")
+    if name.startswith(INPUT_PREFIX):
+        theirs = describe(name.removeprefix(INPUT_PREFIX)) or Column(TEXT, "not known here")
         return replace(theirs, description=f"came with the grasps: {theirs.description}")
     return None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
-from burg_drake.core.files import reading
+from burg_drake.core.files import reporting_read_errors
 from burg_drake.core.frames import FARTHEST, Array, canonical_fingers, check_pose
 from burg_drake.core.grasps.identifiers import identifiers
 from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_grasp_file, write_grasp_file
@@ -221,14 +221,14 @@ class GraspSet:
             InvalidInputError: not such a file, or of a newer version.
         """
         path = Path(path)
-        with reading(path, "a grasp set written by burg_drake"):
+        with reporting_read_errors(path, "a grasp set written by burg_drake"):
             provenance, fixed, columns = read_grasp_file(path)
             grasps = cls(**fixed, provenance=provenance, columns=columns)
-            require_sound(grasps)
+            require_valid(grasps)
             return grasps
 
 
-def require_sound(grasps: GraspSet) -> None:
+def require_valid(grasps: GraspSet) -> None:
     """Refuses a set, read of a file or made elsewhere, that `create` could not have made.
 
     Grasps that are there several times, with the same identifier, object, pose and width, are fine.

@@ -75,12 +75,12 @@ def read_grasp_file(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
     """Provenance, fixed arrays and further columns, as `write_grasp_file` takes them.
 
     Raises:
-        ValueError: or another of `core.files.DAMAGED`, where the file is not as it was written.
+        ValueError: or another of `core.files.READ_ERRORS`, where the file is not as it was written.
         InvalidInputError: a file of another format or of a newer version.
     """
     header, fixed, columns = (_read_hdf5 if is_hdf5(path) else _read_npz)(path)
     if not isinstance(header["provenance"], dict):
-        raise ValueError("its provenance is no mapping")
+        raise ValueError("its provenance is not a mapping")
     provenance = with_resolved_references(header["provenance"], path.absolute().parent)
     return provenance, fixed, columns
 

@@ -127,7 +127,7 @@ class TextField(VerdictField):
 
     def from_json(self, data: Any) -> Any:
         if not isinstance(data, str):
-            raise TypeError(f"{quoted(data)} is no text")
+            raise TypeError(f"{quoted(data)} is not a text")
         return self.of(data)
 
     def joined(self, values: Sequence[Any]) -> Any:
@@ -317,5 +317,5 @@ def _or_nan(value: object) -> float:
 
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise TypeError(f"{quoted(value)} is no number")
+        raise TypeError(f"{quoted(value)} is not a number")
     return float(value)

@@ -22,7 +22,7 @@ def require_name(name: str, *place: str | int) -> None:
         place: of the name in its document, see `FieldError`.
 
     Raises:
-        FieldError: it is no name.
+        FieldError: it is not a name.
     """
     if not _NAME.fullmatch(name) or len(name.encode()) > LONGEST:
         raise FieldError(

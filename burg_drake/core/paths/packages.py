@@ -117,9 +117,11 @@ def drake_models_folder() -> Path | None:
     if share is None:
         return None
     try:
-        told = json.loads(read_bytes(share / "multibody/parsing/drake_models.json", DOCUMENT.size))
-        prefix = hashlib.sha256(told["strip_prefix"].encode()).hexdigest()
-        folder = f"{told['sha256']}-{prefix}"
+        manifest = json.loads(
+            read_bytes(share / "multibody/parsing/drake_models.json", DOCUMENT.size)
+        )
+        prefix = hashlib.sha256(manifest["strip_prefix"].encode()).hexdigest()
+        folder = f"{manifest['sha256']}-{prefix}"
     except (InvalidInputError, ValueError, KeyError, TypeError, AttributeError):
         return None
     if "TEST_TMPDIR" in os.environ:

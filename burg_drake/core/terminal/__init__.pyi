@@ -5,16 +5,16 @@ from .colors import (
 )
 from .number_text import (
     MISSING as MISSING,
-    count as count,
-    duration as duration,
-    figure as figure,
-    percent as percent,
+    format_count as format_count,
+    format_duration as format_duration,
+    format_number as format_number,
+    format_percent as format_percent,
 )
 from .progress import (
     STARTING as STARTING,
     Listener as Listener,
-    Pace as Pace,
     Progress as Progress,
+    ProgressMeter as ProgressMeter,
     Reporter as Reporter,
 )
 from .text_table import TextTable as TextTable

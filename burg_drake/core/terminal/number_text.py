@@ -8,7 +8,7 @@ MISSING = "-"
 """Stands for a number that is not known."""
 
 
-def figure(value: float | None, decimals: int | None = None) -> str:
+def format_number(value: float | None, decimals: int | None = None) -> str:
     """A number, in at most eight characters unless decimals are asked for.
 
     Args:
@@ -32,25 +32,25 @@ def figure(value: float | None, decimals: int | None = None) -> str:
     return f"{float(digits):g}e{int(exponent)}"
 
 
-def count(value: int | None) -> str:
+def format_count(value: int | None) -> str:
     """A whole number; from a billion on three digits of it."""
     if value is None:
         return MISSING
-    return f"{value:,}" if abs(value) < 1_000_000_000 else figure(float(value))
+    return f"{value:,}" if abs(value) < 1_000_000_000 else format_number(float(value))
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """A share of 0 to 1."""
     if math.isnan(share):
         return MISSING
     return f"{100 * share:.0f} %" if share in (0.0, 1.0) else f"{100 * share:.1f} %"
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A duration, with three digits."""
     if math.isnan(seconds):
         return MISSING
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if seconds >= size:
-            return f"{figure(seconds / size)} {unit}"
-    return f"{figure(seconds * 1e6)} µs"
+            return f"{format_number(seconds / size)} {unit}"
+    return f"{format_number(seconds * 1e6)} µs"

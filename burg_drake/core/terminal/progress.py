@@ -1,7 +1,7 @@
 """How far a job is: events for programs, a bar for terminals, a line now and then for log files.
 
-All verbs that take long report here. `Pace` counts results and tells how long the rest takes,
-`Reporter` shows that, or hands it to a function.
+All verbs that take long report here. `ProgressMeter` counts results and forecasts how long the rest
+takes. `Reporter` shows that, or hands it to a function.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from burg_drake.core.grasps import Outcome
-from burg_drake.core.terminal.number_text import figure
+from burg_drake.core.terminal.number_text import format_number
 
 INTERVAL = 30.0
 """Time between two lines where there is no terminal [s]."""
@@ -41,7 +41,7 @@ class Progress:
         before: how many of `done` were there before the clock was started.
         elapsed: time since then [s].
         outcomes: number of grasps by outcome.
-        good: the outcome that is worth telling.
+        counted_outcome: the outcome that is worth telling.
         unit: what is counted.
         left: expected time left [s], where more is known of it than `done` and `total` say.
         note: what else is worth a word.
@@ -53,7 +53,7 @@ class Progress:
     before: float = 0
     elapsed: float = 0.0
     outcomes: Counter[Outcome] | None = None
-    good: Outcome = Outcome.LIFTED
+    counted_outcome: Outcome = Outcome.LIFTED
     unit: str = "grasps"
     left: float | None = None
     note: str = ""
@@ -75,7 +75,7 @@ class Progress:
 Listener = Callable[[Progress], None]
 
 
-class Pace:
+class ProgressMeter:
     """Counts results and makes events of them."""
 
     def __init__(
@@ -205,8 +205,8 @@ class _Bar:
             completed=event.done,
             total=event.total or None,
             count=_count(event),
-            pace=_pace(event),
-            found=_found(event),
+            pace=_rate_text(event),
+            found=_outcome_text(event),
         )
 
     def close(self) -> None:
@@ -221,7 +221,7 @@ class _LogLines:
         self._clock = clock
         self._begun = self._last = clock()
         self._phase = ""
-        self._forecast = self._spoken = False
+        self._forecast = self._last_shown = False
 
     def show(self, event: Progress) -> None:
         now = self._clock()
@@ -230,15 +230,15 @@ class _LogLines:
         )
         new = event.phase != self._phase
         starting = new and event.phase == STARTING and event.done < event.total
-        if not (self._spoken or known or starting or now - self._begun >= FORECAST):
+        if not (self._last_shown or known or starting or now - self._begun >= FORECAST):
             return
-        told = self._forecast and not new
+        shown_forecast = self._forecast and not new
         finished = 0 < event.total == event.done
-        if new or finished or (known and not told) or now - self._last >= INTERVAL:
+        if new or finished or (known and not shown_forecast) or now - self._last >= INTERVAL:
             self._phase, self._last = event.phase, now
-            self._spoken = self._spoken or not starting
-            self._forecast = told or known
-            parts = (event.phase, _count(event), _pace(event), _found(event))
+            self._last_shown = self._last_shown or not starting
+            self._forecast = shown_forecast or known
+            parts = (event.phase, _count(event), _rate_text(event), _outcome_text(event))
             print("  ".join(part for part in parts if part), file=sys.stderr, flush=True)
 
 
@@ -252,7 +252,7 @@ def _number(value: float) -> str:
     return f"{value:,}" if isinstance(value, int) else f"{value:.1f}"
 
 
-def _pace(event: Progress) -> str:
+def _rate_text(event: Progress) -> str:
     if event.remaining is None:
         return ""
     left = math.ceil(event.remaining)
@@ -260,14 +260,14 @@ def _pace(event: Progress) -> str:
     if event.rate <= 0.0:
         return clock
     slow = event.rate < 1.0
-    rate = f"{figure(60.0 * event.rate)}/min" if slow else f"{figure(event.rate)}/s"
+    rate = f"{format_number(60.0 * event.rate)}/min" if slow else f"{format_number(event.rate)}/s"
     return f"{rate}  {clock}"
 
 
-def _found(event: Progress) -> str:
+def _outcome_text(event: Progress) -> str:
     """What was found so far, in short: a terminal has no room for all outcomes."""
     if not event.outcomes:
         return event.note
     failed = event.outcomes[Outcome.SIMULATION_FAILED]
-    found = f"{event.outcomes[event.good]:,} {event.good}"
+    found = f"{event.outcomes[event.counted_outcome]:,} {event.counted_outcome}"
     return found + (f", {failed} failed" if failed else "")

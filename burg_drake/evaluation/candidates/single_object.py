@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import Array, Arrays, content_hash, kept, make_pose
+from burg_drake.core import Array, Arrays, cached, content_hash, make_pose
 from burg_drake.core.documents import Pose, dump_document, plain_data
 from burg_drake.core.paths import named_files
 from burg_drake.evaluation.candidates.approach_limits import from_above
@@ -80,7 +80,7 @@ def object_grasps(
         *(VERSION, library.content[object], hand, plain_data(station.document.table)),
         *(down_O, height, n, seed),
     )
-    found = kept(
+    found = cached(
         "object-grasps",
         asked,
         lambda: _sampled(library, object, _standing(down_O, height), station, n, seed),

@@ -161,7 +161,7 @@ def read_cluster(text: str) -> Cluster:
         return Cluster(document=ClusterDocument(address=text))
     if Path(text).suffix not in (".yaml", ".yml"):
         raise InvalidInputError(
-            f"{quoted(text)} is no cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
+            f"{quoted(text)} is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
         )
     path = resolve(text)
     document = load_document(path, ClusterDocument)
@@ -184,7 +184,7 @@ def require_safe(address: str, whose: str = "") -> None:
             process, too, which nobody can ask for.
 
     Raises:
-        InvalidInputError: it is no address.
+        InvalidInputError: it is not an address.
         ClusterError: plain TCP beyond this machine.
     """
     if whose and address.startswith("inproc://"):
@@ -193,7 +193,7 @@ def require_safe(address: str, whose: str = "") -> None:
     if found is None:
         what = "worker" if "worker" in whose else "scheduler"
         raise InvalidInputError(
-            f"{whose}{quoted(address)} is no address of a {what}; write tls://HOST:PORT"
+            f"{whose}{quoted(address)} is not an address of a {what}; write tls://HOST:PORT"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(

@@ -10,7 +10,7 @@ import numpy as np
 
 from burg_drake.core import BurgError
 from burg_drake.core.documents import load_document
-from burg_drake.core.grasps import GIVEN, GraspSet
+from burg_drake.core.grasps import INPUT_PREFIX, GraspSet
 from burg_drake.evaluation.grasp_sets.provenance import hand_entry, object_files
 from burg_drake.evaluation.records import TEXT
 from burg_drake.evaluation.store import SCENE_FILE, STATION_FILE, Run
@@ -29,16 +29,16 @@ def run_grasps(run: Run) -> GraspSet:
     Returns:
         The grasps with the column `instance` and those of the results table, see
         `evaluation.records.table`; NaN or empty for grasps that are not judged yet. What came with
-        the grasps has its own name, and begins with `GIVEN` only where the run has a column of that
-        name. The identifier of a grasp is the run's without the instance. The provenance names
-        the run, its copies of scene and station, and the hand, and describes the objects.
+        the grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column
+        of that name. The identifier of a grasp is the run's without the instance. The provenance
+        names the run, its copies of scene and station, and the hand, and describes the objects.
     """
     candidates, results = run.candidates, run.results
     row = {id: i for i, id in enumerate(candidates.id)}
     judged = np.array([row[id] for id in results["id"].tolist()], dtype=int)
     columns = {}
     for name, values in results.items():
-        given = name.startswith(GIVEN) and name.removeprefix(GIVEN) not in results
+        given = name.startswith(INPUT_PREFIX) and name.removeprefix(INPUT_PREFIX) not in results
         if name in LEFT_OUT or given:
             continue
         text = name in TEXT or values.dtype.kind == "U"
@@ -56,7 +56,7 @@ def run_grasps(run: Run) -> GraspSet:
 
 def column_called(grasps: GraspSet, name: str) -> str:
     """The column of `run_grasps` that goes by a name of the results table."""
-    plain = name.removeprefix(GIVEN)
+    plain = name.removeprefix(INPUT_PREFIX)
     return plain if name not in grasps.column_names and plain in grasps.column_names else name
 
 

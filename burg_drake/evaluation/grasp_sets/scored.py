@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, InvalidInputError, MeshError, UnknownNameError, nearest
 from burg_drake.core.grasps import GraspSet, Stage
-from burg_drake.core.terminal import Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import INSTANCE
 from burg_drake.evaluation.grasp_sets.provenance import set_documents
 from burg_drake.geometry import Surface
@@ -85,7 +85,7 @@ def scored_set(
     columns["force_closure"] = np.zeros(len(grasps), bool)
     payloads = {}
     with Reporter(progress) as reporter:
-        pace = Pace(reporter.show, Progress("scoring", total=len(grasps)))
+        pace = ProgressMeter(reporter.show, Progress("scoring", total=len(grasps)))
         for name in objects:
             payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
             payloads[name] = asdict(payload)
@@ -101,7 +101,7 @@ def scored_set(
             **set_documents(library, scene, station, objects),
         }
         if scene is not None and instance is not None and X_WO is not None:
-            pace = Pace(reporter.show, Progress("clearance", total=len(grasps)))
+            pace = ProgressMeter(reporter.show, Progress("clearance", total=len(grasps)))
             columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station, pace)
             how["clearance_version"] = CLEARANCE_VERSION
     kept = {name: values for name, values in grasps.columns.items() if name not in SCENE_COLUMNS}
@@ -167,7 +167,7 @@ def _placed(instance: NDArray[np.str_], scene: Scene, station: Station) -> Array
 
 
 def _clearances(
-    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: Pace
+    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: ProgressMeter
 ) -> dict[str, Any]:
     from burg_drake.grasping.clearance import HandClearance
     from burg_drake.station.diagram import build_station_diagram

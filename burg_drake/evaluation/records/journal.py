@@ -48,7 +48,7 @@ class Journal:
             raise being_written(path.parent)
         if not stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
-            raise InvalidInputError(f"cannot write {path}: it is no file; choose another folder")
+            raise InvalidInputError(f"cannot write {path}: it is not a file; choose another folder")
         content = path.read_bytes()
         whole = content.rfind(b"\n") + 1
         if whole != len(content):  # otherwise the file keeps its date: table and report are newer
@@ -67,8 +67,8 @@ class Journal:
                 raise OSError(0, f"{written} of {len(line)} bytes fitted on the disk")
         except OSError as error:
             raise InvalidInputError(
-                f"cannot write {self._path}: {error.strerror}; what is in it is kept, and the same"
-                " command goes on from there"
+                f"cannot write {self._path}: {error.strerror}; what is in it is kept; run the"
+                " same command to continue"
             ) from error
 
     def close(self) -> None:

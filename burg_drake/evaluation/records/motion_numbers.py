@@ -47,7 +47,7 @@ def motion_text(motion: GraspMotion) -> str:
     parts = [f"standoff {_mm(motion.standoff)} mm"]
     if motion.retreat:
         parts.append(f"retreat {_mm(motion.retreat)} mm")
-    least = f"{_mm(motion.least)} to " if motion.least < motion.lift_height else ""
+    least = f"{_mm(motion.shortest)} to " if motion.shortest < motion.lift_height else ""
     parts.append(f"lift {least}{_mm(motion.lift_height)} mm")
     x, y, z = motion.lift_direction
     if (x, y) != (0.0, 0.0) or z < 0.0:

@@ -200,8 +200,8 @@ def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
     unknown = [name for name in values if name not in known]
     if unknown:
         raise InvalidInputError(
-            f"{where}: {unknown[0]!r} is no setting of this release of burg_drake; install the one"
-            " that made the results"
+            f"{where}: {unknown[0]!r} is not a setting of this release of burg_drake; install the"
+            " one that made the results"
         )
     text = "\n".join(f"{name}: {_yaml(value)}" for name, value in values.items())
     found: T = _CellReader(where).read(parse_nodes(text or "{}", where), schema, "")

@@ -45,7 +45,7 @@ class Shard:
         """
         found = re.fullmatch(r"(\d{1,7})/(\d{1,7})", text)
         if found is None:
-            raise InvalidInputError(f"{quoted(text)} is no shard; give K/N, such as 2/8")
+            raise InvalidInputError(f"{quoted(text)} is not a shard; give K/N, such as 2/8")
         return cls(int(found[1]), int(found[2]))
 
     def __str__(self) -> str:

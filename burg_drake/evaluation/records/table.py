@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import quaternion_from_rotation
 from burg_drake.core.grasps import (
-    GIVEN,
+    INPUT_PREFIX,
     VERDICT_FIELDS,
     Part,
     TableShape,
@@ -86,7 +86,7 @@ def make_columns(
         for i in judged
     ]
     columns = trial_columns(trials, origin, instances=instances, joints=joints)
-    return columns | {GIVEN + name: _plain(v[judged]) for name, v in grasps.columns.items()}
+    return columns | {INPUT_PREFIX + name: _plain(v[judged]) for name, v in grasps.columns.items()}
 
 
 def trial_columns(

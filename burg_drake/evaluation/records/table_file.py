@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from burg_drake.core import InvalidInputError, MissingDependencyError, quoted
 from burg_drake.core.files import (
     TABLE,
-    Allowance,
+    ReadBudget,
     atomic_write,
     atomic_write_all,
     open_regular,
     read_rows,
-    reason,
     require_writable,
+    short_message,
     text_array,
 )
 from burg_drake.core.grasps import MARGINS, PREFIXES, csv_metadata, describe, metadata_path
@@ -69,7 +69,7 @@ def require_table(path: Path) -> None:
     """
     if path.suffix not in (".csv", ".parquet"):
         raise InvalidInputError(
-            f"{path} is no table of a known format; give a file that ends in .csv or .parquet,"
+            f"{path} is not a table of a known format; give a file that ends in .csv or .parquet,"
             f" such as {path.with_suffix('.csv') if path.name else 'table.csv'}"
         )
     require_writer(path.suffix.removeprefix("."))
@@ -123,15 +123,17 @@ def read_table(path: Path) -> Columns:
             cells = {name: table.column(name).to_pylist() for name in table.column_names}
         else:
             cells = _csv_cells([row for _, row in read_rows(path)])
-        allowance = Allowance(path)
+        allowance = ReadBudget(path)
         return {name: _typed(name, values, allowance) for name, values in cells.items()}
     except OSError as error:
-        why = error.strerror or reason(error)  # pyarrow's own are OSErrors, too
+        why = error.strerror or short_message(error)  # pyarrow's own are OSErrors, too
         raise InvalidInputError(f"cannot read {path}: {why}") from error
     except InvalidInputError:
         raise
     except ValueError as error:
-        raise InvalidInputError(f"{path} is not a results table ({reason(error)})") from error
+        raise InvalidInputError(
+            f"{path} is not a results table ({short_message(error)})"
+        ) from error
 
 
 def _bounded(path: Path, file: Any) -> Any:
@@ -231,7 +233,7 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-def _typed(name: str, values: Sequence[Any], allowance: Allowance) -> NDArray[Any]:
+def _typed(name: str, values: Sequence[Any], allowance: ReadBudget) -> NDArray[Any]:
     texts = ["" if value is None else str(value) for value in values]
     if name in TEXT:
         return text_array(f"{allowance.path}: {name}", texts, allowance)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
 from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.records import LEDGER_FILE, engine_label
 from burg_drake.evaluation.report.elements import (
     Html,
@@ -75,7 +75,7 @@ def campaign_page(campaign: Campaign) -> str:
     """The report as HTML."""
     document, summary = campaign.document, summarize(campaign)
     number = len(campaign.names)
-    title = f"{count(number)} scene{'' if number == 1 else 's'} on {document.station.name}"
+    title = f"{format_count(number)} scene{'' if number == 1 else 's'} on {document.station.name}"
     names = {m.column for m in (*CHOSEN, *FURTHER)} | {*MARGINS_ASKED, *TEXTS, *POSES, "id"}
     stored = campaign.rows(sorted(names))
     outcomes = _members(stored, "outcome", [outcome.value for outcome in Outcome])
@@ -116,7 +116,7 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
         number, _, whole = campaign.document.shard.partition("/")
         parts.append(f"This is shard {number} of {whole}; burg-drake merge unites the shards.")
     if not campaign.complete:
-        judged, expected = count(summary.total.judged), count(campaign.expected)
+        judged, expected = format_count(summary.total.judged), format_count(campaign.expected)
         parts.append(
             f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
             " goes on with it."

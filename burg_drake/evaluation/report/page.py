@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from burg_drake.core.files import atomic_write
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.records import engine_label
 from burg_drake.evaluation.report.elements import (
     Html,
@@ -97,7 +97,9 @@ def _about(run: Run) -> str:
     how = "sampled" if document.grasps.origin == "sampled" else "given"
     day = document.stretches[0].started[:10] if document.stretches else ""
     engine = engine_label(document.engine)
-    about = f"{count(document.grasps.count)} {how} grasps, mode {document.mode}, engine {engine}"
+    about = (
+        f"{format_count(document.grasps.count)} {how} grasps, mode {document.mode}, engine {engine}"
+    )
     about += f", seed {document.seed}"
     return f"{about}{', ' if day else ''}{day}"
 

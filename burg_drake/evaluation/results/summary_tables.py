@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from burg_drake.core.grasps import Outcome
-from burg_drake.core.terminal import TextTable, count, duration, figure, percent
+from burg_drake.core.terminal import (
+    TextTable,
+    format_count,
+    format_duration,
+    format_number,
+    format_percent,
+)
 from burg_drake.evaluation.results.counts import OutcomeCounts, Summary
 
 if TYPE_CHECKING:
@@ -55,9 +61,11 @@ def _stage_table(summary: Summary) -> TextTable:
         low, high = group.interval
         share, interval = "-", "-"
         if group.executed:
-            share = percent(group.lifted / group.executed)
+            share = format_percent(group.lifted / group.executed)
             interval = f"{100 * low:.0f}-{100 * high:.0f} %"
-        table.row(group.name, *(count(group.funnel[name]) for name in names), share, interval)
+        table.row(
+            group.name, *(format_count(group.funnel[name]) for name in names), share, interval
+        )
     table.caption = "held: to the end; lifted: held, and no other object disturbed\n"
     if summary.mode != "hand":
         table.caption += "reach, plan: the arm can be there; it can move there, in and up\n"
@@ -69,7 +77,7 @@ def _outcome_matrix(summary: Summary) -> TextTable:
     groups = _rows(summary)
     table = TextTable("Outcomes").texts("outcome").numbers(*(group.name for group in groups))
     for outcome in _seen(summary):
-        counts = [count(n) if (n := group.outcomes[outcome]) else "·" for group in groups]
+        counts = [format_count(n) if (n := group.outcomes[outcome]) else "·" for group in groups]
         table.row(outcome.value, *counts, bold=outcome is Outcome.LIFTED)
     return table
 
@@ -77,7 +85,9 @@ def _outcome_matrix(summary: Summary) -> TextTable:
 def _outcome_list(summary: Summary) -> TextTable:
     table = TextTable("Outcomes").names("object").texts("outcomes")
     for group in _rows(summary):
-        found = [f"{count(group.outcomes[o])} {o}" for o in _seen(summary) if group.outcomes[o]]
+        found = [
+            f"{format_count(group.outcomes[o])} {o}" for o in _seen(summary) if group.outcomes[o]
+        ]
         table.row(group.name, ", ".join(found))
     return table
 
@@ -90,8 +100,12 @@ def _cost_table(summary: Summary) -> TextTable:
     table = TextTable("CPU time").texts("stage")
     table.numbers("grasps", "CPU time", "median", "grasps per CPU second")
     for cost in summary.costs:
-        spent = (duration(cost.seconds), duration(cost.median), figure(cost.rate))
-        table.row(cost.name, count(cost.grasps), *spent)
+        spent = (
+            format_duration(cost.seconds),
+            format_duration(cost.median),
+            format_number(cost.rate),
+        )
+        table.row(cost.name, format_count(cost.grasps), *spent)
     return table
 
 

@@ -18,7 +18,7 @@ from burg_drake.core import (
 )
 from burg_drake.core.files import writable_folder
 from burg_drake.core.grasps import Outcome, Stage, Verdict
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import (
@@ -175,7 +175,7 @@ def _answer(
     begin = Progress(
         STARTING, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
-    pace = Pace(reporter.show, begin, "testing", work=work)
+    pace = ProgressMeter(reporter.show, begin, "testing", work=work)
     tests = {probe.id: probe.test for probe in todo}
     trials = [probe.trial for probe in todo]
     factory = replace(factory, tests=tests)

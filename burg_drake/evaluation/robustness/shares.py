@@ -41,7 +41,7 @@ def lifted_shares(
     columns = read_table(path)
     if "success" not in columns or "id" not in columns or columns["success"].dtype.kind != "f":
         raise InvalidInputError(
-            f"{path} is no table of robustness: it has no columns id and success, as `burg-drake"
+            f"{path} is not a table of robustness: it has no columns id and success, as `burg-drake"
             " robustness` writes them"
         )
     grasps, shares = columns["id"].tolist(), columns["success"].tolist()

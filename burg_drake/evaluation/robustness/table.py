@@ -30,7 +30,7 @@ from typing import TypeVar
 import numpy as np
 
 from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.core.terminal import TextTable, figure
+from burg_drake.core.terminal import TextTable, format_number
 from burg_drake.evaluation.records import Columns, engine_label, pairs_text
 from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
 from burg_drake.evaluation.robustness.settings import (
@@ -159,7 +159,7 @@ def _weakest(forces: HoldForces | None, largest: float) -> str:
     if forces is None:
         return "-"
     name, value = forces.weakest
-    return f"> {largest:g} g   " if math.isinf(value) else f"{figure(value, 1)} g {name:>2}"
+    return f"> {largest:g} g   " if math.isinf(value) else f"{format_number(value, 1)} g {name:>2}"
 
 
 def _friction(grasp: GraspRobustness, settings: RobustnessSettings) -> str:
@@ -169,7 +169,7 @@ def _friction(grasp: GraspRobustness, settings: RobustnessSettings) -> str:
         return f"< {settings.friction.smallest:g}"
     if math.isinf(grasp.friction_min):
         return f"> {settings.friction.largest:g}"
-    return f"{figure(grasp.friction_min, 3)} of {figure(grasp.friction)}"
+    return f"{format_number(grasp.friction_min, 3)} of {format_number(grasp.friction)}"
 
 
 def _caption(settings: RobustnessSettings) -> str:

@@ -16,7 +16,7 @@ def require_judged(run: Run) -> None:
     if left:
         raise SimulationError(
             f"{len(left)} of {len(run.mine)} grasps have come back without a verdict, such as"
-            f" {left[0]}; what was judged is kept, and the same command goes on"
+            f" {left[0]}; what was judged is kept; run the same command to continue"
         )
 
 
@@ -34,5 +34,5 @@ def require_scenes_judged(campaign: Campaign) -> None:
     if left:
         raise SimulationError(
             f"{len(left)} of {len(campaign.names)} scenes were not judged to the end"
-            f" ({listing(left)}); what was judged is kept, and the same command goes on"
+            f" ({listing(left)}); what was judged is kept; run the same command to continue"
         )

@@ -22,7 +22,7 @@ from burg_drake.core import (
 )
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Outcome, Verdict
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.records import (
     CampaignDocument,
     Ledger,
@@ -171,7 +171,7 @@ class _Call:
         there = sum(n for name, n in self.expected.items() if name not in left)
         found = self._found()
         event = Progress(STARTING, there, sum(self.expected.values()), outcomes=found)
-        self.pace = Pace(self.reporter.show, event, "judging")
+        self.pace = ProgressMeter(self.reporter.show, event, "judging")
         stretch = begun_now(self.executor.workers, found.total())
         stretches = document.stretches
         save_campaign(

@@ -45,9 +45,9 @@ def require_sound(scene: Scene, station: Station, mode: Mode) -> None:
         InvalidInputError: unsound scene, or an arm that stands in something or does not reach.
     """
     from burg_drake.motion.workspace import require_usable_arm
-    from burg_drake.station.checks import require_sound_scene
+    from burg_drake.station.checks import require_valid_scene
 
-    require_sound_scene(scene, station)
+    require_valid_scene(scene, station)
     if mode != "hand":
         require_usable_arm(scene, station)
 

@@ -22,7 +22,7 @@ class LiftRoom:
 
     def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
         self._sweep = HandSweep(scene, station, motion)
-        self._heights = lift_heights(motion.least, motion.lift_height)
+        self._heights = lift_heights(motion.shortest, motion.lift_height)
 
     def length(self, instance: str, X_WG: Array, width: Array) -> Array:
         """(N,) lengths of lifts on which the hand meets nothing, with the target in it [m].

@@ -132,7 +132,7 @@ def _room(scene: Scene, station: Station, motion: GraspMotion) -> LiftRoom | Non
     """What says how far the hand can lift, where it may be less than asked for."""
     from burg_drake.evaluation.stages.lift_room import LiftRoom
 
-    return LiftRoom(scene, station, motion) if motion.least < motion.lift_height else None
+    return LiftRoom(scene, station, motion) if motion.shortest < motion.lift_height else None
 
 
 @dataclass(frozen=True)

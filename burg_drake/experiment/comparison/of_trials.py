@@ -55,10 +55,10 @@ def compare_trials(
     tables = [columns for columns, _ in found_rows]
     left_out = _missing([missing for _, missing in found_rows])
     indices = set.intersection(*(set(t["trial"].tolist()) for t in tables))
-    chosen, untold = _telling(sheet, tables, sorted(indices))
-    left_out.update(untold)
+    chosen, uninformative = _informative(sheet, tables, sorted(indices))
+    left_out.update(uninformative)
     if not chosen:
-        raise InvalidInputError(_nothing_told(path, left_out))
+        raise InvalidInputError(_no_outcome_message(path, left_out))
     trials = [sheet.trials[k] for k in chosen]
     found = []
     for side, columns in zip(sides, tables, strict=True):
@@ -96,17 +96,17 @@ def _missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
     for k in sorted(set[int]().union(*by_side)):
         reasons = [missing.get(k) for missing in by_side]
         if len(reasons) == 1:
-            told = [f"{reasons[0]} in the run"]
+            reason_texts = [f"{reasons[0]} in the run"]
         elif reasons[0] == reasons[1]:
-            told = [f"{reasons[0]} in either run"]
+            reason_texts = [f"{reasons[0]} in either run"]
         else:
             named = zip(reasons, ("first", "second"), strict=True)
-            told = [f"{reason} in the {which} run" for reason, which in named if reason]
-        left_out[f"grasp {' and '.join(told)}"] += 1
+            reason_texts = [f"{reason} in the {which} run" for reason, which in named if reason]
+        left_out[f"grasp {' and '.join(reason_texts)}"] += 1
     return left_out
 
 
-def _telling(
+def _informative(
     sheet: TrialSheet, tables: Sequence[Columns], indices: Sequence[int]
 ) -> tuple[list[int], Counter[str]]:
     """Trials that tell something of their grasp, and why the others do not."""
@@ -208,6 +208,6 @@ def _notes(
     return tuple(notes)
 
 
-def _nothing_told(path: Path, left_out: Counter[str]) -> str:
+def _no_outcome_message(path: Path, left_out: Counter[str]) -> str:
     reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
     return f"{path}: no trial can be compared yet ({reasons})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from burg_drake.core.terminal import TextTable, count, figure
+from burg_drake.core.terminal import TextTable, format_count, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
@@ -58,8 +58,8 @@ def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
     table = TextTable(f"Verdicts and outcomes{name}").texts("predicted")
     table.numbers(f"success {other}", f"failure {other}")
     found = judged.selected
-    table.row("success", count(int(found.tp)), count(int(found.fp)))
-    table.row("failure", count(int(found.fn)), count(int(found.tn)))
+    table.row("success", format_count(int(found.tp)), format_count(int(found.fp)))
+    table.row("failure", format_count(int(found.fn)), format_count(int(found.tn)))
     return table
 
 
@@ -72,7 +72,7 @@ def figure_table(judged: Judgement, name: str = "") -> TextTable:
     else:
         found.append(judged.all_grasps)
         table.numbers("selected trials", "95 % CI", "all grasps", "95 % CI")
-        grasps = count(round(sum(judged.all_grasps.cells)))
+        grasps = format_count(round(sum(judged.all_grasps.cells)))
         table.caption = (
             f"selected trials: the {found[0].trials} that were compared; all grasps: the {grasps}"
             " that they were chosen from, each trial standing for its share"
@@ -98,7 +98,7 @@ def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTab
         a = group.agreement
         table.row(
             group.name,
-            *(count(int(n)) for n in (a.trials, *a.cells)),
+            *(format_count(int(n)) for n in (a.trials, *a.cells)),
             number(a.accuracy, percent=True),
             interval(a.accuracy, percent=True) or "-",
             number(a.precision, percent=True),
@@ -117,7 +117,7 @@ def stopped_table(judged: Judgement, name: str = "") -> TextTable:
         table.row(
             row.outcome,
             row.blocker,
-            count(row.trials),
+            format_count(row.trials),
             number(row.successes, percent=True),
             interval(row.successes, percent=True) or "-",
         )
@@ -134,10 +134,12 @@ def calibration_table(found: Sequence[MarginCalibration], name: str = "") -> Tex
     if weighted:
         table.numbers("all grasps")
     for c in found:
-        cells = [count(c.trials), number(c.auroc, percent=False)]
+        cells = [format_count(c.trials), number(c.auroc, percent=False)]
         cells.append(interval(c.auroc, percent=False) or "-")
         if weighted:
-            cells.append("-" if c.auroc_weighted is None else figure(c.auroc_weighted.value, 3))
+            cells.append(
+                "-" if c.auroc_weighted is None else format_number(c.auroc_weighted.value, 3)
+            )
         better = "smaller" if c.smaller_is_better else "larger"
         table.row(margin_title(c.name)[0], better, *cells)
     table.caption = (

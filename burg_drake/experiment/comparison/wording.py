@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from burg_drake.core.terminal import MISSING, figure
+from burg_drake.core.terminal import MISSING, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Estimate
@@ -67,7 +67,11 @@ def headline(comparison: Comparison) -> str:
     trials = f"In {found.trials:,} trial{plural} on the robot"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
-        p = "" if c.difference.p_value is None else f" (McNemar p = {figure(c.difference.p_value)})"
+        p = (
+            ""
+            if c.difference.p_value is None
+            else f" (McNemar p = {format_number(c.difference.p_value)})"
+        )
         return (
             f"{trials} {first} was right in {brief(found.accuracy)}, {second} in"
             f" {brief(c.other.selected.accuracy)}; {difference_words(c)}{p}."
@@ -108,7 +112,7 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     return (
         f"The {who} {size} {other} {interval(b.difference, percent=True)}: {b.only_first:,}"
         f" predicted successes did not come true, {b.only_second:,} came about against the"
-        f" prediction (McNemar's exact test: p = {figure(b.p_value)})."
+        f" prediction (McNemar's exact test: p = {format_number(b.p_value)})."
     )
 
 

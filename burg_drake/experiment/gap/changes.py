@@ -86,20 +86,20 @@ class Change:
         return Counter(move.blocker for move in self.lost if move.blocker)
 
 
-def gap_changes(ladder: GapSteps, success: Success) -> tuple[Change, ...]:
+def gap_changes(steps: GapSteps, success: Success) -> tuple[Change, ...]:
     """What each step but the first changes.
 
     Args:
-        ladder: all steps.
+        steps: all steps.
         success: what counts.
     """
-    return tuple(_change(before.runs[0], step, success) for before, step in pairwise(ladder.steps))
+    return tuple(_change(before.runs[0], step, success) for before, step in pairwise(steps.steps))
 
 
 def _change(before: Run, step: GapStep, success: Success) -> Change:
     moves = list(_moves(before, step.runs, success))
-    told = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
-    return Change(step.name, told, success, len(moves) - len(told))
+    judged = tuple(m for m in moves if Outcome.SIMULATION_FAILED not in (m.before, m.after))
+    return Change(step.name, judged, success, len(moves) - len(judged))
 
 
 def _moves(before: Run, after: Sequence[Run], success: Success) -> Iterable[OutcomeChange]:

@@ -65,10 +65,10 @@ def measured_scene(
             why = "not measured" if place is None else place.status.replace("_", " ")
             notes.append(f"{name} as planned ({why if why != 'measured' else 'no pose'})")
             continue
-        X_SO[name], said = upright(scene.X_SO(name), place.X_SO.matrix())
-        notes += [f"{name} {said}"] if said else []
+        X_SO[name], note = upright(scene.X_SO(name), place.X_SO.matrix())
+        notes += [f"{name} {note}"] if note else []
     try:
-        return _apart(scene, X_SO, issues, notes)
+        return _pushed_apart(scene, X_SO, issues, notes)
     except BurgError as error:
         return MeasuredScene(None, tuple(notes), " ".join(str(error).split()))
 
@@ -111,7 +111,9 @@ def _about_z(R: Array) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _apart(scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str]) -> MeasuredScene:
+def _pushed_apart(
+    scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str]
+) -> MeasuredScene:
     """The scene with overlapping objects moved apart, if they are within each other by little."""
     start = displaced_scene(scene, X_SO)
     now, shift = start, {name: np.zeros(3) for name in scene.instances}
@@ -122,9 +124,9 @@ def _apart(scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str
         for issue in errors:
             if issue.kind != "overlap" or issue.other not in scene.instances:
                 return MeasuredScene(None, tuple(notes), issue.message)
-            way = _away(now, issue)
-            shift[issue.instance] += way
-            shift[issue.other] -= way
+            half = _half_overlap(now, issue)
+            shift[issue.instance] += half
+            shift[issue.other] -= half
         far = [name for name, p in shift.items() if np.linalg.norm(p) > APART]
         if far:
             return MeasuredScene(None, tuple(notes), errors[0].message)
@@ -148,7 +150,7 @@ def _is_error(issue: SceneIssue) -> bool:
     return issue.is_error or issue.amount > HEIGHT_ERROR
 
 
-def _away(scene: Scene, issue: SceneIssue) -> Array:
+def _half_overlap(scene: Scene, issue: SceneIssue) -> Array:
     """(3,) half of the way that brings an object out of another one, along the board [m]."""
     one, other = (_middle(scene, name) for name in (issue.instance, issue.other))
     direction = (one - other) * (1.0, 1.0, 0.0)

@@ -13,7 +13,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 
 from burg_drake.core.grasps import LIFT_HEIGHT, Outcome, Stage, Verdict
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import origin_of
 from burg_drake.evaluation.stages import Decision, Judge, StationJudge
@@ -82,7 +82,7 @@ def reach_verdicts(
         return
     with Reporter(progress) as reporter:
         begin = Progress(STARTING, len(known), len(hand.candidates))
-        pace = Pace(reporter.show, begin, "asking the arm")
+        pace = ProgressMeter(reporter.show, begin, "asking the arm")
         job = Job("reach", ReachOfHandFactory(build.plain, trials), todo)
         with closing(executor.judge([job])) as judged:
             for _, candidate, verdict in judged:

@@ -74,14 +74,14 @@ def _row(trial: Rejudged, found: Rejudging) -> Columns | None:
     )
     joints = len(trial.verdict.q_grasp)
     columns = trial_columns([one], origin, instances=list(trial.scene.instances), joints=joints)
-    told = {
+    values = {
         "trial": trial.number,
         "real": trial.real.value,
         "planned": trial.planned.value,
         "cause": trial.cause(found.success) or "",
         "notes": "; ".join(trial.notes),
     }
-    return {name: np.array([value]) for name, value in told.items()} | columns
+    return {name: np.array([value]) for name, value in values.items()} | columns
 
 
 def joined(tables: list[Columns]) -> Columns:

@@ -21,7 +21,7 @@ from burg_drake.core import (
 )
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import (
     JOURNAL_FILE,
@@ -215,7 +215,7 @@ def _judge(
         return
     todo = sum(len(job.candidates) for job in jobs.values())
     begin = Progress(STARTING, total - todo, total, unit="trials")
-    pace = Pace(reporter.show, begin, "judging again")
+    pace = ProgressMeter(reporter.show, begin, "judging again")
 
     def note(lost: JobFailed) -> None:
         failed.update({c.id: one_line(lost.error) for c in lost.job.candidates})

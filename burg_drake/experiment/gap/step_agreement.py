@@ -56,21 +56,21 @@ def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTria
 
 
 def agreement_by_step(
-    ladder: GapSteps, trials: Sequence[RealTrial], success: Success
+    steps: GapSteps, trials: Sequence[RealTrial], success: Success
 ) -> tuple[StepAgreement, ...]:
     """Compares each step with the trials that tell anything of its grasp.
 
     A grasp in displaced scenes is predicted to succeed if it does in more than half of them.
 
     Args:
-        ladder: all steps.
+        steps: all steps.
         trials: see `tried_grasps`. Each counts once, whatever it was chosen from.
         success: what counts.
     """
     real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
     found = []
-    for step in ladder.steps:
-        runs = [*step.runs, *ladder.tried] if step.name == "placed" else list(step.runs)
+    for step in steps.steps:
+        runs = [*step.runs, *steps.tried] if step.name == "placed" else list(step.runs)
         predicted, actual = [], []
         for trial in real:
             assert trial.outcome is not None

@@ -94,9 +94,9 @@ class LabCamera:
             self.close()
             source = self._open(scene)
             try:
-                session = FrameProcessor(scene, self._intrinsics, print_scale=self._print_scale)
+                processor = FrameProcessor(scene, self._intrinsics, print_scale=self._print_scale)
                 events = EventLog(lambda event: None)
-                live = LiveSession(session, source, events=events, idle_after=IDLE_AFTER)
+                live = LiveSession(processor, source, events=events, idle_after=IDLE_AFTER)
             except BaseException:
                 source.close()
                 raise
@@ -141,13 +141,13 @@ class LabCamera:
         self.watch(number)
         with self._lock:
             if self.is_checking:
-                raise InvalidInputError("a placement check is at work already")
+                raise InvalidInputError("a placement check is already running")
             view = self._view
             assert view is not None
-            stale = view.live.attend()
+            stale = view.live.request_pictures()
             picture = view.live.picture if not stale else None
             picture = picture or view.live.next_picture(stale, FRESH)
-            if picture is None or not picture.sight.estimate.valid:
+            if picture is None or not picture.located.estimate.valid:
                 raise InvalidInputError(
                     "a placement check needs a picture that shows where the board is"
                 )
@@ -155,7 +155,7 @@ class LabCamera:
             self._measuring = (number, keep and not refusal)
             self._check = threading.Thread(
                 target=self._measure,
-                args=(view, number, picture.sight, keep, refusal),
+                args=(view, number, picture.located, keep, refusal),
                 name="placement check",
                 daemon=True,
             )
@@ -173,11 +173,11 @@ class LabCamera:
             return {"scene": "", "line": "", "checking": False, "check": None, "drawn": 0}
         picture, reader = view.live.picture, view.live.reader
         lost = reader.fault if reader.state == "lost" else ""
-        line = pose_line(picture.sight.estimate, view.scene.board) if picture else "waiting"
+        line = pose_line(picture.located.estimate, view.scene.board) if picture else "waiting"
         return {
             "scene": view.scene.name,
             "fault": lost,
-            "valid": picture is not None and picture.sight.estimate.valid,
+            "valid": picture is not None and picture.located.estimate.valid,
             "line": line,
             "checking": self.is_checking,
             "measuring": self._measured_now(),
@@ -207,33 +207,33 @@ class LabCamera:
                 view.live.placement, self._drawn = check, number
 
     def _measure(
-        self, view: _View, number: int, sight: LocatedFrame, keep: bool, refusal: str
+        self, view: _View, number: int, located: LocatedFrame, keep: bool, refusal: str
     ) -> None:
         begun = time.monotonic()
-        told: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
+        report: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
         try:
-            check = view.live.session.check(sight)
+            check = view.live.processor.check(located)
             self._show_offsets(view, number, check)
-            told["objects"] = {n: place_row(p) for n, p in check.instances.items()}
-            told["problem"] = check.reason or refusal
-            if keep and not told["problem"]:
-                self._keep(number, sight, check)
-                told["kept"] = True
+            report["objects"] = {n: place_row(p) for n, p in check.instances.items()}
+            report["problem"] = check.reason or refusal
+            if keep and not report["problem"]:
+                self._keep(number, located, check)
+                report["kept"] = True
         except BurgError as error:
-            told["problem"] = str(error)
+            report["problem"] = str(error)
         except Exception as error:  # a thread that ends would leave an older answer on the page
-            told["problem"] = f"the check failed: {one_line(error)}"
+            report["problem"] = f"the check failed: {one_line(error)}"
             traceback.print_exc()
-        told["seconds"] = time.monotonic() - begun
-        told["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
-        self._checked = told
+        report["seconds"] = time.monotonic() - begun
+        report["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
+        self._checked = report
 
-    def _keep(self, number: int, sight: LocatedFrame, check: PlacementCheck) -> None:
+    def _keep(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:
         """Writes the photo, then the entry that names it."""
         path = self._lab.runs.path
         with tempfile.TemporaryDirectory() as folder:
             photo = Path(folder) / "photo.png"
-            write_image(photo, sight.frame.image)
+            write_image(photo, located.frame.image)
             name = keep_evidence(path, number, photo=photo, check=check)
         self._lab.photographed(number, name, object_places(check))
 

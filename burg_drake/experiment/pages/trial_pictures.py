@@ -63,7 +63,7 @@ class TrialPictures:
 
             self._painter = VtkPainter(stock(shown))
 
-    def look(
+    def paint_grasp(
         self, trial: RealTrial, size: tuple[int, int] = SIZE
     ) -> tuple[Painting, tuple[PlacedBody, ...], Viewpoint]:
         """The hand at a trial's grasp among the objects, what of it each pixel shows, and from
@@ -78,7 +78,7 @@ class TrialPictures:
 
     def grasp(self, trial: RealTrial, size: tuple[int, int] = SIZE) -> bytes:
         """JPEG of the hand at a trial's grasp among the objects; the target has a rim."""
-        painting, placed, _ = self.look(trial, size)
+        painting, placed, _ = self.paint_grasp(trial, size)
         return jpeg(with_target(painting, placed, trial.instance))
 
     def setup(self, trial: RealTrial, size: tuple[int, int] = SETUP_SIZE) -> tuple[bytes, bytes]:

@@ -125,7 +125,7 @@ def _fingers(subject: Subject) -> Array:
     return transform_points(subject.X_SG, points)
 
 
-def _free(rays: RayCaster, points: Array, way: Array) -> np.ndarray:
+def _free(rays: RayCaster, points: Array, direction: Array) -> np.ndarray:
     """(N,) whether nothing is in the way from points in a direction; little starts off them."""
-    face, _ = rays.first_hits(points + 1e-3 * way, np.tile(way, (len(points), 1)))
+    face, _ = rays.first_hits(points + 1e-3 * direction, np.tile(direction, (len(points), 1)))
     return np.asarray(face < 0)

@@ -98,11 +98,11 @@ class VtkPainter:
         self._frames[key, number] = self._graph.RegisterFrame(self._source, frame)
         self._labels[key, number] = label = len(self._frames)
         geometry = GeometryInstance(RigidTransform(), body.shape, "visual")
-        look = PerceptionProperties()
-        look.AddProperty("label", "id", RenderLabel(label))
+        perception = PerceptionProperties()
+        perception.AddProperty("label", "id", RenderLabel(label))
         if body.color is not None:
-            look.AddProperty("phong", "diffuse", Rgba(*body.color, 1.0))
-        geometry.set_perception_properties(look)
+            perception.AddProperty("phong", "diffuse", Rgba(*body.color, 1.0))
+        geometry.set_perception_properties(perception)
         try:
             self._graph.RegisterGeometry(self._source, frame.id(), geometry)
         except RuntimeError as error:

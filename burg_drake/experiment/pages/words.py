@@ -53,11 +53,11 @@ def outcome_label(outcome: RealOutcome) -> str:
 
 def approach_text(X_SG: Array) -> str:
     """From where the hand of a grasp (4, 4) in S comes, in words."""
-    way = X_SG[:3, 2]
-    tilt = math.acos(max(-1.0, min(1.0, float(-way[2]))))
+    approach_S = X_SG[:3, 2]
+    tilt = math.acos(max(-1.0, min(1.0, float(-approach_S[2]))))
     if tilt < STRAIGHT:
         return "from straight above"
-    side = SIDES[round(math.atan2(-way[1], -way[0]) / (math.pi / 4)) % 8]
+    side = SIDES[round(math.atan2(-approach_S[1], -approach_S[0]) / (math.pi / 4)) % 8]
     degrees = round(math.degrees(tilt))
     if tilt > math.pi / 2 + STRAIGHT:
         return f"from below, from the {side}, {degrees}° from straight down"

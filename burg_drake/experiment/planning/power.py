@@ -147,7 +147,7 @@ def difference_text(trials: int) -> str:
             f"{trials} trials are too few for McNemar's exact test (5 %) to tell two methods apart"
             " with a chance of 80 %, however much they differ."
         )
-    told = [
+    differences = [
         f"{100 * size:.0f} points"
         + (f", if it is so in {100 * worse:.0f} % of the trials" if worse else "")
         for worse, size in found.items()
@@ -156,7 +156,7 @@ def difference_text(trials: int) -> str:
     return (
         f"Two methods on the same {trials} trials: which of them is right more often, McNemar's"
         " exact test (5 %) finds with a chance of 80 % if the worse one is never right alone and"
-        f" they differ by {'; by '.join(told)}."
+        f" they differ by {'; by '.join(differences)}."
     )
 
 

@@ -20,15 +20,15 @@ class Shortfall:
         run, object: key of the run, and name in the library.
         kind: what is lacking; objects with the same share a line.
         counts: how much there is of it, such as `3 of 5`.
-        told: kind and counts together, where all objects of a line have the same; the kind if
-            empty.
+        description: kind and counts together, where all objects of a line have the same; the
+            kind if empty.
     """
 
     run: str
     object: str
     kind: str
     counts: str = ""
-    told: str = ""
+    description: str = ""
 
 
 def shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
@@ -44,16 +44,20 @@ def shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
     total = sum(stratum.selected for stratum in strata)
     labels = " and ".join(s.label for s in missing)
     counts = ", ".join(f"{s.selected} of {s.wanted}" for s in missing)
-    told = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
+    description = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
     first = strata[0]
     if total == wanted:
         rest = "; others make up for it"
         return [
-            Shortfall(first.run, first.object, f"too few with {labels}{rest}", counts, told + rest)
+            Shortfall(
+                first.run, first.object, f"too few with {labels}{rest}", counts, description + rest
+            )
         ]
     kind = f"too few with {labels}, and in all"
     in_all = f"{total} of {wanted} in all"
-    return [Shortfall(first.run, first.object, kind, f"{counts}; {in_all}", f"{told}; {in_all}")]
+    return [
+        Shortfall(first.run, first.object, kind, f"{counts}; {in_all}", f"{description}; {in_all}")
+    ]
 
 
 def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
@@ -67,11 +71,11 @@ def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
 
 
 def _line(kind: str, members: Sequence[Shortfall]) -> str:
-    alike = len({one.told for one in members}) == 1
+    alike = len({one.description for one in members}) == 1
     by_run: defaultdict[str, list[str]] = defaultdict(list)
     for one in members[:MOST]:
         by_run[one.run].append(one.object if alike else f"{one.object} ({one.counts})")
     where = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
     more = len(members) - MOST
     where += f" and {more} others" if more > 0 else ""
-    return f"{where}: {members[0].told or kind}" if alike else f"{where}: {kind}"
+    return f"{where}: {members[0].description or kind}" if alike else f"{where}: {kind}"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, nearest, quoted
 from burg_drake.core.grasps import MARGINS, Outcome
-from burg_drake.core.terminal import figure
+from burg_drake.core.terminal import format_number
 from burg_drake.evaluation.robustness import TABLE_FILES, lifted_shares, own_table
 from burg_drake.evaluation.store import Run
 from burg_drake.experiment.planning.eligible import EligibleGrasps
@@ -117,7 +117,7 @@ def _bins(values: NDArray[np.float64], name: str, bins: int) -> NDArray[np.str_]
         place = np.searchsorted(edges[1:-1], values, side="right")
         for k in np.unique(place[known]):
             own = known & (place == k)
-            low, high = (figure(float(v), 4) for v in (values[own].min(), values[own].max()))
+            low, high = (format_number(float(v), 4) for v in (values[own].min(), values[own].max()))
             text = low if low == high else f"{low} to {high}"
             labels[own] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
     return labels

@@ -25,7 +25,7 @@ from burg_drake.experiment.trials.entries import (
     append_entry,
     entered,
     journal_path,
-    lacking,
+    missing_values,
     read_entries,
     sync_folder,
     with_values,
@@ -80,9 +80,9 @@ class TrialBook:
         """All that was ever recorded, in order."""
         return read_entries(journal_path(self.path))
 
-    def lacking(self) -> list[MissingValues]:
-        """What the file lacks of that; see `entries.lacking`."""
-        return lacking(self.sheet(), self.entries())
+    def missing_values(self) -> list[MissingValues]:
+        """What the file lacks of that; see `entries.missing_values`."""
+        return missing_values(self.sheet(), self.entries())
 
     def record(
         self,
@@ -144,7 +144,7 @@ class TrialBook:
         """
         return [
             self._change(lost.number, lambda trial: self._restored(trial), "restored")
-            for lost in self.lacking()
+            for lost in self.missing_values()
             if lost.values and (numbers is None or lost.number in numbers)
         ]
 
@@ -159,13 +159,13 @@ class TrialBook:
         """
         return [
             self._change(found.number, lambda trial: trial, "kept")
-            for found in self.lacking()
+            for found in self.missing_values()
             if numbers is None or found.number in numbers
         ]
 
     def _restored(self, trial: RealTrial) -> RealTrial:
         """With the last entry's value of each field that has an older one; under the lock."""
-        lost = [found.values for found in self.lacking() if found.number == trial.number]
+        lost = [found.values for found in self.missing_values() if found.number == trial.number]
         return with_values(trial, lost[0]) if lost else trial
 
     def require_open(
@@ -192,9 +192,9 @@ class TrialBook:
         for name, value in given.items():
             present = getattr(trial, name)
             if present != EMPTY[name] and not includes(value, present):
-                told = f" {quoted(str(present))}" if isinstance(present, str) else ""
+                shown = f" {quoted(str(present))}" if isinstance(present, str) else ""
                 raise InvalidInputError(
-                    f"{self.path}: trial {trial.number} has {name}{told} already; say that this"
+                    f"{self.path}: trial {trial.number} has {name}{shown} already; say that this"
                     " corrects it, or that the trial was carried out once more"
                 ).about("correct", "again")
 

@@ -147,7 +147,7 @@ def sync_folder(folder: Path) -> None:
         os.close(file)
 
 
-def lacking(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
+def missing_values(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
     """What the sheet lacks of what was recorded, trial by trial.
 
     A field counts as lost if the sheet has a value of it that the journal knows from before the
@@ -162,10 +162,10 @@ def lacking(sheet: TrialSheet, entries: Iterable[Entry]) -> list[MissingValues]:
         now, last = entered(trial), own[-1].after
         differing = [name for name in FIELDS if now.get(name) != last.get(name)]
         known = [values for entry in own for values in (entry.before, entry.after)]
-        lost = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
+        missing = [n for n in differing if any(now.get(n) == values.get(n) for values in known)]
         if differing:
-            edited = tuple(name for name in differing if name not in lost)
+            edited = tuple(name for name in differing if name not in missing)
             found.append(
-                MissingValues(trial.number, {name: last.get(name) for name in lost}, edited)
+                MissingValues(trial.number, {name: last.get(name) for name in missing}, edited)
             )
     return found

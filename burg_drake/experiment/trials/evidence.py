@@ -143,10 +143,10 @@ def _free_stem(folder: Path, number: int) -> str:
 
 
 def _place(placement: Placement) -> ObjectPlace:
-    way, sd = placement.displacement, placement.displacement_sd
+    offset, sd = placement.displacement, placement.displacement_sd
     return ObjectPlace(
         status=placement.status,
-        offset_mm=None if way is None else _millimetres(way),
+        offset_mm=None if offset is None else _millimetres(offset),
         offset_sd_mm=None if sd is None else _millimetres(sd),
         turn_deg=None if placement.angle is None else _degrees(placement.angle),
         turn_sd_deg=None if placement.angle_sd is None else _degrees(placement.angle_sd),
@@ -154,8 +154,8 @@ def _place(placement: Placement) -> ObjectPlace:
     )
 
 
-def _millimetres(way: tuple[float, float]) -> tuple[float, float]:
-    x, y = (round(MILLI * value, 3) + 0.0 for value in way)
+def _millimetres(offset: tuple[float, float]) -> tuple[float, float]:
+    x, y = (round(MILLI * value, 3) + 0.0 for value in offset)
     return x, y
 
 

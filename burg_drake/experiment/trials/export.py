@@ -21,7 +21,7 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write, remove_unfinished, writable_folder
 from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.paths import require_name
-from burg_drake.core.terminal import STARTING, Listener, Pace, Progress, Reporter
+from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation import ReachJudgeFactory
 from burg_drake.evaluation.candidates import Candidates
@@ -154,8 +154,8 @@ def _factory(
     station = run.station() if station is None else as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(
-            f"station {station.name!r} of {run.path} has no arm, of which one could have motions;"
-            " give another one"
+            f"station {station.name!r} of {run.path} has no arm to plan motions for; give"
+            " another one"
         ).about("station")
     require_usable_arm(scene, station)
     stems: dict[str, str] = {}
@@ -191,7 +191,7 @@ def _judge(
         left = [candidate for candidate in candidates if candidate.id not in known]
         known_already = len(candidates) - len(left)
         begin = Progress(STARTING, known_already, len(candidates), unit="trials")
-        pace = Pace(reporter.show, begin, "planning")
+        pace = ProgressMeter(reporter.show, begin, "planning")
         with closing(judge_all(left, factory, workers=workers)) as judged:
             for candidate, verdict in judged:
                 journal.append(candidate.id, verdict)

@@ -155,7 +155,7 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     Raises:
         DocumentError: it is no such file or of another version, or a value cannot be used; the
             message names file, line and key.
-        InvalidInputError: a pose is no rigid transform; the message names file and line.
+        InvalidInputError: a pose is not a rigid transform; the message names file and line.
     """
     path = Path(path)
     node = load_nodes(path)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from burg_drake.core import Array, InvalidInputError, make_pose
-from burg_drake.core.files import reason
+from burg_drake.core.files import short_message
 
 ROUNDING = 1e-3
 """Largest deviation of `R' R` from the identity that is taken for rounding. Single precision leaves
@@ -33,7 +33,7 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     try:
         poses = np.asarray(X, dtype=float)
     except (TypeError, ValueError) as error:
-        what = f"does not hold (N, 4, 4) numbers: {reason(error)}"
+        what = f"does not hold (N, 4, 4) numbers: {short_message(error)}"
         raise InvalidInputError(f"{where} {what}") from error
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise InvalidInputError(f"{where} has shape {poses.shape}; expected (N, 4, 4)")
@@ -46,7 +46,7 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
         mirrored = np.linalg.det(R) < 0.0
     off = np.where(np.isnan(off), np.inf, off)
     _refuse(mirrored, where, "is a mirror image, not a rotation")
-    _refuse(off > ROUNDING, where, "is no rotation: not orthonormal by", off)
+    _refuse(off > ROUNDING, where, "is not a rotation: not orthonormal by", off)
     U, _, Vt = np.linalg.svd(R)
     notes: tuple[str, ...] = ()
     if (off > NOTED).any():

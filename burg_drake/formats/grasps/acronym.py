@@ -32,14 +32,14 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, InvalidInputError, inverse
 from burg_drake.core.files import (
-    DAMAGED,
     NUMBERS,
+    READ_ERRORS,
     Hdf5File,
     Shape,
     atomic_write,
     is_hdf5,
     open_hdf5,
-    reading,
+    reporting_read_errors,
 )
 from burg_drake.core.grasps import FIXED_COLUMNS, GraspSet
 from burg_drake.formats.common import (
@@ -88,7 +88,7 @@ def recognises(path: Path) -> bool:
             return False
         with open_hdf5(path) as file:
             return TRANSFORMS in file
-    except (OSError, *DAMAGED):
+    except (OSError, *READ_ERRORS):
         return False
 
 
@@ -98,7 +98,7 @@ def read(path: Path, gripper: Gripper) -> ImportedGrasps:
     Raises:
         InvalidInputError: no such file, or a value that cannot be used; the message says where.
     """
-    with reading(path, "an HDF5 file that can be read"), open_hdf5(path) as file:
+    with reporting_read_errors(path, "an HDF5 file that can be read"), open_hdf5(path) as file:
         return _read(path, file, gripper)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from burg_drake.core import Array, make_pose
-from burg_drake.core.files import DAMAGED, is_hdf5, open_hdf5, open_npz
+from burg_drake.core.files import READ_ERRORS, is_hdf5, open_hdf5, open_npz
 from burg_drake.core.grasps import FORMAT as MARK, GraspSet
 from burg_drake.formats.common import GraspFormat, Gripper, ImportedGrasps
 
@@ -21,7 +21,7 @@ def _recognises(path: Path) -> bool:
                 return bool(tree.attribute("format") == MARK)
         with open_npz(path) as file:
             return {"header", "X_OG"} <= set(file.names)
-    except (OSError, *DAMAGED):
+    except (OSError, *READ_ERRORS):
         return False
 
 

@@ -29,7 +29,7 @@ def recognises(path: Path) -> bool:
     return describes_gripper(path) is False
 
 
-DIALECT = Dialect("graspgen_yaml", "GraspGen predictions", X_GF, says_of_hand=False)
+DIALECT = Dialect("graspgen_yaml", "GraspGen predictions", X_GF, names_gripper_frame=False)
 
 FORMAT = GraspFormat(
     name=DIALECT.name,

@@ -22,10 +22,11 @@ class Dialect:
         name: of the format.
         title: of the format, for people.
         X_GF: (4, 4) pose in G of what the file's poses are those of, for a gripper.
-        says_of_hand: whether it says which frames its poses relate, and where the joints are.
+        names_gripper_frame: whether it says which frames its poses relate, and where the joints
+            are.
     """
 
     name: str
     title: str
     X_GF: Callable[[Gripper], Array]
-    says_of_hand: bool
+    names_gripper_frame: bool

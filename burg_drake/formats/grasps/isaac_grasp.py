@@ -63,7 +63,7 @@ def describes_gripper(path: Path) -> bool | None:
     return _GRIPPER.search(text) is not None if _FORMAT_LINE.search(text) else None
 
 
-DIALECT = Dialect("isaac_grasp", "Isaac Sim grasp editor", X_GF, says_of_hand=True)
+DIALECT = Dialect("isaac_grasp", "Isaac Sim grasp editor", X_GF, names_gripper_frame=True)
 
 FORMAT = GraspFormat(
     name=DIALECT.name,

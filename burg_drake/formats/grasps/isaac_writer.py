@@ -35,7 +35,7 @@ def write_yaml(dialect: Dialect, grasps: GraspSet, path: Path, gripper: Gripper)
     closed = gripper.positions(grasps.width)
     opening = grasps.columns.get(PREGRASP_WIDTH, np.full(len(grasps), gripper.opening[1]))
     opened = gripper.positions(opening)
-    joints = dialect.says_of_hand
+    joints = dialect.names_gripper_frame
     frames = [
         f"object_frame_link: {json.dumps(f'/World/{object}')}",
         f"gripper_frame_link: {json.dumps(f'/World/{gripper.body}')}",
@@ -66,8 +66,8 @@ def _beyond(width: Array, opening: Array, gripper: Gripper) -> tuple[str, ...]:
     low, high = gripper.opening
     off = [(w < low - SLACK) | (w > high + SLACK) for w in (width, opening)]
     count = int((off[0] | off[1]).sum())
-    told = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
-    return (f"widths of {count} grasps are beyond {told}",) if count else ()
+    limits = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
+    return (f"widths of {count} grasps are beyond {limits}",) if count else ()
 
 
 def _notes(grasps: GraspSet, dialect: Dialect) -> tuple[str, ...]:
@@ -80,7 +80,7 @@ def _notes(grasps: GraspSet, dialect: Dialect) -> tuple[str, ...]:
             f"confidence is meant to be from 0 to 1; the scores reach from {known.min():.3g} to"
             f" {known.max():.3g}."
         )
-    of_hand = ("object", "width", PREGRASP_WIDTH) if dialect.says_of_hand else ()
+    of_hand = ("object", "width", PREGRASP_WIDTH) if dialect.names_gripper_frame else ()
     return (*notes, *conversion_losses(grasps, ("score", NAME, *of_hand), dialect.title))
 
 

@@ -92,13 +92,13 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
 
 def _colliding(grasps: GraspSet) -> NDArray[np.bool_] | None:
     """(N,) whether some column tells that the hand collides; None if none tells anything."""
-    told = colliding = np.full(len(grasps), False)
+    known = colliding = np.full(len(grasps), False)
     for name, values in grasps.columns.items():
         if name == CLEARANCE and values.dtype.kind == "f":
-            told, colliding = told | ~np.isnan(values), colliding | (values < 0.0)
+            known, colliding = known | ~np.isnan(values), colliding | (values < 0.0)
         elif name in SCREENED and values.dtype.kind == "U":
-            told, colliding = told | (values != ""), colliding | np.isin(values, COLLISIONS)
-    return colliding if told.any() else None
+            known, colliding = known | (values != ""), colliding | np.isin(values, COLLISIONS)
+    return colliding if known.any() else None
 
 
 def _judge(

@@ -130,10 +130,10 @@ def screen_edges(
     edge, start, end = edge[inner], share[inner], share[inner + 1]
     c_start, c_end = clearance[inner], clearance[inner + 1]
     while True:
-        stretch = (end - start) * length[edge]
-        keep = (c_start + c_end <= stretch) & ~over[path[edge]]
-        edge, start, end, stretch = edge[keep], start[keep], end[keep], stretch[keep]
-        if not len(edge) or stretch.max() <= fine:
+        displacement = (end - start) * length[edge]
+        keep = (c_start + c_end <= displacement) & ~over[path[edge]]
+        edge, start, end, displacement = edge[keep], start[keep], end[keep], displacement[keep]
+        if not len(edge) or displacement.max() <= fine:
             return EdgeBounds(length, blocked_at, doubted_at, edge, start, end)
         c_start, c_end = c_start[keep], c_end[keep]
         places = start[:, None] + np.arange(PIECES + 1) / PIECES * (end - start)[:, None]

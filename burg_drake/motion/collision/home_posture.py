@@ -70,7 +70,7 @@ def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) 
     station, scene = station_diagram.station, station_diagram.scene
     inside = base_overlaps(station_diagram)
     if inside:
-        raise InvalidInputError(f"{station.path}: {_way_out(inside, station)}")
+        raise InvalidInputError(f"{station.path}: {_repair_hint(inside, station)}")
     at_home = collision.overlaps(np.array(_arm(station_diagram).home))
     if at_home:
         pairs = ", ".join(dict.fromkeys(f"{o.link} with {o.other}" for o in at_home))
@@ -109,7 +109,7 @@ def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
     return tuple(sorted(found, key=lambda overlap: (-overlap.depth, str(overlap))))
 
 
-def _way_out(inside: Sequence[BaseOverlap], station: Station) -> str:
+def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
     """What the base is in most deeply, with which shapes, and what to do."""
     name = inside[0].name
     shapes = [overlap for overlap in inside if overlap.name == name]

@@ -98,7 +98,7 @@ class ArmLimits:
             jerk=self.jerk * speed**3,
         )
 
-    def gentle(self, velocity_share: float, ramp: float) -> ArmLimits:
+    def scaled_down(self, velocity_share: float, ramp: float) -> ArmLimits:
         """With a share of the velocity, and with jerk that takes `ramp` [s] or more to build up the
         largest acceleration."""
         return replace(
@@ -107,7 +107,7 @@ class ArmLimits:
             jerk=np.minimum(self.jerk, self.acceleration / ramp),
         )
 
-    def stretch(self, peaks: tuple[Array, Array, Array]) -> float:
+    def time_scale(self, peaks: tuple[Array, Array, Array]) -> float:
         """By what factor in time a motion with these peaks, (n,) each, has to be stretched to keep
         within the limits; below 1 for one that could be faster."""
         velocity, acceleration, jerk = peaks

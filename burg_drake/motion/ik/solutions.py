@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from burg_drake.core import Array, Arrays, content_hash, kept, rng_from
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.ik.numeric import ArmKinematics, solve_ik
 from burg_drake.motion.ik.panda import PandaIk
 
@@ -116,7 +116,7 @@ class NumericSolutions:
             return {"q": q, "features": _features(arm.forward(q)[0])}
 
         follows = (arm.turns, arm.axis, arm.p_AJ, arm.X_AH0, lower, upper)
-        table = kept("hand-poses", content_hash(*follows), make)
+        table = cached("hand-poses", content_hash(*follows), make)
         self._q, self._tree = table["q"], cKDTree(table["features"])
         self._arm = arm if limited else arm.unlimited()
         self._margin = limit_margin

@@ -23,14 +23,14 @@ class ChainCandidates:
     """C postures at a grasp, each with its continuation at L poses of the way.
 
     Attributes:
-        way: (C,) which of the two ways to put the fingers.
+        flip: (C,) which of the two ways to put the fingers.
         q: (C, L, n) arm positions; NaN where the continuation has not got to.
         stage: (C,) where it ended.
         cost: (C,) of those that have not ended.
         open: (C,) whether it may still be proposed.
     """
 
-    way: Indices
+    flip: Indices
     q: Array
     stage: Indices
     cost: Array
@@ -45,13 +45,13 @@ class ChainCandidates:
         return cls(index, np.empty((0, poses, joints)), index, np.empty(0), np.empty(0, dtype=bool))
 
     def __len__(self) -> int:
-        return len(self.way)
+        return len(self.flip)
 
-    def add(self, way: Indices, q: Array, pose: int) -> Indices:
+    def add(self, flip: Indices, q: Array, pose: int) -> Indices:
         """Adds postures at one of the poses, without those that are there already.
 
         Args:
-            way: (S,) which way to put the fingers.
+            flip: (S,) which way to put the fingers.
             q: (S, n) arm positions.
             pose: index of the pose.
 
@@ -61,14 +61,14 @@ class ChainCandidates:
         first = len(self)
         if not len(q):
             return np.empty(0, np.intp)
-        every_way, every = np.append(self.way, way), np.concatenate([self.q[:, pose], q])
+        every_flip, every = np.append(self.flip, flip), np.concatenate([self.q[:, pose], q])
         same = np.abs(every[first:, None] - every).max(axis=-1) <= SAME
-        same &= every_way[first:, None] == every_way
+        same &= every_flip[first:, None] == every_flip
         kept = np.flatnonzero(same.argmax(axis=1) == np.arange(first, len(every)))
         count = len(kept)
         new = np.full((count, *self.q.shape[1:]), np.nan)
         new[:, pose] = q[kept]
-        self.way = np.append(self.way, way[kept])
+        self.flip = np.append(self.flip, flip[kept])
         self.q = np.concatenate([self.q, new])
         self.stage = np.append(self.stage, np.full(count, GRASP))
         self.cost = np.append(self.cost, np.full(count, np.inf))
@@ -78,7 +78,7 @@ class ChainCandidates:
     def complete(self, k: int, q: Array, cost: float) -> None:
         """Takes the continuation (L, n) of a candidate over, which may be proposed from now on."""
         self.q[k], self.cost[k], self.stage[k] = q, cost, WHOLE
-        self.open[k] = self.way[k] not in self._closed
+        self.open[k] = self.flip[k] not in self._closed
 
     def stop(self, k: int, stage: int) -> None:
         """A candidate ends at a stage, as its continuation does not exist."""
@@ -97,17 +97,17 @@ class ChainCandidates:
         self.stop(k, stage)
         self._blocked.append((stage, upper, q.copy(), moved_W))
 
-    def close(self, way: int) -> None:
+    def close(self, flip: int) -> None:
         """Proposes nothing any more with the fingers in one way."""
-        self._closed.add(way)
-        self.open[self.way == way] = False
+        self._closed.add(flip)
+        self.open[self.flip == flip] = False
 
     def best(self) -> int | None:
         """Index of the cheapest candidate that may be proposed; None if there is none."""
         which = np.flatnonzero(self.open)
         return int(which[self.cost[which].argmin()]) if len(which) else None
 
-    def in_the_way(self, stage: int, count: int) -> tuple[Array, Array]:
+    def blocking(self, stage: int, count: int) -> tuple[Array, Array]:
         """Arm positions (K, n) in collision at a stage, the nearest to being free first, and how
         far the target has been moved there (K, 3) [m]; K is at most `count`."""
         of = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]

@@ -117,17 +117,17 @@ class _ClosedFormBatch:
             place = found.place
             k = place.parameter[0]
             around = slice(max(0, k - AROUND), k + AROUND + 1)
-            found.grid.refused[0, found.index, place.way, place.branch[0], around] = True
+            found.grid.refused[0, found.index, place.flip, place.branch[0], around] = True
         else:
-            self._put_out(grasp, found, float(found.layer[row]))
+            self._exclude(grasp, found, float(found.layer[row]))
             self._farthest[grasp] = max(self._farthest[grasp], found.layer[row])
         self._failed[grasp] += 1
 
-    def close(self, grasp: int, way: int) -> None:
+    def close(self, grasp: int, flip: int) -> None:
         """See `Lines`."""
-        self._closed[grasp, way] = True
+        self._closed[grasp, flip] = True
         for grid, i in self._grids[grasp]:
-            grid.refused[:, i, way] = True
+            grid.refused[:, i, flip] = True
 
     def failure(self, grasp: int) -> Failure:
         """See `Lines`."""
@@ -178,8 +178,8 @@ class _ClosedFormBatch:
             for i, g in enumerate(members.tolist()):
                 for coarse, index in self._grids[g][-1:]:
                     grid.take_over(i, coarse, index, ends)
-            way = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None]).max(axis=0)
-            grid.start[:] = START * np.nan_to_num(way)
+            flip = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None]).max(axis=0)
+            grid.start[:] = START * np.nan_to_num(flip)
             alive = alive[grid.joined[0, alive].any(axis=(1, 2, 3))]
             for layer in ends:
                 self._search.measure(grid, np.array([layer]), alive, grid.joined)
@@ -210,15 +210,15 @@ class _ClosedFormBatch:
         count = len(search.layers)
         at = np.linspace(0.0, count - 1.0, (count - 1) * ROWS_A_LAYER + 1)
         grasp = np.array([g for g, *_ in rows])
-        way = np.array([place.way for *_, place in rows])
-        X_AG = self._X_AG[grasp, way]
+        flip = np.array([place.flip for *_, place in rows])
+        X_AG = self._X_AG[grasp, flip]
         corners = np.array(
             [
-                grid.q[:, np.arange(count), i, p.way, p.branch, p.parameter].T
+                grid.q[:, np.arange(count), i, p.flip, p.branch, p.parameter].T
                 for _, grid, i, p in rows
             ]
         )
-        tolerance = np.clip(0.5 * self._tolerance[grasp, way], *search.settings.deviation)
+        tolerance = np.clip(0.5 * self._tolerance[grasp, flip], *search.settings.deviation)
         straight = search.straight(X_AG, corners, at, tolerance)
         bounds = search.proximity.bounds(straight.q, hand=False)
         upper = counted_clearance(bounds, search.settings.exact)
@@ -236,22 +236,22 @@ class _ClosedFormBatch:
         broken = rows.broken[own] | ~(upper[own] > 0.0)
         if broken.any():
             for row in np.flatnonzero(broken):
-                self._put_out(grasp, found, float(layer[row]))
+                self._exclude(grasp, found, float(layer[row]))
             self._farthest[grasp] = max(self._farthest[grasp], layer[broken][0])
             self._failed[grasp] += 1
             return None
         length = np.interp(layer, np.arange(len(self._search.layers)), self._search.layers)
         return Chain(
-            way=found.place.way,
+            flip=found.place.flip,
             q=rows.q[own],
             at_grasp=int(np.searchsorted(layer, self._search.at_grasp)),
             at_retreated=int(np.searchsorted(layer, self._search.lines.at_retreated)),
-            moved_W=self._search.lines.carried(self._X_AG[grasp, found.place.way], length),
+            moved_W=self._search.lines.carried(self._X_AG[grasp, found.place.flip], length),
             lower=lower[own],
             place=found,
         )
 
-    def _put_out(self, grasp: int, found: _Found, layer: float) -> None:
+    def _exclude(self, grasp: int, found: _Found, layer: float) -> None:
         """Puts the posture at a layer out of the search, or the step between two.
 
         Where chains keep failing the neighbours go with it, so that the next chain leads elsewhere.
@@ -262,6 +262,6 @@ class _ClosedFormBatch:
         if layer == nearest or widely:
             k = place.parameter[nearest]
             around = slice(max(0, k - widely), k + widely + 1)
-            grid.refused[nearest, found.index, place.way, place.branch[nearest], around] = True
+            grid.refused[nearest, found.index, place.flip, place.branch[nearest], around] = True
         else:
             grid.cut(found.index, int(layer), place)

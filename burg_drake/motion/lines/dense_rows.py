@@ -62,7 +62,7 @@ def straighten(every: Filler, at: Array, tolerance: Array) -> DenseRows:
     Args:
         every: the chains.
         at: (R,) where rows are wanted at least, as layers and fractions between them.
-        tolerance: (m,) how far the hand may be beside the straight way half-way between two
+        tolerance: (m,) how far the hand may be beside the straight segment half-way between two
             rows [m].
 
     Returns:

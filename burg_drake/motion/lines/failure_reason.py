@@ -37,13 +37,13 @@ def failure(
         return _beyond_limits(search, X_AG)
     for layer in ends:
         if not _is_free(search, places, layer):
-            return _in_the_way(search, X_AG, places, Outcome.ARM_COLLISION, layer)
+            return _blocking(search, X_AG, places, Outcome.ARM_COLLISION, layer)
     last = grid.reached(i) + 1
     if not 0 < last < grid.poses:
         # Where there still are chains, they have been given up: the best of them got this far.
         last = int(np.ceil(farthest))
     outcome = search.lines.outcome(last)
-    return _in_the_way(search, X_AG, places, outcome, last)
+    return _blocking(search, X_AG, places, outcome, last)
 
 
 def _is_free(search: PostureGridBuilder, places: Sequence[GridPlace], layer: int) -> bool:
@@ -56,7 +56,7 @@ def _is_free(search: PostureGridBuilder, places: Sequence[GridPlace], layer: int
     return grid.measured_free(layer, i)
 
 
-def _in_the_way(
+def _blocking(
     search: PostureGridBuilder,
     X_AG: Array,
     places: Sequence[GridPlace],

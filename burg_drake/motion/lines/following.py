@@ -1,4 +1,4 @@
-"""Follows arm postures at grasps along the straight ways, from pose to pose."""
+"""Follows arm postures at grasps along the straight segments, from pose to pose."""
 
 from __future__ import annotations
 

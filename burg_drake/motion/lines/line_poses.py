@@ -24,7 +24,7 @@ class LinePoses:
         X_GH: (4, 4) hand body in the grasp frame.
         R_WA: (3, 3) the arm's base in the world.
         direction_W: (3,) unit vector of the lift.
-        standoff, retreat, lift: lengths of the three straight ways [m].
+        standoff, retreat, lift: lengths of the three straight segments [m].
     """
 
     X_GH: Array
@@ -69,19 +69,19 @@ class LinePoses:
             return Outcome.APPROACH_LINE
         return Outcome.RETREAT_LINE if layer <= self.at_retreated else Outcome.LIFT_LINE
 
-    def X_AH(self, X_AG: Array, way: Array) -> Array:
+    def X_AH(self, X_AG: Array, distance: Array) -> Array:
         """Poses of the hand body.
 
         Args:
             X_AG: (..., 4, 4) grasps in the arm's base frame.
-            way: (...,) lengths [m].
+            distance: (...,) lengths [m].
 
         Returns:
             (..., 4, 4), with the leading shapes broadcast against each other.
         """
-        shape = np.broadcast_shapes(X_AG.shape[:-2], way.shape)
+        shape = np.broadcast_shapes(X_AG.shape[:-2], distance.shape)
         X = np.broadcast_to(X_AG, (*shape, 4, 4)).copy()
-        length = np.broadcast_to(way, shape)[..., None]
+        length = np.broadcast_to(distance, shape)[..., None]
         along = np.minimum(length, 0.0) - np.clip(length, 0.0, self.retreat)
         X[..., :3, 3] += along * X[..., :3, 2]
         X[..., :3, 3] += np.maximum(length - self.retreat, 0.0) * (self.direction_W @ self.R_WA)
@@ -89,17 +89,17 @@ class LinePoses:
         X[..., :3, :3], X[..., :3, 3] = placed.R, placed.p
         return X
 
-    def carried(self, X_AG: Array, way: Array) -> Array:
+    def carried(self, X_AG: Array, distance: Array) -> Array:
         """How far what the hand holds from the grasp on has been moved in the world.
 
         Args:
             X_AG: (..., 4, 4) grasps in the arm's base frame.
-            way: (...,) lengths [m].
+            distance: (...,) lengths [m].
 
         Returns:
             (..., 3) [m]; 0 up to the grasp.
         """
-        length = way[..., None]
+        length = distance[..., None]
         approach_W = rotate(self.R_WA, X_AG[..., :3, 2])
         back = -np.clip(length, 0.0, self.retreat) * approach_W
         return np.asarray(back + np.maximum(length - self.retreat, 0.0) * self.direction_W)

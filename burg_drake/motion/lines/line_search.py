@@ -25,7 +25,7 @@ class Chain:
     deviation.
 
     Attributes:
-        way: which of the two grasps with fingers swapped it is, 0 or 1.
+        flip: which of the two grasps with fingers swapped it is, 0 or 1.
         q: (M, n) from the pregrasp over the grasp to the top of the lift.
         at_grasp: row of the grasp.
         at_retreated: row at which the retreat ends and the lift begins.
@@ -34,7 +34,7 @@ class Chain:
         place: of the search, to know the chain again.
     """
 
-    way: int
+    flip: int
     q: Array
     at_grasp: int
     at_retreated: int
@@ -81,7 +81,7 @@ class LineSearchBatch(Protocol):
         """
         ...
 
-    def close(self, grasp: int, way: int) -> None:
+    def close(self, grasp: int, flip: int) -> None:
         """Leaves one way to put the fingers of a grasp out: the hand itself is in the way of
         something, and no posture of the arm helps."""
         ...
@@ -105,6 +105,6 @@ class LineSearch(Protocol):
             X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with the fingers either way; which of
                 the two comes first does not depend on how a grasp was given.
             clearance: (N, 2) of the hand on its way with the fingers either way [m]: the hand may
-                deviate from the straight way by a fraction of it.
+                deviate from the straight segment by a fraction of it.
         """
         ...

@@ -1,9 +1,9 @@
 """Chains of postures from pregrasp over grasp to the top of the lift, for any serial arm.
 
 Postures at the grasp come from whoever solves the arm's inverse kinematics, numerically or in
-closed form. Each is followed along both straight ways, step by step, which makes a chain unless a
-joint gets to its limit or jumps. The best chain is filled in until the hand goes straight, and held
-against bounds of the arm's clearance; what collides is put out, and the next takes its place.
+closed form. Each is followed along both straight segments, step by step, which makes a chain unless
+a joint gets to its limit or jumps. The best chain is filled in until the hand goes straight, and
+held against bounds of the arm's clearance; what collides is put out, and the next takes its place.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from burg_drake.motion.lines.line_search import Chain, Failure
 from burg_drake.motion.lines.reach_settings import ReachSettings
 from burg_drake.motion.proximity import ArmProximity
 
-WAYS = (
+FLIPS = (
     (APPROACH, Outcome.APPROACH_LINE),
     (RETREAT, Outcome.RETREAT_LINE),
     (LIFT, Outcome.LIFT_LINE),
 )
-"""The hand's straight ways in their order."""
+"""The hand's straight segments in their order."""
 
 
 class NumericLineSearch:
@@ -135,12 +135,12 @@ class _NumericBatch:
             candidates.open[k] = False
             return
         ends = chain.at_grasp, chain.at_retreated, len(chain.q)
-        stage = GRASP if row in (0, chain.at_grasp) else WAYS[int(np.searchsorted(ends, row))][0]
+        stage = GRASP if row in (0, chain.at_grasp) else FLIPS[int(np.searchsorted(ends, row))][0]
         candidates.block(k, stage, chain.q[row], chain.moved_W[row], 0.0)
 
-    def close(self, grasp: int, way: int) -> None:
+    def close(self, grasp: int, flip: int) -> None:
         """See `Lines`."""
-        self._of[grasp].close(way)
+        self._of[grasp].close(flip)
 
     def failure(self, grasp: int) -> Failure:
         """See `Lines`."""
@@ -151,9 +151,9 @@ class _NumericBatch:
         if stage == GRASP:
             return self._explain(Outcome.ARM_COLLISION, candidates, GRASP)
         if stage == APPROACH:
-            return self._no_approach(grasp)
+            return self._explain_no_approach(grasp)
         if stage in (RETREAT, LIFT):
-            return self._explain(dict(WAYS)[stage], candidates, stage)
+            return self._explain(dict(FLIPS)[stage], candidates, stage)
         return Failure(Outcome.NO_PATH)
 
     def _advance(self, grasps: list[int]) -> None:
@@ -181,10 +181,10 @@ class _NumericBatch:
         """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
         search = self._search
         places = list(zip(grasp.tolist(), k.tolist(), strict=True))
-        way = np.array([self._of[g].way[j] for g, j in places], dtype=np.intp)
+        flip = np.array([self._of[g].flip[j] for g, j in places], dtype=np.intp)
         q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
         q = q.reshape(len(k), len(search.home))
-        found = search.follower.follow(self._X_AG[grasp, way], q)
+        found = search.follower.follow(self._X_AG[grasp, flip], q)
         for s, (g, j) in enumerate(places):
             stage, blocked = int(found.stage[s]), found.blocked(s)
             if stage == WHOLE:
@@ -192,16 +192,16 @@ class _NumericBatch:
             elif blocked is None:
                 self._of[g].stop(j, stage)
             else:
-                moved_W = search.lines.carried(self._X_AG[g, way[s]], search.layers[blocked])
+                moved_W = search.lines.carried(self._X_AG[g, flip[s]], search.layers[blocked])
                 upper = float(found.upper[s, blocked])
                 self._of[g].block(j, stage, found.q[s, blocked], moved_W, upper)
 
     def _cost(self, q: Array, lower: Array) -> float:
         """Of a chain: the way of the joint that moves most from layer to layer, its distance from
         home, and doubts whether it is free."""
-        way = np.abs(np.diff(q, axis=0)).max(axis=1).sum()
+        change = np.abs(np.diff(q, axis=0)).max(axis=1).sum()
         start = START * np.abs(q[0] - self._search.home).max()
-        return float(way + start + DOUBT * (lower <= 0.0).sum())
+        return float(change + start + DOUBT * (lower <= 0.0).sum())
 
     def _refine(self, chosen: list[tuple[int, int]]) -> dict[int, Chain]:
         """Chains whose hand goes straight and that are not in collision as far as is known; those
@@ -211,14 +211,14 @@ class _NumericBatch:
         search = self._search
         count = len(search.layers)
         grasp = np.array([g for g, _ in chosen])
-        way = np.array([self._of[g].way[k] for g, k in chosen])
+        flip = np.array([self._of[g].flip[k] for g, k in chosen])
         corners = np.array([self._of[g].q[k] for g, k in chosen])
-        X_AG = self._X_AG[grasp, way]
+        X_AG = self._X_AG[grasp, flip]
         filler = NumericFiller(
             *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
         )
         at = np.linspace(0.0, count - 1.0, (count - 1) * ROWS_A_LAYER + 1)
-        rows = straighten(filler, at, self._deviation[grasp, way])
+        rows = straighten(filler, at, self._deviation[grasp, flip])
         lower, upper = search.measure(rows.q)
         chains = {}
         for i, (g, k) in enumerate(chosen):
@@ -233,13 +233,13 @@ class _NumericBatch:
         search, of = self._search, self._of[grasp]
         layer, q = rows.layer[own], rows.q[own]
         length = np.interp(layer, np.arange(len(search.layers)), search.layers)
-        moved_W = search.lines.carried(self._X_AG[grasp, of.way[k]], length)
+        moved_W = search.lines.carried(self._X_AG[grasp, of.flip[k]], length)
         blocked = ~(upper[own] > 0.0)
         bad = np.flatnonzero(rows.broken[own] | blocked)
         if len(bad):
             ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
             on = np.searchsorted(ends, layer[bad])  # which of the ways
-            stage, bad = WAYS[int(on.min())][0], bad[on == on.min()]
+            stage, bad = FLIPS[int(on.min())][0], bad[on == on.min()]
             row = bad[upper[own][bad].argmin()]
             if blocked[row]:
                 of.block(k, stage, q[row], moved_W[row], float(upper[own][row]))
@@ -247,7 +247,7 @@ class _NumericBatch:
                 of.stop(k, stage)
             return None
         return Chain(
-            way=int(of.way[k]),
+            flip=int(of.flip[k]),
             q=q,
             at_grasp=int(np.searchsorted(layer, search.at_grasp)),
             at_retreated=int(np.searchsorted(layer, search.lines.at_retreated)),
@@ -256,7 +256,7 @@ class _NumericBatch:
             place=k,
         )
 
-    def _no_approach(self, grasp: int) -> Failure:
+    def _explain_no_approach(self, grasp: int) -> Failure:
         """Whether the arm does not get along the line, or has no place at the pregrasp at all."""
         search = self._search
         if search.at_grasp > 0:
@@ -274,7 +274,7 @@ class _NumericBatch:
 
     def _explain(self, outcome: Outcome, candidates: ChainCandidates, stage: int) -> Failure:
         """Names the postures that were in the way at a stage, the nearest to being free first."""
-        q, moved_W = candidates.in_the_way(stage, EXPLAINED)
+        q, moved_W = candidates.blocking(stage, EXPLAINED)
         return Failure(outcome, q=q, moved_W=moved_W)
 
     def _beyond_limits(self, grasp: int, layer: int) -> Failure:

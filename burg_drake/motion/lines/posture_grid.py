@@ -34,12 +34,12 @@ class GridChain:
     """A chain's postures, one at each of L poses.
 
     Attributes:
-        way: index of the finger way.
+        flip: index of the finger way.
         branch: (L,) of the inverse kinematics.
         parameter: (L,) indices of values of the redundant joint.
     """
 
-    way: int
+    flip: int
     branch: Indices
     parameter: Indices
 
@@ -101,8 +101,8 @@ class PostureGrid:
         """Finds the postures at some poses of some grasps."""
         X = self._X_AH[np.ix_(poses, grasps)]
         found = self._ik.solve(X.reshape(-1, 4, 4), self.parameter)
-        pose, grasp, way = np.unravel_index(found.pose, X.shape[:3])
-        where = poses[pose], grasps[grasp], way, found.branch, found.parameter
+        pose, grasp, flip = np.unravel_index(found.pose, X.shape[:3])
+        where = poses[pose], grasps[grasp], flip, found.branch, found.parameter
         self.q[(slice(None), *where)] = found.q.T
         self.exists[where] = True
 
@@ -141,7 +141,7 @@ class PostureGrid:
         """Parts the postures of a chain at `pose` and the next one."""
         (branch, there), k = place.branch[pose : pose + 2].tolist(), int(place.parameter[pose])
         step = int(place.parameter[pose + 1]) - k
-        row = self._rows.number(grasp, place.way, branch)
+        row = self._rows.number(grasp, place.flip, branch)
         crossing = None if there == branch else CROSSINGS[:, branch].tolist().index(there)
         self._steps.cut(pose, row, k, step, crossing)
 
@@ -180,7 +180,7 @@ class PostureGrid:
         there = np.flatnonzero(cheapest[0] >= 0)
         row, k = steps.follow(values, *cheapest[:, there])
         for g, r, parameter in zip(there.tolist(), row, k, strict=True):
-            found[g] = GridChain(int(rows.way[r[0]]), rows.branch[r], parameter)
+            found[g] = GridChain(int(rows.flip[r[0]]), rows.branch[r], parameter)
         return found
 
     def reached(self, grasp: int) -> int:
@@ -190,7 +190,7 @@ class PostureGrid:
         only = np.zeros(self.q.shape[2:-1], dtype=bool)
         only[grasp] = usable.any(axis=(0, -1))
         rows = PostureRows.where(only)
-        led = self._steps_of(rows).reached(usable[:, rows.way, rows.branch]).any(axis=(1, 2))
+        led = self._steps_of(rows).reached(usable[:, rows.flip, rows.branch]).any(axis=(1, 2))
         return int(np.flatnonzero(led).max(initial=-1))
 
     def _steps_of(self, rows: PostureRows) -> PostureSteps:

@@ -35,7 +35,7 @@ class PostureRows:
     """
 
     grasp: Indices
-    way: Indices
+    flip: Indices
     branch: Indices
     other: Indices
 
@@ -44,23 +44,23 @@ class PostureRows:
         """Those wanted (n, 2, 8), with all that they can go over into."""
         for crossing in CROSSINGS:
             wanted = wanted | wanted[..., crossing]
-        grasp, way, branch = np.nonzero(wanted)
+        grasp, flip, branch = np.nonzero(wanted)
         number = np.cumsum(wanted).reshape(wanted.shape) - 1
-        return cls(grasp, way, branch, number[grasp, way, CROSSINGS[:, branch]])
+        return cls(grasp, flip, branch, number[grasp, flip, CROSSINGS[:, branch]])
 
     @property
     def index(self) -> tuple[slice, Indices, Indices, Indices]:
         """What picks the rows of an array (L, n, 2, 8, Q): as (L, R, Q)."""
-        return slice(None), self.grasp, self.way, self.branch
+        return slice(None), self.grasp, self.flip, self.branch
 
     def some(self, chosen: Indices) -> PostureRows:
         """All the rows of some grasps, by their numbers, rising."""
         other = np.searchsorted(chosen, self.other[:, chosen])
-        return PostureRows(self.grasp[chosen], self.way[chosen], self.branch[chosen], other)
+        return PostureRows(self.grasp[chosen], self.flip[chosen], self.branch[chosen], other)
 
-    def number(self, grasp: int, way: int, branch: int) -> int:
+    def number(self, grasp: int, flip: int, branch: int) -> int:
         """The number of a row."""
-        here = (self.grasp == grasp) & (self.way == way) & (self.branch == branch)
+        here = (self.grasp == grasp) & (self.flip == flip) & (self.branch == branch)
         return int(np.flatnonzero(here)[0])
 
 
@@ -101,10 +101,10 @@ class PostureSteps:
         for kind, (offset, side) in enumerate(kinds):
             there = steps._shifted(after, offset)
             there = there if side is None else there[..., other[side], :]
-            way = np.abs(there[0] - here[0])
+            change = np.abs(there[0] - here[0])
             for joint in range(1, len(q)):
-                np.maximum(way, np.abs(there[joint] - here[joint]), out=way)
-            length[:, kind] = np.where(way <= travel, way, FAR)
+                np.maximum(change, np.abs(there[joint] - here[joint]), out=change)
+            length[:, kind] = np.where(change <= travel, change, FAR)
         return replace(steps, length=length)
 
     def some(self, rows: Indices) -> PostureSteps:

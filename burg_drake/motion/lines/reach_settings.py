@@ -13,8 +13,8 @@ class ReachSettings:
     """How thoroughly to look for arm configurations.
 
     Attributes:
-        motion: the hand's straight ways to a grasp and away from it; those that the station states
-            if None.
+        motion: the hand's straight segments to a grasp and away from it; those that the station
+            states if None.
         exact: whether Drake's collision checker has the last word on every motion; without it, for
             screening, the best guess of bounds of the arm's clearance decides.
         closed_form: whether to use the closed form for arms that have one, the Panda.
@@ -28,8 +28,8 @@ class ReachSettings:
         joint_travel: most that a joint may move while the hand moves by 5 cm [rad]; with more, the
             two postures lie on different branches, and the hand could not go straight from one to
             the other.
-        deviation: the hand may be beside the straight way by half of its clearance, but by no less
-            and no more than these two [m].
+        deviation: the hand may be beside the straight segment by half of its clearance, but by no
+            less and no more than these two [m].
         chains: so many motions of a grasp may be refused by the collision checker before it is
             given up ...
         starts_tried: ... and so many of its pregrasp postures that the arm does not get to.

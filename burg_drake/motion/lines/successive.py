@@ -63,7 +63,7 @@ class _SuccessiveBatch:
         found: dict[int, Chain | None] = dict.fromkeys(grasps)
         fresh = [g for g in grasps if g not in self._failed]
         found.update(zip(fresh, self._first.propose(fresh), strict=True))
-        self._give_up([g for g in fresh if found[g] is None])
+        self._switch_search([g for g in fresh if found[g] is None])
         by_search: dict[int, tuple[LineSearchBatch, list[int]]] = {}
         for g in grasps:
             if g in self._again:
@@ -79,11 +79,11 @@ class _SuccessiveBatch:
         lines, number = self._again.get(grasp, (self._first, grasp))
         lines.refuse(number, chain, row)
 
-    def close(self, grasp: int, way: int) -> None:
+    def close(self, grasp: int, flip: int) -> None:
         """See `LineSearchBatch`."""
-        self._closed[grasp, way] = True
+        self._closed[grasp, flip] = True
         lines, number = self._again.get(grasp, (self._first, grasp))
-        lines.close(number, way)
+        lines.close(number, flip)
 
     def failure(self, grasp: int) -> Failure:
         """See `LineSearchBatch`: what the search says that got farther, or else has more to say."""
@@ -94,7 +94,7 @@ class _SuccessiveBatch:
         second = lines.failure(number)
         return max(first, second, key=_rank)
 
-    def _give_up(self, grasps: Sequence[int]) -> None:
+    def _switch_search(self, grasps: Sequence[int]) -> None:
         """Leaves grasps to the second search where that may help."""
         if not grasps:
             return
@@ -105,8 +105,8 @@ class _SuccessiveBatch:
         lines = self._search.second.begin(self._X_AG[left], self._clearance[left])
         for number, g in enumerate(left):
             self._again[g] = lines, number
-            for way in np.flatnonzero(self._closed[g]):
-                lines.close(number, int(way))
+            for flip in np.flatnonzero(self._closed[g]):
+                lines.close(number, int(flip))
 
 
 def _rank(failure: Failure) -> tuple[int, bool]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, quoted
 from burg_drake.core.documents import load_json
-from burg_drake.core.files import DAMAGED, GRASP_FILE, atomic_write_all, read_rows, row_texts
+from burg_drake.core.files import GRASP_FILE, READ_ERRORS, atomic_write_all, format_rows, read_rows
 from burg_drake.core.grasps import TEXT, Column, csv_metadata, metadata_path
 from burg_drake.motion.plans.plan_record import (
     assembled,
@@ -55,8 +55,8 @@ def write_csv(plan: PlannedMotion, path: str | Path) -> None:
     joints = joint_names(plan)
     meanings = _meanings(joints)
     lines = [",".join(map(_cell, meanings))]
-    times = row_texts(whole.t[:, None])
-    rows = row_texts(np.hstack([whole.q, whole.v, whole.a]))
+    times = format_rows(whole.t[:, None])
+    rows = format_rows(np.hstack([whole.q, whole.v, whole.a]))
     for phase, (first, last) in spans_of(plan).items():
         start, end = first if first == 0 else first + 1, f",{_width(plan, phase)}"
         lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
@@ -76,7 +76,7 @@ def read_csv(path: Path) -> PlannedMotion:
     joints = tuple(name[2:] for name in header if name.startswith("q_"))
     if not joints or header != list(_meanings(joints)):
         raise InvalidInputError(
-            f"{path} is no plan: its columns are not t, phase, q_JOINT, v_JOINT, a_JOINT, width"
+            f"{path} is not a plan: its columns are not t, phase, q_JOINT, v_JOINT, a_JOINT, width"
         )
     beside = metadata_path(path)
     try:
@@ -94,7 +94,7 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
     try:
         (data,) = document["notes"]
         titles = [column["titles"] for column in document["tableSchema"]["columns"]]
-    except DAMAGED as error:
+    except READ_ERRORS as error:
         raise InvalidInputError(f"{path} has no notes on a plan; write it again") from error
     if titles != list(header):
         raise InvalidInputError(f"{path} is of a table with other columns; write it again")
@@ -118,10 +118,10 @@ def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
             values[k] = [_number(c, m, line) for c, m in zip(row[2:-1], names, strict=True)]
     if not np.isfinite(values).all():
         k, column = np.argwhere(~np.isfinite(values))[0]
-        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is no finite number")
+        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is not a finite number")
     q, v, a = np.hsplit(values, 3)
     if data is None:
-        data = _told_by_rows(rows, t, spans)
+        data = _described_by_rows(rows, t, spans)
     plan = assembled(read_data(data, joints), t, spans, (q, v, a))
     _require_widths(plan, rows)
     return plan
@@ -153,7 +153,7 @@ def _read_spans(rows: Rows) -> dict[str, tuple[int, int]]:
     return spans
 
 
-def _told_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
+def _described_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
     """What a table alone tells of its plan."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:

@@ -38,9 +38,9 @@ def load_plan(
         scene, station: what the plan has to be for, if given.
 
     Raises:
-        InvalidInputError: there is no such file, it is no plan, or one that is damaged: with times,
-            phases or positions that do not belong together, or beyond its own limits; or it is for
-            another scene or station, or does not tell.
+        InvalidInputError: there is no such file, it is not a plan, or one that is damaged: with
+            times, phases or positions that do not belong together, or beyond its own limits; or it
+            is for another scene or station, or does not tell.
     """
     path = Path(path)
     read = read_csv if path.suffix.lower() == ".csv" else read_json

@@ -15,7 +15,7 @@ import numpy as np
 
 from burg_drake.core import Array, DocumentError, InvalidInputError
 from burg_drake.core.documents import load_json
-from burg_drake.core.files import GRASP_FILE, atomic_write, row_texts
+from burg_drake.core.files import GRASP_FILE, atomic_write, format_rows
 from burg_drake.motion.plans.plan_record import (
     NANO,
     Spans,
@@ -41,7 +41,7 @@ def write_json(plan: PlannedMotion, path: str | Path) -> None:
     require_writable(plan)
     whole = plan.whole
     stamps = np.rint(whole.t * NANO).astype(int).tolist()
-    rows = zip(stamps, *(row_texts(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
+    rows = zip(stamps, *(format_rows(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
     points = ", ".join(
         f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
         f' "time_from_start": {{"sec": {time // NANO}, "nanosec": {time % NANO}}}}}'
@@ -78,12 +78,12 @@ def _plan(document: dict[str, Any]) -> PlannedMotion:
         rows = _rows(motion["points"], len(joints))
         stamps = [point["time_from_start"] for point in motion["points"]]
         t = np.array([stamp["sec"] + stamp["nanosec"] / NANO for stamp in stamps], dtype=float)
-    told = read_data(document, joints)
+    description = read_data(document, joints)
     with part(document, "phases") as phases:
         spans: Spans = {name: (first, last) for name, (first, last) in phases.items()}
         if spans.keys() - set(PHASES):
             raise KeyError(spans)
-        return assembled(told, t, spans, rows)
+        return assembled(description, t, spans, rows)
 
 
 def _rows(points: list[dict[str, Any]], n: int) -> list[Array]:

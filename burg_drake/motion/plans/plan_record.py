@@ -13,7 +13,7 @@ import numpy as np
 
 import burg_drake
 from burg_drake.core import Array, BurgError, InvalidInputError, check_pose, quoted
-from burg_drake.core.files import DAMAGED, without_warnings
+from burg_drake.core.files import READ_ERRORS, without_warnings
 from burg_drake.motion.plans.planned_motion import PHASES, PlannedMotion, PlanOrigin
 from burg_drake.motion.plans.trajectory import Trajectory
 
@@ -87,13 +87,13 @@ def plan_data(plan: PlannedMotion) -> dict[str, Any]:
 
 
 def require_version(data: Any, path: str | Path) -> None:
-    """Refuses what is no plan, or one of another release.
+    """Refuses what is not a plan, or one of another release.
 
     Raises:
         InvalidInputError: it is not.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InvalidInputError(f"{path} is no plan: it lacks format {FORMAT!r}")
+        raise InvalidInputError(f"{path} is not a plan: it lacks format {FORMAT!r}")
     if data.get("version") != VERSION:
         raise InvalidInputError(
             f"{path} has version {quoted(data.get('version'))}; this release reads {VERSION}"
@@ -107,7 +107,7 @@ def part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
         yield document[name]
     except BurgError:
         raise
-    except DAMAGED as error:
+    except READ_ERRORS as error:
         raise InvalidInputError(f"{name!r} is not as it was written") from error
 
 
@@ -135,12 +135,12 @@ def read_data(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescr
 
 
 def assembled(
-    told: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
+    description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
 ) -> PlannedMotion:
     """A plan of its samples.
 
     Args:
-        told: what else is known of it.
+        description: what else is known of it.
         t: (T,) times of the samples [s].
         spans: where the phases are.
         rows: positions, velocities and accelerations, (T, n) each.
@@ -149,12 +149,12 @@ def assembled(
         InvalidInputError: times, phases or positions do not belong together, or are beyond the
             limits.
     """
-    exact = np.arange(len(t)) / told.rate
+    exact = np.arange(len(t)) / description.rate
     apart = ~(np.abs(exact - t) * NANO <= STAMP_TOLERANCE)
     if apart.any():
         k = apart.argmax()
         raise InvalidInputError(
-            f"point {k} is at {t[k]:.9g} s; of {told.rate:g} samples a second it is that at"
+            f"point {k} is at {t[k]:.9g} s; of {description.rate:g} samples a second it is that at"
             f" {exact[k]:.9g} s"
         )
     _require_spans(spans, len(t))
@@ -164,14 +164,14 @@ def assembled(
     }
     plan = PlannedMotion(
         **{name: trajectory for name, trajectory in parts.items() if name != "close"},
-        close_time=told.close_time,
-        opening=told.opening,
-        width=told.width,
-        origin=told.origin,
+        close_time=description.close_time,
+        opening=description.opening,
+        width=description.width,
+        origin=description.origin,
     )
     _require_rest(parts, plan)
-    if told.origin is not None:
-        _require_within(plan.whole, told.origin)
+    if description.origin is not None:
+        _require_within(plan.whole, description.origin)
     return plan
 
 

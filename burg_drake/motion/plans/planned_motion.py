@@ -126,7 +126,7 @@ class PlannedMotion:
             wanted.append(("scene", as_scene(scene)))
         if wanted and self.origin is None:
             raise InvalidInputError(
-                f"{name} does not tell which scene and arm it is for; of a CSV that is in the file"
+                f"{name} does not say which scene and arm it is for; of a CSV that is in the file"
                 " NAME.csv-metadata.json beside it"
             )
         for kind, here in wanted:

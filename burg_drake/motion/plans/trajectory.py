@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from burg_drake.core import Array
-from burg_drake.core.files import on_grid
+from burg_drake.core.files import rounded_to_places
 
 if TYPE_CHECKING:
     from pydrake.trajectories import PiecewisePolynomial
@@ -25,7 +25,7 @@ class Motion(Protocol):
     def at(self, time: Array) -> tuple[Array, Array, Array, Array]:
         """Position, velocity, acceleration and jerk, each (T, n), at times (T,) [s]."""
 
-    def stretched(self, factor: float) -> Motion:
+    def time_scaled(self, factor: float) -> Motion:
         """The same way in `factor` times the time."""
 
 
@@ -54,8 +54,8 @@ class Trajectory:
         """
         count = max(1, int(np.ceil(motion.duration * rate - 1e-6)))
         t = np.arange(count + 1) / rate
-        motion = motion.stretched(t[-1] / motion.duration)
-        q, v, a = (on_grid(x) for x in motion.at(t)[:3])
+        motion = motion.time_scaled(t[-1] / motion.duration)
+        q, v, a = (rounded_to_places(x) for x in motion.at(t)[:3])
         q[0], q[-1] = start, end
         v[[0, -1]] = a[[0, -1]] = 0.0
         return cls(t, q, v, a)
@@ -72,7 +72,7 @@ class Trajectory:
         """One after the other; where one ends and the next begins there is one row."""
         t, rows = [parts[0].t], [slice(None)] + [slice(1, None)] * (len(parts) - 1)
         for part in parts[1:]:
-            t.append(on_grid(t[-1][-1] + part.t[1:]))
+            t.append(rounded_to_places(t[-1][-1] + part.t[1:]))
         q, v, a = (
             np.concatenate([getattr(p, name)[row] for p, row in zip(parts, rows, strict=True)])
             for name in ("q", "v", "a")

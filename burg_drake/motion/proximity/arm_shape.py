@@ -23,7 +23,7 @@ from pydrake.geometry import (
     Sphere,
 )
 
-from burg_drake.core import Array, Arrays, content_hash, kept
+from burg_drake.core import Array, Arrays, cached, content_hash
 from burg_drake.motion.ik import ArmLinks
 from burg_drake.motion.proximity.ball_tree import BallTrees, bodies_with_shape
 from burg_drake.motion.proximity.cached_arrays import from_arrays, to_arrays
@@ -75,7 +75,7 @@ class ArmShape:
                 trees = BallTrees.of(station_diagram, links)
                 return to_arrays(trees, SelfClearance.of(station_diagram, links, trees, limits))
 
-            _kept[key] = from_arrays(kept("robot", key, make))
+            _kept[key] = from_arrays(cached("robot", key, make))
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
         trees, itself = _kept[key]

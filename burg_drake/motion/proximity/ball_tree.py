@@ -152,15 +152,15 @@ def _around(balls: Balls) -> tuple[Array, float]:
     center = (balls.center.min(axis=0) + balls.center.max(axis=0)) / 2
     best = (center, np.inf)
     for step in range(20):
-        ways = balls.center - center
-        distance = np.sqrt((ways * ways).sum(axis=1))
+        offsets = balls.center - center
+        distance = np.sqrt((offsets * offsets).sum(axis=1))
         reach = distance + balls.outer
         far = int(reach.argmax())
         if reach[far] < best[1]:
             best = (center, float(reach[far]))
         if distance[far] < 1e-9:
             break
-        center = center + ways[far] / distance[far] * reach[far] / (step + 2)
+        center = center + offsets[far] / distance[far] * reach[far] / (step + 2)
     return best
 
 

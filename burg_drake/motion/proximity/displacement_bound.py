@@ -24,10 +24,10 @@ def joint_reaches(links: ArmLinks, bodies: tuple[BodyBalls, ...], limits: Array)
                 own = np.linalg.norm(body.balls.center, axis=1) + body.balls.outer
                 beyond[i] = max(beyond[i], own.max())
         if i + 1 < n:
-            way = np.linalg.norm(links.X_before[i + 1][:3, 3])
+            reach = np.linalg.norm(links.X_before[i + 1][:3, 3])
             if not links.turns[i + 1]:
-                way += np.abs(limits[i + 1]).max()
-            beyond[i] = max(beyond[i], beyond[i + 1] + way)
+                reach += np.abs(limits[i + 1]).max()
+            beyond[i] = max(beyond[i], beyond[i + 1] + reach)
     return np.maximum(beyond, 0.0)
 
 
@@ -54,15 +54,15 @@ class DisplacementBound:
 
     def between(self, q_a: Array, q_b: Array) -> Array:
         """Upper bounds (K,) [m] for segments from `q_a` to `q_b` (K, n) within the limits."""
-        way = np.abs(q_b - q_a).T
+        displacement = np.abs(q_b - q_a).T
         of_all = self._from_axes(np.concatenate([q_a, q_b]))
         ends = of_all[:, : len(q_a)] + of_all[:, len(q_a) :]
-        total = np.zeros(way.shape[1])
-        for i in reversed(range(len(way))):
+        total = np.zeros(displacement.shape[1])
+        for i in reversed(range(len(displacement))):
             if self._links.turns[i]:
-                total += way[i] * np.minimum(self._reach[i], (ends[i] + total) / 2)
+                total += displacement[i] * np.minimum(self._reach[i], (ends[i] + total) / 2)
             else:
-                total += way[i]
+                total += displacement[i]
         return total
 
     def _from_axes(self, q: Array) -> Array:

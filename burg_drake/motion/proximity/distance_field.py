@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, kept
+from burg_drake.core import Array, Arrays, cached
 from burg_drake.motion.ik import Single
 from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, Solid, content_of
 
@@ -55,7 +55,7 @@ class DistanceField:
         if not small:
             far = np.full(1, np.inf, dtype=np.float32)
             return cls(np.zeros(3), CELL, (1, 1, 1), far, far, boxes)
-        arrays = kept("distances", content_of(small), lambda: _arrays(small))
+        arrays = cached("distances", content_of(small), lambda: _arrays(small))
         nx, ny, nz = (int(n) for n in arrays["shape"])
         return cls(
             arrays["origin"],

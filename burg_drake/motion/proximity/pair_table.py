@@ -130,10 +130,12 @@ class PairTable:
             found = distance.at(grid.centers(cells, level), ceiling)
             inside = found + slack < -ACCURACY
             done = (slack <= SHARE * found) | (found >= ceiling) | inside | (level == 0)
-            number, way = grid.within(cells[done], level)
+            number, reach = grid.within(cells[done], level)
             at = found[done, None]
-            lower[number] = np.where(at > 0.0, np.minimum(at, ceiling), at - DEPTH) - way - ACCURACY
-            upper[number] = at + way + ACCURACY
+            lower[number] = (
+                np.where(at > 0.0, np.minimum(at, ceiling), at - DEPTH) - reach - ACCURACY
+            )
+            upper[number] = at + reach + ACCURACY
             cells = _halved(cells[~done])
         return cls(grid, lower.astype(np.float32), upper.astype(np.float32))
 
@@ -141,16 +143,16 @@ class PairTable:
         """Lower and upper bounds (K,) [m] at arm positions `q` (K, n)."""
         grid = self.grid
         number = np.zeros(len(q), dtype=np.intp)
-        way = np.zeros(len(q))
+        shift = np.zeros(len(q))
         for axis, joint in enumerate(grid.joints):
             at = (q[:, joint] - grid.low[axis]) / grid.step[axis]
             if grid.whole[axis]:
                 at %= grid.count[axis]
             cell = np.floor(at).clip(0, grid.count[axis] - 1)
-            way += np.abs(at - cell - 0.5) * (grid.step[axis] * grid.lever[axis])
+            shift += np.abs(at - cell - 0.5) * (grid.step[axis] * grid.lever[axis])
             number *= grid.count[axis]
             number += cell.astype(np.intp)
-        slack = way.astype(np.float32)
+        slack = shift.astype(np.float32)
         return self.lower[number] - slack, self.upper[number] + slack
 
 

@@ -140,8 +140,8 @@ class HullSolid:
         left = np.maximum((foot @ self.normals.T - self.offsets).max(axis=1), 0.0)
         centroid = self.vertices.mean(axis=0)
         depth = (self.offsets - self.normals @ centroid).min()
-        way = left / (left + depth) * np.linalg.norm(foot - centroid, axis=1)
-        return np.asarray(np.where(farthest > 0.0, farthest + way, farthest), dtype=np.float32)
+        offset = left / (left + depth) * np.linalg.norm(foot - centroid, axis=1)
+        return np.asarray(np.where(farthest > 0.0, farthest + offset, farthest), dtype=np.float32)
 
 
 Solid = BoxSolid | BallSolid | HullSolid

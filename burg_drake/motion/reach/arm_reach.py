@@ -51,7 +51,7 @@ class ArmReach:
 
     Attributes:
         settings: how thoroughly it looks.
-        motion: the hand's straight ways to a grasp and away from it.
+        motion: the hand's straight segments to a grasp and away from it.
         kinematics: the arm on its own.
         diagram: the station diagram of the checks.
         collision: the arm in the scene, by Drake's checker.
@@ -145,40 +145,42 @@ class ArmReach:
                 f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)} widths;"
                 " give as many poses (N, 4, 4)"
             )
-        ways = HandPaths(
+        paths = HandPaths(
             self._sweep,
             np.array(instances, dtype=object),
             _both(X, self._X_AW),
             widths,
             retreats=self.motion.retreat > 0.0,
         )
-        before, motion = ways.before_lift(), self.motion
+        before, motion = paths.before_lift(), self.motion
 
         def judge(height: float, some: Indices) -> list[Reach]:
-            return self._lifted(ways[some], before[some], float(height))
+            return self._lifted(paths[some], before[some], float(height))
 
         def hand_is_free(height: float, some: Indices) -> NDArray[np.bool_]:
-            return ~ways[some].lifted(before[some], height).blocked
+            return ~paths[some].lifted(before[some], height).blocked
 
         whole = judge(motion.lift_height, np.arange(len(X)))
-        if motion.least >= motion.lift_height:
+        if motion.shortest >= motion.lift_height:
             return whole
-        tried = lift_heights(motion.least, motion.lift_height)
+        tried = lift_heights(motion.shortest, motion.lift_height)
         return raise_lifts(whole, tried, judge, hand_is_free)
 
-    def _lifted(self, ways: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:
+    def _lifted(self, paths: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:
         """Verdicts on N grasps with a lift to one height [m]."""
-        hand = ways.lifted(before, height)
-        found: dict[int, Reach] = {int(k): hand.why(int(k)) for k in np.flatnonzero(hand.blocked)}
+        hand = paths.lifted(before, height)
+        found: dict[int, Reach] = {
+            int(k): hand.refusal(int(k)) for k in np.flatnonzero(hand.blocked)
+        }
         left = np.flatnonzero(~hand.blocked)
         if height not in self._searches:
             self._searches[height] = self._search.lifted(height)
         size = min(BATCH, POSES // len(replace(self._lines, lift=height).layers))
         for k in range(0, len(left), size):
             part = left[k : k + size]
-            X_WG, clearance = ways.X_both[part], hand.clearance[part]
+            X_WG, clearance = paths.X_both[part], hand.clearance[part]
             lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
-            task = GraspBatch(ways.instance[part].tolist(), X_WG, ways.width[part], clearance)
+            task = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
             verdicts = MotionSearch(task, lines, self.tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None

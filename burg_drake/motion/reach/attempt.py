@@ -81,8 +81,8 @@ class MotionSearch:
         self._refused = np.zeros(len(task.instance), dtype=int)
         self._unconnected = np.zeros(len(task.instance), dtype=int)
         self._nearest: dict[int, Refusal] = {}
-        for grasp, way in np.argwhere(task.clearance < 0.0):
-            lines.close(int(grasp), int(way))
+        for grasp, flip in np.argwhere(task.clearance < 0.0):
+            lines.close(int(grasp), int(flip))
 
     def run(self) -> list[Reach]:
         """The verdicts."""
@@ -94,7 +94,7 @@ class MotionSearch:
             found |= self._reached(self._unblocked(chains))
             for grasp in left:
                 if grasp not in found and (grasp not in chains or self._is_hopeless(grasp)):
-                    found[grasp] = self._no(grasp)
+                    found[grasp] = self._refused_reach(grasp)
             left = [grasp for grasp in left if grasp not in found]
         return [found[grasp] for grasp in range(len(self._task.instance))]
 
@@ -165,7 +165,7 @@ class MotionSearch:
         )
         with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
         if with_hand is not None:
-            self._lines.close(grasp, chain.way)
+            self._lines.close(grasp, chain.flip)
         else:
             self._lines.refuse(grasp, chain, row)
         if row in (0, chain.at_grasp) or with_hand is not None:
@@ -180,17 +180,17 @@ class MotionSearch:
         """A yes for each of the free chains that a path leads to; the others are refused."""
         if not chains:
             return {}
-        ways = self._tree.connect_each(np.array([c.q[0] for c in chains.values()]))
+        transfers = self._tree.connect_each(np.array([c.q[0] for c in chains.values()]))
         found = {}
-        for (grasp, chain), transfer in zip(chains.items(), ways, strict=True):
+        for (grasp, chain), transfer in zip(chains.items(), transfers, strict=True):
             if transfer is None:
                 self._lines.refuse(grasp, chain, None)
                 self._unconnected[grasp] += 1
                 continue
             at, corner = chain.at_grasp, chain.at_retreated
-            hand = float(self._task.clearance[grasp, chain.way])
+            hand = float(self._task.clearance[grasp, chain.flip])
             witness = Witness(
-                X_WG=self._task.X_WG[grasp, chain.way],
+                X_WG=self._task.X_WG[grasp, chain.flip],
                 transfer=transfer,
                 approach=chain.q[: at + 1],
                 retreat=chain.q[at : corner + 1] if corner > at else None,
@@ -201,19 +201,19 @@ class MotionSearch:
             found[grasp] = Reach(None, clearance=clearance, witness=witness)
         return found
 
-    def _no(self, grasp: int) -> Reach:
+    def _refused_reach(self, grasp: int) -> Reach:
         """Why there is no motion: what kept the best attempt from being one."""
         if self._unconnected[grasp]:
             return Reach(Outcome.NO_PATH)
         failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
         if refusal is not None and refusal.rank[0] >= _progress(failure.outcome):
-            return _because(refusal.outcome, refusal.overlap)
-        least = self._least(grasp, failure)
+            return _reason_rank(refusal.outcome, refusal.overlap)
+        least = self._least_overlapping(grasp, failure)
         if least is None:
             return Reach(failure.outcome, excess=failure.excess)
-        return _because(failure.outcome, least)
+        return _reason_rank(failure.outcome, least)
 
-    def _least(self, grasp: int, failure: Failure) -> Overlap | None:
+    def _least_overlapping(self, grasp: int, failure: Failure) -> Overlap | None:
         """What is in the way, of the configuration where that is least."""
         least: Overlap | None = None
         for q, place in zip(failure.q, failure.moved_W, strict=True):
@@ -228,7 +228,7 @@ def _progress(outcome: Outcome) -> int:
     return PROGRESS.index(outcome) if outcome in PROGRESS else -1
 
 
-def _because(outcome: Outcome, overlap: Overlap | None) -> Reach:
+def _reason_rank(outcome: Outcome, overlap: Overlap | None) -> Reach:
     if overlap is None:
         return Reach(outcome)
     return Reach(outcome, str(overlap), -overlap.depth)

@@ -1,4 +1,4 @@
-"""How deep a hand that moves along a straight way gets into a body, and where."""
+"""How deep a hand that moves along a straight segment gets into a body, and where."""
 
 from __future__ import annotations
 

@@ -89,12 +89,12 @@ def read_hand(station_diagram: StationDiagram) -> tuple[tuple[HandPart, ...], di
         for finger in hand.fingers
     ]
     links.insert(0, robot - links[0] - links[1])
-    ways = [np.zeros(3), *_closing_ways(hand, plant, plant_context)]
+    paths = [np.zeros(3), *_closing_paths(hand, plant, plant_context)]
     owned = [
         tuple(s for s, owner in zip(shapes, owners, strict=True) if owner in own) for own in links
     ]
     opening = hand.document.opening
-    parts = [HandPart(o, way, opening) for o, way in zip(owned, ways, strict=True) if o]
+    parts = [HandPart(o, path, opening) for o, path in zip(owned, paths, strict=True) if o]
     return tuple(parts), bodies
 
 
@@ -121,7 +121,9 @@ def _reach(shape: Shape, directions: Array) -> Array:
     return np.asarray(along + (d_P @ shape.polytope.vertices.T).max(axis=1))
 
 
-def _closing_ways(hand: FloatingHand, plant: MultibodyPlant, plant_context: Context) -> list[Array]:
+def _closing_paths(
+    hand: FloatingHand, plant: MultibodyPlant, plant_context: Context
+) -> list[Array]:
     """How far each finger moves from open to closed, in the grasp frame (3,) [m]."""
     ends = []
     for closed in (0.0, 1.0):

@@ -1,9 +1,9 @@
-"""The hand on its straight ways to a grasp, back from it and along the lift, for many grasps,
+"""The hand on its straight segments to a grasp, back from it and along the lift, for many grasps,
 without the arm.
 
-A way is judged as a whole, not at samples: what a convex part sweeps along a straight way is convex
-(`geometry.swept`), so that one overlap and one distance tell whether the way is free, and how
-far from everything it stays.
+A way is judged as a whole, not at samples: what a convex part sweeps along a straight segment is
+convex (`geometry.swept`), so that one overlap and one distance tell whether the way is free, and
+how far from everything it stays.
 
 Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
 """
@@ -176,7 +176,7 @@ class HandSweep:
         u_W: Array,
         length: float,
     ) -> Sweep:
-        """The hand around the target on straight ways from N poses (N, 4, 4).
+        """The hand around the target on straight segments from N poses (N, 4, 4).
 
         Args:
             instance: the target, which does not count.
@@ -217,9 +217,9 @@ class HandSweep:
     def _moved_against(self, height: float) -> dict[str, Body]:
         """All bodies, as they sweep when in place of the hand all else moves: against the lift."""
         if height not in self._against:
-            way_W = -height * self._motion.direction_W
+            shift_W = -height * self._motion.direction_W
             bodies = self._bodies.items()
-            self._against[height] = {name: swept_body(body, way_W) for name, body in bodies}
+            self._against[height] = {name: swept_body(body, shift_W) for name, body in bodies}
         return self._against[height]
 
     def _lift_screens(self, instance: str, height: float) -> list[HandScreen]:
@@ -240,13 +240,13 @@ class HandSweep:
     def _lifted(self, instance: str, start_W: Array, height: float) -> PathBlockers:
         """What is in the way of the target on the lift; without a retreat that is the same for all
         grasps."""
-        way, u_W = self._target(instance), self._motion.direction_W
+        shift_W, u_W = self._target(instance), self._motion.direction_W
         swept = self._moved_against(height)
         if self._motion.retreat > 0.0:
-            return way.lift(start_W, u_W, height, swept)
+            return shift_W.lift(start_W, u_W, height, swept)
         key = instance, height
         if key not in self._risen:
-            self._risen[key] = way.lift(np.zeros((1, 3)), u_W, height, swept)
+            self._risen[key] = shift_W.lift(np.zeros((1, 3)), u_W, height, swept)
         return self._risen[key].repeated(len(start_W))
 
 

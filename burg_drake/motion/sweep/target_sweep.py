@@ -83,7 +83,7 @@ class TargetSweep:
         for name, box in self._boxes.items():
             near = (ends[0] <= box.high).all(axis=1) & (ends[1] >= box.low).all(axis=1)
             rows = np.flatnonzero(near & (found.by == ""))
-            self._look(name, found, rows, np.zeros((len(rows), 3)), u_W[rows], length)
+            self._check(name, found, rows, np.zeros((len(rows), 3)), u_W[rows], length)
         return found
 
     def lift(
@@ -111,10 +111,10 @@ class TargetSweep:
             if len(rows):
                 rows = rows[screen.deepest(path[rows], [name])[1] > self._allowed(name)]
             u = np.broadcast_to(u_W, (len(rows), 3))
-            self._look(name, found, rows, start_W[rows], u, height)
+            self._check(name, found, rows, start_W[rows], u, height)
         return found
 
-    def _look(
+    def _check(
         self,
         name: str,
         found: PathBlockers,

@@ -71,11 +71,11 @@ def _rounded(
         return _straight(q, limits, least[0])
     level = np.zeros(len(q) - 2, int)
     while level.max() < len(SHARES):
-        way = _fastest(q, limits, least, np.take(SHARES, level))
+        path = _fastest(q, limits, least, np.take(SHARES, level))
         corners = range(len(level))
-        cut = [k for k in corners if not way.is_good(k, deviation, is_free)]
+        cut = [k for k in corners if not path.is_good(k, deviation, is_free)]
         if not cut:
-            return way.motion
+            return path.motion
         level[cut] += 1
     ends = [0, *(np.flatnonzero(level == len(SHARES)) + 1).tolist(), len(q) - 1]
     return Cubics.joined(
@@ -84,11 +84,11 @@ def _rounded(
 
 
 def _straight(q: Array, limits: ArmLimits, least: float) -> Cubics:
-    way = np.abs(q[1] - q[0])
+    length = np.abs(q[1] - q[0])
     profile = DoubleS.of(
-        1.0 / max(least, (way / limits.velocity).max()),
-        1.0 / (way / limits.acceleration).max(),
-        1.0 / (way / limits.jerk).max(),
+        1.0 / max(least, (length / limits.velocity).max()),
+        1.0 / (length / limits.acceleration).max(),
+        1.0 / (length / limits.jerk).max(),
     )
     unit = profile.over(q[1] - q[0])
     return Cubics(unit.t, unit.q + q[0], unit.v, unit.a, unit.j)
@@ -121,8 +121,10 @@ class _TimedPolyline:
 
 def _fastest(q: Array, limits: ArmLimits, least: Array, share: Array) -> _TimedPolyline:
     """The fastest of the windows tried; `share` (M - 2,) is how exactly corners are met."""
-    way = np.abs(np.diff(q, axis=0))
-    V, A, J = ((way / m).max(axis=1) for m in (limits.velocity, limits.acceleration, limits.jerk))
+    length = np.abs(np.diff(q, axis=0))
+    V, A, J = (
+        (length / m).max(axis=1) for m in (limits.velocity, limits.acceleration, limits.jerk)
+    )
     V = np.maximum(V, least)
     full = float((limits.velocity / limits.acceleration).max())
     build = float((limits.acceleration / limits.jerk).max())
@@ -133,23 +135,23 @@ def _fastest(q: Array, limits: ArmLimits, least: Array, share: Array) -> _TimedP
             windows = DoubleS(float(travel.sum()), float(rise), float(ramp))
             dwell = share * (rise + ramp)
             motion = smoothed(q, travel, windows, dwell)
-            factor = limits.stretch(motion.peaks())
+            factor = limits.time_scale(motion.peaks())
             if least.any():
                 factor = max(factor, 1.0)
             if motion.duration * factor < shortest:
                 shortest = motion.duration * factor
                 arrival = np.cumsum(travel)[:-1] + np.cumsum(dwell) - dwell
                 departure = arrival + dwell + rise + ramp
-                best = motion.stretched(factor), arrival * factor, departure * factor
+                best = motion.time_scaled(factor), arrival * factor, departure * factor
     assert best is not None
     return _TimedPolyline(q, *best)
 
 
 def distance_to_polyline(rows: Array, q: Array) -> Array:
     """(R,) Euclidean distances of rows (R, n) to the polyline through q (M, n)."""
-    start, way = q[:-1], np.diff(q, axis=0)
-    length = np.maximum((way**2).sum(axis=1), np.finfo(float).tiny)
+    start, segment = q[:-1], np.diff(q, axis=0)
+    length = np.maximum((segment**2).sum(axis=1), np.finfo(float).tiny)
     offset = rows[:, None] - start
-    along = np.clip((offset * way).sum(axis=2) / length, 0.0, 1.0)
-    gap = offset - along[..., None] * way
+    along = np.clip((offset * segment).sum(axis=2) / length, 0.0, 1.0)
+    gap = offset - along[..., None] * segment
     return np.asarray(np.sqrt((gap**2).sum(axis=2)).min(axis=1))

@@ -78,7 +78,7 @@ class Cubics:
             j,
         )
 
-    def stretched(self, factor: float) -> Cubics:
+    def time_scaled(self, factor: float) -> Cubics:
         """The same way in `factor` times the time."""
         return Cubics(
             self.t * factor, self.q, self.v / factor, self.a / factor**2, self.j / factor**3
@@ -141,9 +141,9 @@ class DoubleS:
             rise = ramp = (0.5 / jerk) ** (1.0 / 3.0)
         return cls(rise + ramp, rise, ramp)
 
-    def over(self, way: Array) -> Cubics:
-        """The motion of n coordinates from 0 over `way` (n,)."""
-        return smoothed(np.stack([np.zeros_like(way), way]), np.array([self.travel]), self)
+    def over(self, length: Array) -> Cubics:
+        """The motion of n coordinates from 0 over `length` (n,)."""
+        return smoothed(np.stack([np.zeros_like(length), length]), np.array([self.travel]), self)
 
 
 def smoothed(q: Array, travel: Array, windows: DoubleS, dwell: Array | None = None) -> Cubics:

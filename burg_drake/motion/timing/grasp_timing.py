@@ -60,7 +60,7 @@ def time_motion(
     Args:
         witness: the paths.
         limits: of the joints; none is exceeded.
-        kinematics: the arm, to measure the way of the hand.
+        kinematics: the arm, to measure the path length of the hand.
         settings: how fast, how close to the paths.
         checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
             at each corner; without one for a line, it keeps to a spline through the waypoints.
@@ -75,7 +75,7 @@ def time_motion(
     settings, checks = settings or TimingSettings(), checks or PathChecks()
     near = NARROW if np.isnan(witness.clearance) else max(0.0, witness.clearance)
     lines = replace(settings, straightness=max(STRAIGHT, min(settings.straightness, near / 2.0)))
-    gentle = limits.gentle(settings.velocity_share, settings.ramp)
+    gentle = limits.scaled_down(settings.velocity_share, settings.ramp)
     transfer = time_polyline(
         _within(witness.transfer, limits, "transfer"),
         gentle,
@@ -96,7 +96,7 @@ def time_motion(
         _within(witness.lift, limits, "lift"),
         kinematics,
         gentle,
-        _lifting(_way(witness.lift, kinematics), settings),
+        _lifting(_hand_path_length(witness.lift, kinematics), settings),
         lines,
         is_free=checks.lift,
         limit_margin=limit_margin,
@@ -146,7 +146,7 @@ def _retreating(settings: TimingSettings) -> HandSpeed:
     return HandSpeed(settings.approach_speed, acceleration, settings.ramp)
 
 
-def _way(rows: Array, kinematics: ArmKinematics) -> float:
+def _hand_path_length(rows: Array, kinematics: ArmKinematics) -> float:
     """Distance between the ends of a line [m]."""
     p = kinematics.forward(rows[[0, -1]])[0][:, :3, 3]
     return float(np.linalg.norm(p[1] - p[0]))
@@ -156,13 +156,13 @@ def _sampled(
     motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
 ) -> Trajectory:
     """Samples that keep the limits, by their differences, too."""
-    motion, kept = motion.stretched(1.0 / settings.speed), limits.slowed(settings.speed)
+    motion, kept = motion.time_scaled(1.0 / settings.speed), limits.slowed(settings.speed)
     for _ in range(SLOWED):
         trajectory = Trajectory.of(motion, path[0], path[-1], settings.rate)
-        factor = kept.stretch(trajectory.peaks())
+        factor = kept.time_scale(trajectory.peaks())
         if factor <= 1.0 + ROUNDING:
             return trajectory
-        motion = motion.stretched(MORE * factor)
+        motion = motion.time_scaled(MORE * factor)
     raise InvalidInputError(
         f"a motion still exceeds the arm's limits after it was slowed down {SLOWED} times, to"
         f" {motion.duration:g} s"

@@ -1,5 +1,5 @@
-"""Motions of the hand along a straight line: the joint path is smooth in the way of the hand, and
-the hand has its own limits of speed and acceleration."""
+"""Motions of the hand along a straight line: the joint path is smooth in the path length of the
+hand, and the hand has its own limits of speed and acceleration."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class HandSpeed:
 
 @dataclass(frozen=True, eq=False)
 class PathMotion:
-    """A motion along a path that is given by the way of the hand.
+    """A motion along a path that is given by the path length of the hand.
 
     Attributes:
         path: joint positions (n,) over the way [m], with continuous second derivatives.
@@ -63,15 +63,15 @@ class PathMotion:
         """Time from start to end [s]."""
         return self.profile.duration
 
-    def stretched(self, factor: float) -> PathMotion:
+    def time_scaled(self, factor: float) -> PathMotion:
         """The same way in `factor` times the time."""
-        return PathMotion(self.path, self.profile.stretched(factor))
+        return PathMotion(self.path, self.profile.time_scaled(factor))
 
     def at(self, time: Array) -> tuple[Array, Array, Array, Array]:
         """Position, velocity, acceleration and jerk, each (T, n), at times (T,) [s]."""
         s, v, a, j = self.profile.at(time)
-        way = np.clip(s[:, 0], 0.0, self.path.x[-1])
-        q, q1, q2, q3 = (self.path(way, order) for order in range(4))
+        length = np.clip(s[:, 0], 0.0, self.path.x[-1])
+        q, q1, q2, q3 = (self.path(length, order) for order in range(4))
         return q, q1 * v, q2 * v**2 + q1 * a, q3 * v**3 + 3.0 * q2 * v * a + q1 * j
 
     def peaks(self, rate: float) -> tuple[Array, Array, Array]:
@@ -120,7 +120,7 @@ def time_line(
         for motion in sorted(slow, key=lambda motion: motion.duration):
             if line.is_good(motion.path, settings.straightness, settings.line_deviation, is_free):
                 return motion
-    least = np.diff(line.way) / max(hand.speed, np.finfo(float).tiny)
+    least = np.diff(line.travel) / max(hand.speed, np.finfo(float).tiny)
     return time_polyline(rows, limits, deviation=POLYLINE_DEVIATION, is_free=is_free, least=least)
 
 
@@ -130,14 +130,14 @@ def _fastest(
     """The fastest motion found along a path, and whether the hand has its full speed."""
     length = float(path.x[-1])
     best = PathMotion(path, hand.over(length))
-    stretch = limits.stretch(best.peaks(rate)) / SLACK
-    if stretch <= 1.0:
+    time_scale = limits.time_scale(best.peaks(rate)) / SLACK
+    if time_scale <= 1.0:
         return best, True
-    best = best.stretched(stretch)
-    for share in np.geomspace(1.0, 1.0 / stretch, TRIES)[1:]:
+    best = best.time_scaled(time_scale)
+    for share in np.geomspace(1.0, 1.0 / time_scale, TRIES)[1:]:
         motion = PathMotion(path, hand.over(length, float(share)))
         if motion.duration < best.duration:
-            factor = limits.stretch(motion.peaks(rate)) / SLACK
-            motion = motion.stretched(max(1.0, factor))
+            factor = limits.time_scale(motion.peaks(rate)) / SLACK
+            motion = motion.time_scaled(max(1.0, factor))
             best = min(best, motion, key=lambda candidate: candidate.duration)
     return best, False

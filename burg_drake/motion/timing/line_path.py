@@ -31,18 +31,18 @@ LEVER = 0.1
 
 @dataclass(frozen=True, eq=False)
 class LinePath:
-    """A straight way of the hand, with an arm that does not go straight in joint space.
+    """A straight segment of the hand's path, with an arm that does not go straight in joint space.
 
     Attributes:
         rows: (K, n) joint positions along it.
         X_AH: (K, 4, 4) hand poses there.
-        way: (K,) rising: how far the hand is from the first row [m].
+        travel: (K,) rising: how far the hand is from the first row [m].
         kinematics: the arm, with limits that leave the margin, or reach to the rows.
     """
 
     rows: Array
     X_AH: Array
-    way: Array
+    travel: Array
     kinematics: ArmKinematics
 
     @classmethod
@@ -60,11 +60,12 @@ class LinePath:
     @property
     def length(self) -> float:
         """The hand's way [m]."""
-        return float(self.way[-1])
+        return float(self.travel[-1])
 
     def paths(self, smoother: bool) -> Iterator[CubicSpline]:
-        """Joint positions by the way of the hand [m]: first a spline that is close to the rows;
-        then, if they are wanted, smoother and smoother ones; last one that is closer to the line.
+        """Joint positions by the path length of the hand [m]: first a spline that is close to the
+        rows; then, if they are wanted, smoother and smoother ones; last one that is closer to the
+        line.
         """
         wanted = [(SPACING, 0.0), *((SPACING, weight) for weight in SMOOTHING if smoother)]
         for spacing, weight in (*wanted, (FINE_SPACING, 0.0)):
@@ -76,9 +77,9 @@ class LinePath:
         """A spline with its knots on the line; None if the arm does not get there."""
         count = max(4, int(np.ceil(self.length / spacing))) + 1
         share = np.linspace(0.0, 1.0, count)[:, None]
-        way = share[:, 0] * self.length
+        travel = share[:, 0] * self.length
         straight = self.rows[0] + share * (self.rows[-1] - self.rows[0])
-        near = np.stack([np.interp(way, self.way, joint) for joint in self.rows.T], axis=1)
+        near = np.stack([np.interp(travel, self.travel, joint) for joint in self.rows.T], axis=1)
         X_AH = np.repeat(self.X_AH[:1], count, axis=0)
         X_AH[:, :3, 3] += share * (self.X_AH[-1, :3, 3] - self.X_AH[0, :3, 3])
         knots = straight.copy()
@@ -88,7 +89,7 @@ class LinePath:
         knots[1:-1], met = solve_ik(
             self.kinematics, X_AH[1:-1], knots[1:-1], iterations=ITERATIONS, tolerance=TOLERANCE
         )
-        return CubicSpline(way, knots) if met.all() else None
+        return CubicSpline(travel, knots) if met.all() else None
 
     def is_good(
         self, path: CubicSpline, straightness: float, deviation: float, is_free: IsFree | None
@@ -140,9 +141,9 @@ def extremes(path: CubicSpline) -> tuple[Array, Array]:
 def line_error(X_AH: Array, X_A0: Array, X_A1: Array) -> float:
     """Largest distance of hand poses (N, 4, 4) from the straight line between two poses [m]; a turn
     away from the first counts with a lever of `LEVER`."""
-    way = X_A1[:3, 3] - X_A0[:3, 3]
+    segment = X_A1[:3, 3] - X_A0[:3, 3]
     offset = X_AH[:, :3, 3] - X_A0[:3, 3]
-    along = offset @ way / max(float(way @ way), np.finfo(float).tiny)
-    gap = np.linalg.norm(offset - np.clip(along, 0.0, 1.0)[:, None] * way, axis=1)
+    along = offset @ segment / max(float(segment @ segment), np.finfo(float).tiny)
+    gap = np.linalg.norm(offset - np.clip(along, 0.0, 1.0)[:, None] * segment, axis=1)
     turn = np.linalg.norm(rotation_vector(X_AH[:, :3, :3] @ X_A0[:3, :3].T), axis=1)
     return float(np.maximum(gap, LEVER * turn).max())

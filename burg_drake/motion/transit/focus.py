@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, content_hash, kept, rng_from
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.ik import ArmLinks
 from burg_drake.station.diagram import StationDiagram
 
@@ -53,13 +53,13 @@ def postures_over_objects(
 
     def make() -> Arrays:
         q = random_postures(home, lower, upper, DRAWN, rng_from("burg_drake postures over objects"))
-        return {"q": q[_look_at(links, frame, X_FG, objects, q)]}
+        return {"q": q[_aimed_at(links, frame, X_FG, objects, q)]}
 
     asked = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
-    return np.asarray(kept("postures", content_hash(*asked), make)["q"])
+    return np.asarray(cached("postures", content_hash(*asked), make)["q"])
 
 
-def _look_at(
+def _aimed_at(
     links: ArmLinks, frame: int, X_FG: Array, objects: list[Array], q: Array
 ) -> NDArray[np.bool_]:
     """(N,) whether the hand looks at one of the objects in postures (N, n)."""
@@ -71,9 +71,9 @@ def _look_at(
         p_WG, ahead = poses.place(frame, points).swapaxes(0, 1)
         approach = ahead - p_WG
         for p_WO in objects:
-            way = p_WO.astype(np.float32)[:, None] - p_WG
-            distance = np.sqrt((way * way).sum(axis=0))
-            along = (way * approach).sum(axis=0)
+            offset = p_WO.astype(np.float32)[:, None] - p_WG
+            distance = np.sqrt((offset * offset).sum(axis=0))
+            along = (offset * approach).sum(axis=0)
             near = (distance > NEAREST) & (distance < FARTHEST)
             looks[block] |= near & (along > COSINE * distance)
     return looks

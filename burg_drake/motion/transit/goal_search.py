@@ -42,14 +42,14 @@ def search_from_goals(
     trees = _Trees(goals[roots], guess)
     for _ in range(ROUNDS):
         new = trees.grow(roadmap, edges, _samples(trees.q, lower, upper, rng))
-        for node, entry in _meetings(roadmap, edges, trees.q, new, guess):
+        for node, entry in _connections(roadmap, edges, trees.q, new, guess):
             chain = trees.chain(node)
             corners = np.concatenate([roadmap.q[entry][None], trees.q[chain]])
             if edges.first_blocked(corners) is not None:
                 continue
-            way = roadmap.way(entry)
-            if way is not None:
-                return int(roots[chain[-1]]), np.concatenate([way, corners[1:]])
+            path = roadmap.path(entry)
+            if path is not None:
+                return int(roots[chain[-1]]), np.concatenate([path, corners[1:]])
     return None
 
 
@@ -62,7 +62,7 @@ def _samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> 
     return drawn
 
 
-def _meetings(
+def _connections(
     roadmap: Roadmap, edges: EdgeChecker, q: Array, new: NDArray[np.intp], guess: bool
 ) -> list[tuple[int, int]]:
     """New nodes and nodes of the roadmap between which the screen finds a free segment, the

@@ -60,20 +60,20 @@ class HomeTree:
         """
         goals = np.asarray(goals, dtype=float)
         for index in range(len(goals)):
-            (way,) = self._by_segments(goals[index : index + 1])
-            if way is not None:
-                return index, way
+            (path,) = self._by_segments(goals[index : index + 1])
+            if path is not None:
+                return index, path
         return self._search(goals)
 
     def connect_each(self, goals: Array) -> list[Array | None]:
         """A free way to each of several goals (K, n), with few batches of the fast tier; what is
         found for one does not depend on the others. See `connect`."""
         goals = np.asarray(goals, dtype=float)
-        ways = self._by_segments(goals)
-        for index in (k for k, way in enumerate(ways) if way is None):
+        paths = self._by_segments(goals)
+        for index in (k for k, path in enumerate(paths) if path is None):
             found = self._search(goals[index : index + 1])
-            ways[index] = None if found is None else found[1]
-        return ways
+            paths[index] = None if found is None else found[1]
+        return paths
 
     def _search(self, goals: Array) -> tuple[int, Array] | None:
         return search_from_goals(self.roadmap, self.edges, goals, self._lower, self._upper)
@@ -81,12 +81,12 @@ class HomeTree:
     def _by_segments(self, goals: Array) -> list[Array | None]:
         """Ways that end with a segment from home or from a near node, for each goal (K, n)."""
         near = [self.roadmap.near(goal, FIRST + THEN) for goal in goals]
-        ways = self._over(goals, [nodes[:FIRST] for nodes in near])
-        left = [k for k, way in enumerate(ways) if way is None]
+        paths = self._over(goals, [nodes[:FIRST] for nodes in near])
+        left = [k for k, way in enumerate(paths) if way is None]
         rest = [np.append(nodes[FIRST:][nodes[FIRST:] != 0], 0) for nodes in near]
-        for k, way in zip(left, self._over(goals[left], [rest[k] for k in left]), strict=True):
-            ways[k] = way
-        return ways
+        for k, path in zip(left, self._over(goals[left], [rest[k] for k in left]), strict=True):
+            paths[k] = path
+        return paths
 
     def _over(self, goals: Array, nodes: list[NDArray[np.intp]]) -> list[Array | None]:
         """Ways over some nodes, for each goal: the shortest segment first among the proven ones."""
@@ -100,17 +100,17 @@ class HomeTree:
         owner = np.repeat(np.arange(len(goals)), counts)[order]
         node = np.concatenate(nodes)
         goals_first = np.unique(owner, return_index=True)[1]
-        self.roadmap.look_ahead(node[order[goals_first]])
-        ways: list[Array | None] = []
+        self.roadmap.check_ahead(node[order[goals_first]])
+        paths: list[Array | None] = []
         for k, goal in enumerate(goals):
             confirmed = (
-                self.roadmap.way(int(node[edge]))
+                self.roadmap.path(int(node[edge]))
                 for edge in order[owner == k]
                 if self.edges.confirm(q_a, q_b, screened, edge)
             )
-            way = next((way for way in confirmed if way is not None), None)
-            ways.append(None if way is None else np.concatenate([way, goal[None]]))
-        return ways
+            path = next((way for way in confirmed if way is not None), None)
+            paths.append(None if path is None else np.concatenate([path, goal[None]]))
+        return paths
 
     def shortcut(self, path: Array) -> Array:
         """A way with the same ends that is no longer; see `motion.transit.shortcutting`."""

@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from burg_drake.core import Array, Arrays, content_hash, kept, rng_from
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.collision import EdgeChecker
 from burg_drake.motion.transit.focus import random_postures
 
@@ -67,7 +67,7 @@ class Roadmap:
         self._edges = edges
         near = np.empty((0, len(home))) if focus is None else focus
         asked = (edges.content, home, lower, upper, near, seed, nodes)
-        arrays = kept(
+        arrays = cached(
             "roadmap",
             content_hash(*asked),
             lambda: _laid_out(edges, home, lower, upper, near, seed, nodes),
@@ -86,12 +86,12 @@ class Roadmap:
         distance = (np.abs(self.q - q) * self.scale).sum(axis=1)
         return np.argsort(distance, kind="stable")[:count]
 
-    def look_ahead(self, nodes: NDArray[np.intp]) -> None:
-        """Judges the edges of the ways that `way` will look at first, with one batch of the fast
+    def check_ahead(self, nodes: NDArray[np.intp]) -> None:
+        """Judges the edges of the ways that `path` will look at first, with one batch of the fast
         tier; the verdicts are the same."""
         reached = nodes[np.isfinite(self.distance[nodes])]
-        ways = (pairwise(self._chain(int(node))) for node in dict.fromkeys(reached.tolist()))
-        asked = {(min(edge), max(edge)) for way in ways for edge in way}
+        paths = (pairwise(self._chain(int(node))) for node in dict.fromkeys(reached.tolist()))
+        asked = {(min(edge), max(edge)) for path in paths for edge in path}
         new = np.array(sorted(asked - self._free - self._blocked), dtype=np.intp).reshape(-1, 2)
         q_a, q_b = self.q[new[:, 0]], self.q[new[:, 1]]
         screened = self._edges.screen(q_a, q_b)
@@ -99,7 +99,7 @@ class Roadmap:
             free = self._edges.confirm(q_a, q_b, screened, k)
             (self._free if free else self._blocked).add((first, second))
 
-    def way(self, node: int) -> Array | None:
+    def path(self, node: int) -> Array | None:
         """The shortest free way to a node: (M, n) corners from home, or None."""
         while np.isfinite(self.distance[node]):
             chain = self._chain(node)

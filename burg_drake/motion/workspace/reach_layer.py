@@ -18,8 +18,8 @@ from burg_drake.core import (
     Array,
     Arrays,
     InvalidInputError,
+    cached,
     content_hash,
-    kept,
     rot_z,
     rotation_from_rpy,
 )
@@ -123,10 +123,10 @@ def reach_from_above(
             found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
             return np.array([one.outcome is None for one in found]).reshape(-1, yaws)
 
-        return {"reached": asked_where_needed(len(y), len(x), yaws, ask)}
+        return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
 
     asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
-    return ReachLayer(x, y, height, yaw, kept("reach-layer", asked, make)["reached"], cell)
+    return ReachLayer(x, y, height, yaw, cached("reach-layer", asked, make)["reached"], cell)
 
 
 @lru_cache(maxsize=2)
@@ -153,7 +153,7 @@ def require_arm(station: Station) -> None:
         )
 
 
-def asked_where_needed(
+def answers_by_refinement(
     rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
     """(Y, X, K) answers, of which `ask` is asked those that do not follow from their neighbours.

@@ -17,9 +17,9 @@ from burg_drake.core import (
     Array,
     Arrays,
     InvalidInputError,
+    cached,
     content_hash,
     inverse,
-    kept,
     rot_z,
     rotation_from_rpy,
     swap_fingers,
@@ -185,7 +185,7 @@ def map_reachability(
         return {"reached": reached}
 
     asked = content_hash(world_content(scene, station), vars(settings))
-    reached = kept("reachability", asked, make)["reached"]
+    reached = cached("reachability", asked, make)["reached"]
     shape = len(heights), len(y), len(x), len(tilt)
     return ReachabilityMap(x, y, heights, tilt, R_WG, reached.reshape(shape), cell)
 

@@ -31,7 +31,7 @@ from burg_drake.scene.document import (
     as_scene,
     placed_vertices,
 )
-from burg_drake.station.checks import require_sound_scene
+from burg_drake.station.checks import require_valid_scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import Station, StationLike, as_station, seen_share
 from burg_drake.station.world import HandFigures, check_hand
@@ -101,7 +101,7 @@ def inspect_station(
     scene = None if scene is None else as_scene(scene)
     hand = check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     if scene is not None:
-        require_sound_scene(scene, station)
+        require_valid_scene(scene, station)
     scene = scene or empty_scene()
     seen = {
         name: seen_share(camera, station, scene.board)

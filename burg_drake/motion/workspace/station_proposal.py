@@ -21,7 +21,7 @@ from burg_drake.motion.workspace.reachability import ReachabilitySettings
 from burg_drake.motion.workspace.station_check import inspect_station
 from burg_drake.motion.workspace.usable_arm import require_usable_arm
 from burg_drake.scene.document import TOUCH_TOLERANCE, Scene, placed_vertices
-from burg_drake.station.checks import require_sound_scene
+from burg_drake.station.checks import require_valid_scene
 from burg_drake.station.document import (
     Obstacle,
     Station,
@@ -122,7 +122,7 @@ def find_built_in(scene: Scene) -> tuple[Station | None, dict[str, str]]:
     Raises:
         InvalidInputError: the scene can stand nowhere: its objects overlap, for example.
     """
-    require_sound_scene(scene, _without_arm(scene, Path("station.yaml")))
+    require_valid_scene(scene, _without_arm(scene, Path("station.yaml")))
     misfits: dict[str, str] = {}
     for name in sorted(builtin_names("stations"), key=lambda name: name != "panda_tabletop"):
         station = load_station(name)
@@ -159,7 +159,7 @@ def misfit(scene: Scene, station: Station) -> str:
             if _depth(placed[name], p_WB) > TOUCH_TOLERANCE:
                 return f"its {obstacle!r} would stand in {name!r}"
     try:
-        require_sound_scene(scene, station)
+        require_valid_scene(scene, station)
         far = require_usable_arm(scene, station)
     except InvalidInputError as error:
         return str(error).removeprefix(f"{scene.path}: ").removeprefix(f"{station.path}: ")

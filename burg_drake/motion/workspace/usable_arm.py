@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core import Arrays, kept
+from burg_drake.core import Arrays, cached
 from burg_drake.motion.workspace.arm_span import ArmSpan, unreachable_objects
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station, world_content
@@ -34,6 +34,6 @@ def require_usable_arm(scene: Scene, station: Station) -> tuple[str, ...]:
         span = usable_span(scene, station)
         return {"p_WJ": span.p_WJ, "radius": np.array(span.radius)}
 
-    found = kept("usable-arm", world_content(scene, station), check)
+    found = cached("usable-arm", world_content(scene, station), check)
     span = ArmSpan(found["p_WJ"], float(found["radius"]))
     return tuple(unreachable_objects(span, scene, station).values())

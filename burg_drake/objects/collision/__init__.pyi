@@ -5,9 +5,9 @@ from .decomposition import (
     given_pieces as given_pieces,
 )
 from .fit import (
-    coarse_note as coarse_note,
-    coarseness as coarseness,
     describe_fit as describe_fit,
+    deviation as deviation,
+    deviation_warning as deviation_warning,
     measure_fit as measure_fit,
 )
 from .primitive import primitive_mesh as primitive_mesh

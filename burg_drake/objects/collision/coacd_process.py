@@ -62,8 +62,8 @@ def run_coacd(
     if child.returncode in (-signal.SIGINT, -signal.SIGTERM):
         raise KeyboardInterrupt
     if child.returncode != 0:
-        said = child.stderr.decode(errors="replace").strip().splitlines() or ["no message"]
-        raise DecompositionFailed(f"CoACD ended with code {child.returncode}: {said[-1]}")
+        output = child.stderr.decode(errors="replace").strip().splitlines() or ["no message"]
+        raise DecompositionFailed(f"CoACD ended with code {child.returncode}: {output[-1]}")
     with np.load(io.BytesIO(child.stdout), allow_pickle=False) as result:
         parts = [result[f"part{i}"] for i in range(int(result["count"]))]
         return parts, float(result["seconds"])

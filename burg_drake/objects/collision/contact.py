@@ -21,7 +21,7 @@ from pathlib import Path
 import trimesh
 
 from burg_drake.core import MeshError
-from burg_drake.objects.collision.fit import surface_distance, union_of
+from burg_drake.objects.collision.fit import surface_distance, union_mesh
 from burg_drake.objects.collision.primitive import fit_primitive, nearest_primitive
 from burg_drake.objects.library import ContactGeometry, ContactKind, Fit, write_piece
 from burg_drake.objects.meshes import decimated
@@ -59,7 +59,7 @@ def contact_geometry(
         return _mesh(surface, closed, folder), (CONTACT_FILE,)
     if kind in ("pieces", "compliant_pieces"):
         return ContactGeometry(kind=kind), ()
-    volume = float(surface.volume) if closed else float(union_of(pieces).volume)
+    volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
     found = fit_primitive(surface, volume)
     if found is not None:
         primitive, fit = found

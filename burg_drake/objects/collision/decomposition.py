@@ -113,10 +113,10 @@ def joined_parts(parts: Sequence[Array], budget: float) -> list[Array]:
 
     cost = {(i, j): added(i, j) for i in points for j in points if i < j}
     while cost:
-        (i, j), price = min(cost.items(), key=lambda item: (item[1], item[0]))
-        if price > left:
+        (i, j), added_volume = min(cost.items(), key=lambda item: (item[1], item[0]))
+        if added_volume > left:
             break
-        left -= max(price, 0.0)
+        left -= max(added_volume, 0.0)
         new = max(points) + 1
         hull = convex_hull(np.vstack([points.pop(i), points.pop(j)]))
         del volume[i], volume[j]

@@ -54,14 +54,14 @@ def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volu
     Raises:
         MeshError: a part is not closed.
     """
-    union = union_of(parts)
+    union = union_mesh(parts)
     there = _farthest(_points(surface)[0], union)
     points, normals = _points(union)
     back = _farthest(points[_reached(points, normals, parts)], surface)
     return Fit(volume_ratio=float(union.volume / volume), hausdorff=max(there, back))
 
 
-def coarseness(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
+def deviation(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
     """How coarse convex pieces are: above 1, grasps are judged on another shape than the object's.
 
     Args:
@@ -74,9 +74,9 @@ def coarseness(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
     return max(fit.volume_ratio / MOST_VOLUME, fit.hausdorff / (MOST_DEVIATION * diagonal))
 
 
-def coarse_note(fit: Fit | None, diagonal: float) -> str:
+def deviation_warning(fit: Fit | None, diagonal: float) -> str:
     """What to say of coarse pieces; empty if they are not."""
-    if fit is None or coarseness(fit, diagonal) <= 1.0:
+    if fit is None or deviation(fit, diagonal) <= 1.0:
         return ""
     return (
         f"the convex pieces are coarse: {describe_fit(fit)}; a lower decomposition.threshold"
@@ -89,7 +89,7 @@ def describe_fit(fit: Fit) -> str:
     return f"{fit.volume_ratio:.2f} times the volume, up to {1e3 * fit.hausdorff:.1f} mm off"
 
 
-def union_of(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+def union_mesh(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     """The boundary of the union of closed parts.
 
     Raises:

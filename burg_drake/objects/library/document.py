@@ -93,7 +93,7 @@ class ObjectLibrary:
         """
         path = self.root / relative
         if not path.is_file():
-            what = "is missing" if not path.exists() else "is no file"
+            what = "is missing" if not path.exists() else "is not a file"
             raise UnknownNameError(f"{path} {what}; build the library {self.name!r} again")
         return path
 

@@ -54,10 +54,10 @@ def mesh_hash(mesh: str | Path | trimesh.Trimesh) -> str:
     """
     if isinstance(mesh, trimesh.Trimesh):
         image = texture_image(mesh)
-        look: list[Any] = [face_palette(mesh), source_rgba(mesh)]
+        appearance: list[Any] = [face_palette(mesh), source_rgba(mesh)]
         if image is not None:
-            look += [np.asarray(mesh.visual.uv), np.asarray(image)]
-        return content_hash(np.asarray(mesh.vertices), np.asarray(mesh.faces), look)
+            appearance += [np.asarray(mesh.visual.uv), np.asarray(image)]
+        return content_hash(np.asarray(mesh.vertices), np.asarray(mesh.faces), appearance)
     path = Path(mesh)
     _check_file(path)
     try:

@@ -12,8 +12,8 @@ from scipy.spatial.distance import pdist
 
 from burg_drake.core import Array
 from burg_drake.objects.meshes.cleaning import HOLE, Repaired, boundary_loops, signed_volume
-from burg_drake.objects.meshes.solids import is_closed, parted, united
-from burg_drake.objects.meshes.walls import default_wall, rims, separated, wall
+from burg_drake.objects.meshes.solids import is_closed, split_bodies, united
+from burg_drake.objects.meshes.walls import default_wall, rims, separated, thickened
 
 Openings = Literal["wall", "close"]
 
@@ -42,7 +42,7 @@ def close_openings(result: Repaired, openings: Openings, thickness: float | None
         return None
     loops = boundary_loops(mesh)
     if not len(rims(mesh)):
-        apart = parted(mesh)
+        apart = split_bodies(mesh)
         if apart is not None:
             result.mesh = apart
             result.sentences.append("parted bodies that touch along edges")
@@ -79,15 +79,15 @@ def close_openings(result: Repaired, openings: Openings, thickness: float | None
 def _thicken(
     result: Repaired, rest: trimesh.Trimesh, sheets: trimesh.Trimesh, thickness: float, opening: str
 ) -> bool:
-    walled = wall(sheets, thickness)
+    walled = thickened(sheets, thickness)
     if walled is None:
         return False
     parts = [p for p in (rest, walled) if len(p.faces)]
-    result.mesh, said = united(trimesh.util.concatenate(parts))
+    result.mesh, repairs = united(trimesh.util.concatenate(parts))
     result.sentences += [
         f"made the open surface ({opening}) a wall {1e3 * thickness:.3g} mm thick; wall_thickness"
         " sets it, openings='close' caps it instead",
-        *said,
+        *repairs,
     ]
     return True
 

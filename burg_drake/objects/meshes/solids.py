@@ -84,7 +84,7 @@ def united(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     ]
 
 
-def parted(surface: trimesh.Trimesh) -> trimesh.Trimesh | None:
+def split_bodies(surface: trimesh.Trimesh) -> trimesh.Trimesh | None:
     """A surface whose bodies touch along edges, with these edges doubled so that it counts as
     closed; None if it is not that."""
     manifold = _manifold(surface)
@@ -120,14 +120,14 @@ def decimated(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh
     if len(best.faces) > max(max_faces, USEFUL * len(surface.faces)):
         return surface, [f"left at {len(surface.faces)} faces, as it is too rough to decimate"]
     step = max(1, len(surface.vertices) // MEASURED)
-    away = farthest(surface.vertices[::step], best)
+    away = one_sided_hausdorff(surface.vertices[::step], best)
     return best, [
         f"decimated from {len(surface.faces)} to {len(best.faces)} faces,"
         f" at most {1e3 * max(away, RESOLVED):.2g} mm away"
     ]
 
 
-def farthest(points: Array, surface: trimesh.Trimesh) -> float:
+def one_sided_hausdorff(points: Array, surface: trimesh.Trimesh) -> float:
     """Largest distance of points (N, 3) from a surface [m], exact above `RESOLVED`.
 
     The distance to the faces of the nearest samples is an upper bound. The points are measured

@@ -36,7 +36,7 @@ def default_wall(mesh: trimesh.Trimesh) -> float:
     return min(DEFAULT_WALL, WALL_SHARE * float(np.linalg.norm(mesh.extents)))
 
 
-def wall(sheet: trimesh.Trimesh, thickness: float) -> trimesh.Trimesh | None:
+def thickened(sheet: trimesh.Trimesh, thickness: float) -> trimesh.Trimesh | None:
     """A closed wall, half its thickness on either side of an open surface.
 
     Where more than two faces meet at an edge, each sheet ends there with a rim of its own, and the

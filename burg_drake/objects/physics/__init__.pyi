@@ -1,4 +1,4 @@
-from .landscape import Landscape as Landscape
+from .landscape import PotentialLandscape as PotentialLandscape
 from .mass import (
     DEFAULT_DENSITY as DEFAULT_DENSITY,
     Solid as Solid,

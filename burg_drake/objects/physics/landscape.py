@@ -101,7 +101,7 @@ class NeutralEquilibrium:
         return float(np.arccos(np.clip(near, -1.0, 1.0)))
 
 
-class Landscape:
+class PotentialLandscape:
     """Facets of the hull, what they topple to and what lies between them.
 
     Args:

@@ -13,12 +13,12 @@ from burg_drake.objects.library import StablePose
 from burg_drake.objects.physics.landscape import (
     ROLL_MARGIN,
     TILT_MARGIN,
-    Landscape,
     NeutralEquilibrium,
+    PotentialLandscape,
 )
 from burg_drake.objects.physics.symmetry import SymmetryTest
 
-NEAR = TILT_MARGIN
+NEAR_ANGLE = TILT_MARGIN
 """What is tilted from a pose by less than this is in the pose [rad]; as for quasi-static poses, of
 which those parted by a smaller tilt are one."""
 
@@ -46,7 +46,7 @@ class PoseClasses:
     def __init__(
         self,
         poses: Sequence[StablePose],
-        landscape: Landscape,
+        landscape: PotentialLandscape,
         surface: Callable[[], trimesh.Trimesh],
         p_OOcm: Array,
     ) -> None:
@@ -72,12 +72,12 @@ class PoseClasses:
         """
         angles = [self.angle(k, down) for k in range(len(self.poses))]
         k = int(np.argmin(angles))
-        if angles[k] <= NEAR:
+        if angles[k] <= NEAR_ANGLE:
             return k, angles[k]
         lowest = self.landscape.basin(down)
         level = float(self.landscape.height(lowest))
         height = float(self.landscape.height(down))
-        if angle_between(lowest, down) > NEAR and height * np.cos(ROLL_MARGIN) > level:
+        if angle_between(lowest, down) > NEAR_ANGLE and height * np.cos(ROLL_MARGIN) > level:
             return None
         for k in np.argsort([angle_between(known, lowest) for known in self.downs]).tolist():
             if angle_between(self.downs[k], lowest) < SAME_FACET:

@@ -36,9 +36,9 @@ def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
     if not (np.isfinite(thickness) and thickness > 0.0):
         raise InvalidInputError(f"wall_thickness is {thickness:g} m; it must be above 0")
     room = _room(surface)
-    moved = surface.vertices - thickness * offsets(surface)
-    inner = trimesh.Trimesh(moved, surface.faces[:, ::-1], process=False)
-    fits = folded(surface, moved) <= FOLDED and signed_volume(inner) < 0.0
+    offset = surface.vertices - thickness * offsets(surface)
+    inner = trimesh.Trimesh(offset, surface.faces[:, ::-1], process=False)
+    fits = folded(surface, offset) <= FOLDED and signed_volume(inner) < 0.0
     if 2.0 * thickness > room or not fits:
         most = min(0.5 * room, thickness)
         raise InvalidInputError(

@@ -18,7 +18,7 @@ import trimesh
 from burg_drake.core import Array, make_pose
 from burg_drake.core.documents import Pose
 from burg_drake.objects.library import StablePose
-from burg_drake.objects.physics.landscape import Landscape, RestingFacet
+from burg_drake.objects.physics.landscape import PotentialLandscape, RestingFacet
 from burg_drake.objects.physics.symmetry import SymmetryTest
 
 MIN_PROBABILITY = 0.01
@@ -36,7 +36,7 @@ def stable_poses(surface: trimesh.Trimesh, support: Array, p_OOcm: Array) -> tup
     Returns:
         At least one pose; probabilities sum to one.
     """
-    landscape = Landscape(support, p_OOcm)
+    landscape = PotentialLandscape(support, p_OOcm)
     classes = _merge_symmetric(landscape.minima(), surface, p_OOcm)
     most = max(c.probability for c in classes)
     kept = [c for c in classes if c.probability >= min(MIN_PROBABILITY, most)]

@@ -13,7 +13,7 @@ from .polygons import (
     convex_polygon as convex_polygon,
     distances as distances,
     no_fit_polygon as no_fit_polygon,
-    without_short_sides as without_short_sides,
+    simplified as simplified,
 )
 from .sweep import (
     ConvexShapes as ConvexShapes,

@@ -6,17 +6,17 @@ import numpy as np
 
 from burg_drake.core import Array
 from burg_drake.scene.arrangement.occupancy import (
-    CERTAIN,
+    BOX_TOLERANCE,
     OccupiedBoard,
     StandingObject,
+    free_distance,
     random_place,
-    travel,
 )
 from burg_drake.scene.arrangement.polygons import exit_distance
 
 CLOSE = (0.002, 0.010)
 """Between shadows that are close to each other [m]: too little for a finger."""
-START = 1e-4
+START_GAP = 1e-4
 """What is pushed against others starts with its shadow that far from theirs [m]."""
 
 
@@ -43,18 +43,18 @@ def place_beside(
     direction = np.array([np.cos(angle), np.sin(angle)])
     around = partner.shadow.forbids(turned.shadow)
     middle = partner.shadow.middle - turned.shadow.middle
-    way = exit_distance(around, middle, direction)
-    way += START if touching else rng.uniform(*CLOSE)
-    place = middle + way * direction
+    distance = exit_distance(around, middle, direction)
+    distance += START_GAP if touching else rng.uniform(*CLOSE)
+    place = middle + distance * direction
     if touching:
-        return _pushed(occupied, partner, turned, place, -direction, way)
+        return _moved_to_contact(occupied, partner, turned, place, -direction, distance)
     one = turned.shifted(place)
     if occupied.in_bounds(one) and occupied.is_free(turned, place, CLOSE[0]):
         return one
     return None
 
 
-def _pushed(
+def _moved_to_contact(
     occupied: OccupiedBoard,
     partner: StandingObject,
     turned: StandingObject,
@@ -66,14 +66,16 @@ def _pushed(
     it touches others; None if the place is not free, it touches nothing within the limit [m], or it
     ends off the board."""
     one = turned.shifted(place)
-    least, most = occupied.ways_in_bounds(one, direction)
-    if least > min(most, limit) + CERTAIN or most < -CERTAIN:
+    least, most = occupied.exit_distances(one, direction)
+    if least > min(most, limit) + BOX_TOLERANCE or most < -BOX_TOLERANCE:
         return None
     if not occupied.is_free(turned, place, 0.0):
         return None
     along = np.array([*direction, 0.0])
-    way = travel(one.pieces, occupied.pieces(partner), along, limit, enough=least - CERTAIN)
-    if way == limit:
+    distance = free_distance(
+        one.pieces, occupied.pieces(partner), along, limit, stop_below=least - BOX_TOLERANCE
+    )
+    if distance == limit:
         return None
-    one = one.shifted(way * direction)
+    one = one.shifted(distance * direction)
     return one if occupied.in_bounds(one) else None

@@ -23,9 +23,9 @@ from burg_drake.scene.arrangement.occupancy import (
     OccupiedBoard,
     StandingObject,
     draw_pose,
-    instance,
     random_place,
-    standing,
+    stand_in_pose,
+    to_instance,
 )
 from burg_drake.scene.arrangement.packing import density, pack
 from burg_drake.scene.document import LAYOUTS, TRIES, Board, Layout, PoseChoice
@@ -153,7 +153,7 @@ def _scattered(
         used = 0
         while used < tries and places[i] is None:
             some = min(PLACES, tries - used) if layout in GAPS else 1
-            turned = standing(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
+            turned = stand_in_pose(shape, pose, rng.uniform(0.0, 2.0 * np.pi))
             if layout in GAPS:
                 places[i], some = random_place(occupied, turned, rng, GAPS[layout], some)
             else:
@@ -205,7 +205,7 @@ def _heap(
         found = None
         for _ in range(tries):
             used += 1
-            found = heap.hang(shapes[one.object], rng)
+            found = heap.place_above(shapes[one.object], rng)
             if found is not None:
                 break
         X_SO.append(found)
@@ -223,7 +223,7 @@ def _result(
 ) -> Arrangement:
     placed = zip(wanted, X_SO, strict=True)
     return Arrangement(
-        tuple(instance(one, X) for one, X in placed if X is not None),
+        tuple(to_instance(one, X) for one, X in placed if X is not None),
         tuple(one.name for one, X in zip(wanted, X_SO, strict=True) if X is None),
         tries,
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from burg_drake.core import Array
-from burg_drake.scene.arrangement.polygons import Sides, no_fit_polygon_of_sides, reach
+from burg_drake.scene.arrangement.polygons import Sides, no_fit_polygon_of_sides, support_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Footprint:
     @cached_property
     def reach(self) -> Array:
         """How far it reaches along `polygons.DIRECTIONS`."""
-        return reach(self.corners)
+        return support_values(self.corners)
 
     @cached_property
     def sides(self) -> Sides:

@@ -11,7 +11,7 @@ import numpy as np
 
 from burg_drake.core import Array, make_pose, rot_z, rotation_from_quaternion
 from burg_drake.scene.arrangement.object_shapes import ObjectShape
-from burg_drake.scene.arrangement.occupancy import OccupiedBoard, travel
+from burg_drake.scene.arrangement.occupancy import OccupiedBoard, free_distance
 
 START_GAP = 0.004
 """Between the hulls of what is dropped, and below the lowest [m]."""
@@ -41,7 +41,7 @@ class Heap:
         covered = sum(np.pi * np.ptp(s.corners, axis=0).mean() ** 2 / 4.0 for s in shapes)
         self._radius = np.sqrt(covered / np.pi / LAYERS)
 
-    def hang(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
+    def place_above(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
         """Hangs an object above the spot, in a random orientation, as low as it goes.
 
         Returns:
@@ -58,18 +58,18 @@ class Heap:
             xy = self._size / 2.0 + radius * np.array([np.cos(angle), np.sin(angle)]) - middle
             if (xy + lower[:2] < 0.0).any() or (xy + upper[:2] > self._size).any():
                 continue
-            X_SO = self._let_down(shape, R_SO, xy, float(lower[2]))
+            X_SO = self._lowered(shape, R_SO, xy, float(lower[2]))
             if best is None or X_SO[2, 3] < best[2, 3]:
                 best = X_SO
         if best is not None:
             self._below.append(shape.hull.moved(best))
         return best
 
-    def stand(self, shape: ObjectShape, X_SO: Array) -> None:
+    def add(self, shape: ObjectShape, X_SO: Array) -> None:
         """An object is there, at a pose (4, 4) in S."""
         self._below.append(shape.hull.moved(X_SO))
 
-    def hang_low(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
+    def place_low(self, shape: ObjectShape, rng: np.random.Generator) -> Array | None:
         """Hangs an object where its centre of mass gets lowest, anywhere on the board, in one of
         its stable poses: so it finds what room there is beside a heap.
 
@@ -85,21 +85,21 @@ class Heap:
             least, most = MARGIN - lower[:2], self._size - MARGIN - upper[:2]
             if (least > most).any():
                 continue
-            X_SO = self._let_down(shape, R_SO, rng.uniform(least, most), float(lower[2]))
+            X_SO = self._lowered(shape, R_SO, rng.uniform(least, most), float(lower[2]))
             height = float((X_SO @ (*entry.mass_properties.center_of_mass, 1.0))[2])
             if height < lowest:
                 best, lowest = X_SO, height
         if best is not None:
-            self.stand(shape, best)
+            self.add(shape, best)
         return best
 
-    def _let_down(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
+    def _lowered(self, shape: ObjectShape, R_SO: Array, xy: Array, lowest: float) -> Array:
         """The pose of an object that is let down on what is below."""
         top = max((float(body.points[..., 2].max()) for body in self._below), default=0.0)
         start = max(top, 0.0) + START_GAP - lowest
         X_SO = make_pose(R_SO, (*xy, start))
-        way = travel(
+        distance = free_distance(
             shape.hull.moved(X_SO), self._below, np.array([0.0, 0.0, -1.0]), start + lowest
         )
-        X_SO[2, 3] -= max(0.0, way - START_GAP)
+        X_SO[2, 3] -= max(0.0, distance - START_GAP)
         return X_SO

@@ -13,7 +13,7 @@ from burg_drake.geometry import convex_hull
 from burg_drake.objects.collision import primitive_mesh
 from burg_drake.objects.library import ObjectLibrary, Primitive
 from burg_drake.scene.arrangement.footprint import Footprint
-from burg_drake.scene.arrangement.polygons import convex_polygon, turned, without_short_sides
+from burg_drake.scene.arrangement.polygons import convex_polygon, rotated, simplified
 from burg_drake.scene.arrangement.sweep import ConvexShapes
 from burg_drake.scene.document import read_vertices
 
@@ -47,9 +47,9 @@ class Outline:
         """A polygon around the hull that has fewer corners."""
         return Footprint(self.corners[self.count :])
 
-    def turned(self, yaw: float) -> Outline:
+    def rotated(self, yaw: float) -> Outline:
         """The same, turned by a yaw [rad] about the origin."""
-        return Outline(turned(self.corners, yaw), self.count, self.height)
+        return Outline(rotated(self.corners, yaw), self.count, self.height)
 
     def moved(self, offset: Array) -> Outline:
         """The same, moved by an offset (2,) [m]."""
@@ -92,8 +92,8 @@ class ObjectShape:
 
     def _outline(self, X_SO: Array) -> Outline:
         corners = transform_points(X_SO, self.corners)
-        hull = without_short_sides(convex_polygon(corners[:, :2]), ROUNDED)
-        coarse = without_short_sides(hull, COARSE)
+        hull = simplified(convex_polygon(corners[:, :2]), ROUNDED)
+        coarse = simplified(hull, COARSE)
         return Outline(np.concatenate([hull, coarse]), len(hull), float(corners[:, 2].max()))
 
     @property

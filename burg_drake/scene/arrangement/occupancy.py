@@ -19,7 +19,7 @@ from burg_drake.scene.document import Board, Instance, PoseChoice
 
 HEADROOM = 0.005
 """Between an object and what hangs above it [m]."""
-CERTAIN = 1e-9
+BOX_TOLERANCE = 1e-9
 """Boxes around shadows that are apart by so much more than is asked for [m] speak for these,
 however distances are rounded."""
 
@@ -95,10 +95,10 @@ class StandingObject:
         return self.shape.pieces.moved(self.X_SO)
 
 
-def standing(shape: ObjectShape, pose: int, yaw: float) -> StandingObject:
+def stand_in_pose(shape: ObjectShape, pose: int, yaw: float) -> StandingObject:
     """An object in its k-th stable pose, turned by a yaw [rad] about its centre of mass, which is
     above the board's corner."""
-    return StandingObject(shape, pose, yaw, np.zeros(2), shape.outline(pose).turned(yaw))
+    return StandingObject(shape, pose, yaw, np.zeros(2), shape.outline(pose).rotated(yaw))
 
 
 class OccupiedBoard:
@@ -112,39 +112,39 @@ class OccupiedBoard:
         self.size = np.array(board.size)
         self.obstacles = [ConvexShapes.of([p], [np.zeros((3, 3))]) for p in obstacles]
         self.standing: list[StandingObject] = []
-        self._there: list[tuple[Footprint, float, float]] = []
+        self._footprints: list[tuple[Footprint, float, float]] = []
         for p in obstacles:
             low, high = float(p[:, 2].min()), float(p[:, 2].max())
-            self._there.append((Footprint(convex_polygon(p[:, :2])), low, high))
+            self._footprints.append((Footprint(convex_polygon(p[:, :2])), low, high))
 
     def add(self, one: StandingObject) -> None:
         """Something stands there from now on."""
         self.standing.append(one)
-        self._there.append((one.shadow, 0.0, one.outline.height))
+        self._footprints.append((one.shadow, 0.0, one.outline.height))
 
     def in_bounds(self, one: StandingObject) -> bool:
         """Whether nothing of it is beyond the board's edge."""
         shadow = one.shadow
         return bool((shadow.low >= 0.0).all() and (shadow.high <= self.size).all())
 
-    def ways_in_bounds(self, one: StandingObject, direction: Array) -> tuple[float, float]:
+    def exit_distances(self, one: StandingObject, direction: Array) -> tuple[float, float]:
         """After which ways along a unit vector (2,) nothing of it may be beyond the board's edge
         [m]: from the former to the latter, and never if that is less."""
         with np.errstate(divide="ignore", invalid="ignore"):
             to_low = -one.shadow.low / direction
             to_high = (self.size - one.shadow.high) / direction
-        ways = np.sort([to_low, to_high], axis=0)
-        return float(ways[0].max()), float(ways[1].min())
+        distances = np.sort([to_low, to_high], axis=0)
+        return float(distances[0].max()), float(distances[1].min())
 
     def are_free(self, one: StandingObject, offsets: Array, least: float) -> NDArray[np.bool_]:
         """Whether what it covers, moved by offsets (N, 2) [m], is at least that far [m] from all
         that is there, (N,); what hangs above it and what is below the board is not in the way."""
         free = np.ones(len(offsets), dtype=bool)
         low, high = offsets + one.shadow.low, offsets + one.shadow.high
-        for shadow, bottom, top in self._there:
+        for shadow, bottom, top in self._footprints:
             if bottom <= one.outline.height + HEADROOM and top >= 0.0:
                 beside = np.maximum(shadow.low - high, low - shadow.high).max(axis=1)
-                near = np.flatnonzero(free & (beside < least + CERTAIN))
+                near = np.flatnonzero(free & (beside < least + BOX_TOLERANCE))
                 if len(near):
                     free[near] = distances(shadow.forbids(one.shadow), offsets[near]) >= least
         return free
@@ -159,21 +159,23 @@ class OccupiedBoard:
         return [first.pieces, *others, *self.obstacles]
 
 
-def travel(
+def free_distance(
     moving: ConvexShapes,
     still: Sequence[ConvexShapes],
     direction: Array,
     limit: float,
-    enough: float = -np.inf,
+    stop_below: float = -np.inf,
 ) -> float:
     """How far shapes can be moved together along a unit vector (3,), at most `limit`, until they
-    touch others [m]; anything shorter than `enough`, once that is known to be too far."""
+    touch others [m]; anything shorter than `stop_below`, once that is known to be too far."""
     for others in still:
-        if limit < enough:
+        if limit < stop_below:
             break
         i, j = np.indices((len(moving), len(others))).reshape(2, -1)
-        ways = contact_distances(moving, others, (i, j), direction, limit, enough=enough)
-        limit = min(limit, float(ways.min()))
+        distances = contact_distances(
+            moving, others, (i, j), direction, limit, stop_below=stop_below
+        )
+        limit = min(limit, float(distances.min()))
     return limit
 
 
@@ -221,7 +223,7 @@ def random_place(
     return (one.shifted(offsets[first]), first + 1) if free[first] else (None, tries)
 
 
-def instance(wanted: ObjectRequest, X_SO: Array) -> Instance:
+def to_instance(wanted: ObjectRequest, X_SO: Array) -> Instance:
     """An instance whose pose can be read; it has no name of its own if that is its object's."""
     name = "" if wanted.name == wanted.object else wanted.name
     return Instance(name=name, object=wanted.object, X_SO=Pose.readable(X_SO))

@@ -17,7 +17,7 @@ import numpy as np
 from burg_drake.core import Array
 from burg_drake.scene.arrangement.footprint import Footprint
 from burg_drake.scene.arrangement.object_shapes import ObjectShape
-from burg_drake.scene.arrangement.occupancy import OccupiedBoard, StandingObject, standing
+from burg_drake.scene.arrangement.occupancy import OccupiedBoard, StandingObject, stand_in_pose
 from burg_drake.scene.arrangement.polygons import (
     DIRECTIONS,
     area,
@@ -57,7 +57,7 @@ def pack(
         best, best_area = None, np.inf
         yaws = _yaws(shape.outline(pose).hull.corners, occupied.standing)
         for yaw in yaws[:MOST_YAWS] if occupied.standing else yaws[quarter : quarter + 1]:
-            turned = standing(shape, pose, yaw)
+            turned = stand_in_pose(shape, pose, yaw)
             place, place_area = _best_place(occupied, turned)
             if place is not None and place_area < best_area - 1e-12:
                 best, best_area = place, place_area

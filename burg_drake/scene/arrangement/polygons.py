@@ -57,7 +57,7 @@ def convex_polygon(points: Array) -> Array:
     return np.asarray(points[ConvexHull(points).vertices])
 
 
-def turned(polygon: Array, angle: float) -> Array:
+def rotated(polygon: Array, angle: float) -> Array:
     """A polygon turned counter-clockwise about the origin by an angle [rad]."""
     c, s = np.cos(angle), np.sin(angle)
     x, y = polygon[:, 0], polygon[:, 1]
@@ -108,12 +108,12 @@ def support_area(reach: Array) -> Array:
     return np.asarray((reach * side).sum(axis=-1) / 2.0)
 
 
-def reach(polygon: Array) -> Array:
+def support_values(polygon: Array) -> Array:
     """(K,) largest `direction . corner` of a polygon along `DIRECTIONS` [m]."""
     return np.asarray((polygon @ DIRECTIONS.T).max(axis=0))
 
 
-def without_short_sides(polygon: Array, most: float) -> Array:
+def simplified(polygon: Array, most: float) -> Array:
     """A polygon with fewer corners around a polygon: short sides are left out, and their
     neighbours go on until they meet.
 

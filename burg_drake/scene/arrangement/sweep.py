@@ -108,7 +108,7 @@ def contact_distances(
     direction: Array,
     limit: float,
     offsets: Array | None = None,
-    enough: float = -np.inf,
+    stop_below: float = -np.inf,
 ) -> Array:
     """Ways of pairs of shapes, the first one moved, until they touch.
 
@@ -116,10 +116,10 @@ def contact_distances(
         moving, still: the shapes.
         pairs: (K,) indices of the former and of the latter; the two must be apart.
         direction: (3,) unit vector along which the former go.
-        limit: ways that are longer do not count [m].
+        limit: longer distances do not count [m].
         offsets: (K, 3) by which the first of each pair starts beside its place; nowhere if None.
-        enough: once a way is known to be shorter than this [m], nothing more is asked: it may still
-            be shorter than what is returned, which is below this, too.
+        stop_below: once a distance is known to be shorter than this [m], the search ends: it may
+            still be shorter than what is returned, which is below this, too.
 
     Returns:
         Ways (K,) [m], after which the gap between the two surfaces is at most some 1e-7 m, either
@@ -134,15 +134,15 @@ def contact_distances(
     meets = (low[:, :2] <= 0.0).all(axis=1) & (high >= 0.0).all(axis=1) & (low[:, 2] <= limit)
     order = np.flatnonzero(meets)
     order = order[np.argsort(low[order, 2])]
-    ways = np.full(len(shift), np.inf)
+    distances = np.full(len(shift), np.inf)
     for block in (order[i : i + BLOCK] for i in range(0, len(order), BLOCK)):
-        if low[block[0], 2] > limit or limit < enough:
+        if low[block[0], 2] > limit or limit < stop_below:
             break
         across = low[block, :2], high[block, :2]
         i, j = pairs[0][block], pairs[1][block]
-        ways[block] = _least(a, b, i, j, shift[block], across, limit, enough)
-        limit = min(limit, float(ways[block].min()))
-    return ways
+        distances[block] = _smallest_distances(a, b, i, j, shift[block], across, limit, stop_below)
+        limit = min(limit, float(distances[block].min()))
+    return distances
 
 
 def _basis(direction: Array) -> Array:
@@ -159,7 +159,7 @@ def _cross(u: Array, v: Array) -> Array:
     return np.array([b * f - c * e, c * d - a * f, a * e - b * d])
 
 
-def _least(
+def _smallest_distances(
     a: ConvexShapes,
     b: ConvexShapes,
     i: Indices,
@@ -167,11 +167,11 @@ def _least(
     shift: Array,
     across: tuple[Array, Array],
     limit: float,
-    enough: float,
+    stop_below: float,
 ) -> Array:
     """Ways (K,) of a few pairs along z; infinite above the limit. M reaches from the first to the
     second of `across` (K, 2)."""
-    ways = np.full(len(i), np.inf)
+    distances = np.full(len(i), np.inf)
     middle = np.column_stack([(across[0] + across[1]) / 2.0, np.zeros(len(i))])
     half = np.maximum((across[1] - across[0]) / 2.0, GRAZE)
     scale = np.column_stack([1.0 - GRAZE / half, np.ones(len(i))])
@@ -190,11 +190,11 @@ def _least(
         foreign = (np.where(basis[..., 2] == PRICE, share, 0.0) > LEFT).any(axis=1)
         ends = height - lower <= ACCURACY
         done = ends & ~foreign & (lower >= -ACCURACY)
-        ways[left[done]] = lower[done]
-        limit = min(limit, float(ways[left].min(initial=np.inf)))
-        short = ~foreign & (height < enough) & (height >= 0.0)  # what is behind is below 0
+        distances[left[done]] = lower[done]
+        limit = min(limit, float(distances[left].min(initial=np.inf)))
+        short = ~foreign & (height < stop_below) & (height >= 0.0)  # what is behind is below 0
         if short.any():
-            ways[left[short]] = height[short]
+            distances[left[short]] = height[short]
             break
         goes_on = ~ends & (lower <= limit)
         if not goes_on.any():
@@ -203,8 +203,8 @@ def _least(
         left, basis = left[goes_on], basis[goes_on]
         basis[np.arange(len(left)), _leaving(fall, share[goes_on])] = w[goes_on]
     else:
-        ways[left] = np.maximum(lower[goes_on], 0.0)
-    return np.where(ways <= limit, np.maximum(ways, 0.0), np.inf)
+        distances[left] = np.maximum(lower[goes_on], 0.0)
+    return np.where(distances <= limit, np.maximum(distances, 0.0), np.inf)
 
 
 class _Triangles:

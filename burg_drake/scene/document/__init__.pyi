@@ -13,7 +13,7 @@ from .markers import (
     marker_dictionary as marker_dictionary,
 )
 from .origin import (
-    Ingredients as Ingredients,
+    SamplingProvenance as SamplingProvenance,
     SceneOrigin as SceneOrigin,
 )
 from .recipe import SceneRecipe as SceneRecipe
@@ -35,7 +35,7 @@ from .validation import (
     length_text as length_text,
     placed_vertices as placed_vertices,
     read_vertices as read_vertices,
-    require_sound as require_sound,
+    require_no_errors as require_no_errors,
     surface_vertices as surface_vertices,
     validate_scene as validate_scene,
 )

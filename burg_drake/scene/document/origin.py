@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 from burg_drake.scene.document.recipe import SceneRecipe
 
-DECISIVE = ("burg_drake", "drake", "numpy", "scipy")
+DECIDING_VERSIONS = ("burg_drake", "drake", "numpy", "scipy")
 """Software whose versions decide about scenes."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ingredients:
+class SamplingProvenance:
     """What scenes are made with, besides their numbers.
 
     Attributes:
@@ -27,9 +27,9 @@ class Ingredients:
     station_content: str
     versions: dict[str, str] = field(default_factory=dict)
 
-    def differences(self, other: Ingredients) -> list[str]:
+    def differences(self, other: SamplingProvenance) -> list[str]:
         """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those in `DECISIVE`."""
+        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`."""
         found = []
         for name, mine in vars(self.recipe).items():
             theirs = getattr(other.recipe, name)
@@ -41,7 +41,7 @@ class Ingredients:
             mine, theirs = (getattr(one, f"{name}_content") for one in (self, other))
             if mine != theirs:
                 found.append(f"the {name} has content {mine} there, {theirs} here")
-        for name in DECISIVE:
+        for name in DECIDING_VERSIONS:
             mine, theirs = (one.versions.get(name, "unknown") for one in (self, other))
             if mine != theirs:
                 found.append(f"{name} is {mine} there, {theirs} here")
@@ -49,7 +49,7 @@ class Ingredients:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneOrigin(Ingredients):
+class SceneOrigin(SamplingProvenance):
     """How one scene was made.
 
     Attributes:

@@ -106,7 +106,7 @@ def validate_scene(
     return tuple(issues)
 
 
-def require_sound(scene: Scene, issues: Iterable[SceneIssue]) -> None:
+def require_no_errors(scene: Scene, issues: Iterable[SceneIssue]) -> None:
     """Refuses a scene with errors; warnings pass.
 
     Raises:
@@ -191,7 +191,7 @@ def _ground_issue(
             message=f"{name!r} is in the ground: it reaches {length_text(-lowest)} below the board;"
             f" z = {height:.4f} would put it on top",
         )
-    if lowest > HOVER_TOLERANCE and not any(_may_support(other, extent) for other in others):
+    if lowest > HOVER_TOLERANCE and not any(_can_support(other, extent) for other in others):
         return SceneIssue(
             instance=name,
             kind="hovering",
@@ -209,7 +209,7 @@ def _contact_error(scene: Scene, name: str) -> float:
     return fit.hausdorff if fit is not None else 0.0
 
 
-def _may_support(below: Extent, above: Extent) -> bool:
+def _can_support(below: Extent, above: Extent) -> bool:
     """Whether the bounding boxes let `above` rest on `below`."""
     overlap = (below.low < above.high) & (above.low < below.high)
     lowest = above.low[2]

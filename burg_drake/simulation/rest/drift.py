@@ -28,7 +28,7 @@ from burg_drake.simulation.rest.still_check import (
 )
 from burg_drake.station.diagram import StationDiagram
 
-LOOKS = ((0.1, 0.2, 0.1), (0.2, 0.4, 0.4), (0.5, 1.0, 0.4), (1.0, 2.0, 0.8))
+CHECK_TIMES = ((0.1, 0.2, 0.1), (0.2, 0.4, 0.4), (0.5, 1.0, 0.4), (1.0, 2.0, 0.8))
 """From when to when paces are measured [s]; before, all yields to its load that was let go from
 rounded poses. And the share of the way that a settled scene may go in `STILL_DURATION`: what would
 go less far stays, and what would go further by the last look does not."""
@@ -76,15 +76,15 @@ def predict_drift(
     """
     watch = _Watch(built)
     watch.freeze_all_but(built.free if among is None else among)
-    for start, end, share in LOOKS:
-        ways = watch.look(start, end)
-        watch.freeze_all_but([n for n, way in ways.items() if not _is_within(way, share)])
-        if not watch.awake or (once and not all(map(has_stayed, ways.values()))):
+    for start, end, share in CHECK_TIMES:
+        shifts = watch.check_between(start, end)
+        watch.freeze_all_but([n for n, shift in shifts.items() if not _is_within(shift, share)])
+        if not watch.awake or (once and not all(map(has_stayed, shifts.values()))):
             break
     doubtful = frozenset(watch.awake)
     kept = {name: built.X_WO(name) for name in built.free if name not in doubtful}
-    last = LOOKS[-1][-1]
-    moving = {n: _mean_speed(ways[n]) for n in watch.awake if not _is_within(ways[n], last)}
+    last = CHECK_TIMES[-1][-1]
+    moving = {n: _mean_speed(shifts[n]) for n in watch.awake if not _is_within(shifts[n], last)}
     return DriftPrediction(moving, kept | watch.on_table(), doubtful)
 
 
@@ -113,21 +113,21 @@ class _Watch:
                 freeze(self._built, self._root, island)
         self._islands = [i for i in self._islands if not chosen.isdisjoint(i)]
 
-    def look(self, start: float, end: float) -> dict[str, Displacement]:
+    def check_between(self, start: float, end: float) -> dict[str, Displacement]:
         """How far what is awake would move altogether, by its pace from `start` to `end` [s]."""
         built, context = self._built, self._context
         bodies = {name: self._plant.get_body(built.free[name]) for name in self.awake}
         self._simulator.AdvanceTo(start)
         before = {name: body_place(body, context) for name, body in bodies.items()}
         self._simulator.AdvanceTo(end)
-        X_WO, left, ways = poses(built, context), STILL_DURATION - end, {}
+        X_WO, left, shifts = poses(built, context), STILL_DURATION - end, {}
         for name, body in bodies.items():
             speed = mean_speed(before[name], body_place(body, context), end - start)
             now = displacement_from_document(built, name, X_WO[name])
-            ways[name] = Displacement(
+            shifts[name] = Displacement(
                 now.distance + left * speed.speed, now.angle + left * speed.turning
             )
-        return ways
+        return shifts
 
     def on_table(self) -> dict[str, Array]:
         """Poses in the world of what is awake and still on the table."""
@@ -136,10 +136,10 @@ class _Watch:
         return {name: X_WO[name] for name in above}
 
 
-def _is_within(way: Displacement, share: float) -> bool:
+def _is_within(shift: Displacement, share: float) -> bool:
     """Whether a way is shorter than a share of what a settled scene may go; NaN is not."""
-    return way.distance < share * STILL_DISTANCE and way.angle < share * STILL_ANGLE
+    return shift.distance < share * STILL_DISTANCE and shift.angle < share * STILL_ANGLE
 
 
-def _mean_speed(way: Displacement) -> BodySpeed:
-    return BodySpeed(way.distance / STILL_DURATION, way.angle / STILL_DURATION)
+def _mean_speed(shift: Displacement) -> BodySpeed:
+    return BodySpeed(shift.distance / STILL_DURATION, shift.angle / STILL_DURATION)

@@ -18,7 +18,7 @@ from burg_drake.simulation.rest.criterion import BodySpeed, RestCriterion, settl
 from burg_drake.simulation.rest.falling_contacts import compliant_while_falling
 from burg_drake.station.diagram import StationDiagram, soften
 
-STRETCH = 0.5
+BRAKING_INTERVAL = 0.5
 """What falls off the table is looked for at this interval [s]."""
 BRAKING_TIME = 0.1
 """Turning is braked with this time constant [s], as by air and rolling resistance, which Drake does
@@ -85,7 +85,7 @@ def fall(
             simulator,
             built.plant,
             watched,
-            min(STRETCH, time_limit - now),
+            min(BRAKING_INTERVAL, time_limit - now),
             SLOW,
             before_poll=intervene,
         )

@@ -30,9 +30,9 @@ WINDOW = 10
 """Steps between two looks."""
 WINDOW_TIME = WINDOW * RELAXING.time_step
 """The same in seconds."""
-CALM = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
+CALM_SPEED = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
-GROUP_CALM = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
+GROUP_CALM_SPEED = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
 """The same of objects that touch each other, which creep, slower and slower, for long."""
 CALM_WINDOWS = 2
 """So many windows in succession."""
@@ -124,7 +124,7 @@ class _Relaxation:
             place = body_place(body, self.context)
             self._speed[body.index()] = mean_speed(before[body.index()], place, WINDOW_TIME)
         for island in list(self._islands):
-            self._look(island)
+            self._inspect(island)
         return len(self._islands)
 
     def result(self) -> Relaxed:
@@ -139,13 +139,13 @@ class _Relaxation:
                 X_WO[name] = body.EvalPoseInWorld(self.context).GetAsMatrix4()
         return Relaxed(X_WO, frozenset(n for n in X_WO if built.free[n] in together))
 
-    def _look(self, island: _Island) -> None:
+    def _inspect(self, island: _Island) -> None:
         """Takes what has fallen out of an island, and freezes it once it is calm."""
         for index in [i for i in island.bodies if is_below(self._built, self.context, i)]:
             island.bodies.remove(index)
             self._fallen.add(index)
             self._plant.get_body(index).Lock(self.context)
-        limit = CALM if self._alone.issuperset(island.bodies) else GROUP_CALM
+        limit = CALM_SPEED if self._alone.issuperset(island.bodies) else GROUP_CALM_SPEED
         calm = all(is_slower(self._speed[index], limit) for index in island.bodies)
         island.calm = island.calm + 1 if calm else 0
         if island.calm == CALM_WINDOWS:

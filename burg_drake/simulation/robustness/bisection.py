@@ -10,7 +10,7 @@ STRIDE = 1.5
 
 
 def largest_passing(
-    bears: Callable[[float], bool], *, guess: float, low: float, high: float, tolerance: float
+    passes: Callable[[float], bool], *, guess: float, low: float, high: float, tolerance: float
 ) -> float:
     """Searches from a guess in growing or falling strides, then by bisection of the logarithm.
 
@@ -18,7 +18,7 @@ def largest_passing(
     that is larger by at most `tolerance` is not.
 
     Args:
-        bears: whether a load is borne.
+        passes: whether a load is borne.
         guess: where the search starts; the nearer to the limit, the fewer loads are tried.
         low, high: smallest and largest load tried, above 0.
         tolerance: relative, above 0.
@@ -29,7 +29,7 @@ def largest_passing(
     borne, lost = 0.0, math.inf
     load = min(max(guess, low), high)
     while True:
-        if bears(load):
+        if passes(load):
             if load == high:
                 return math.inf
             borne = load

@@ -26,10 +26,10 @@ from burg_drake.simulation.trials import (
 
 REST_SPEED = 0.002
 """A target that moves in the hand slower than this is at rest [m/s]."""
-REST_LOOKS, REST_TIMEOUT = 10, 50
+REST_CHECKS, REST_TIMEOUT = 10, 50
 """The grip is loaded when the target is at rest in the standing hand at so many looks in a row, and
 after so many looks in any case."""
-STEADY_LOOKS = 3
+STEADY_CHECKS = 3
 """A steady load is borne when the target is at rest in the hand at so many looks in a row: what
 slides under an excess of a hundredth of its weight is faster by then."""
 
@@ -71,7 +71,7 @@ class Grip:
         self._state = self._context.get_discrete_state().Clone()
         self._X_GO = self._current_X_GO()
 
-    def bears(
+    def withstands(
         self,
         load: Callable[[float], Array],
         duration: float,
@@ -98,19 +98,19 @@ class Grip:
         self._context.SetDiscreteState(self._state)
         self._trial.simulator.Initialize()
         R_WG = self._trial.hand.X_WG(self._plant_context)[:3, :3]
-        steps_a_look = max(1, round(self._trial.settings.poll / self._step))
-        looks = math.ceil(duration / (steps_a_look * self._step) - 1e-9)
+        steps_per_check = max(1, round(self._trial.settings.poll / self._step))
+        checks = math.ceil(duration / (steps_per_check * self._step) - 1e-9)
         X_GO, at_rest = self._X_GO, 0
         try:
-            for look in range(looks):
-                for k in range(look * steps_a_look, (look + 1) * steps_a_look):
+            for check in range(checks):
+                for k in range(check * steps_per_check, (check + 1) * steps_per_check):
                     self._apply(self.weight * (R_WG @ load((k + 0.5) * self._step)))
                     self._advance_by(1)
                 before, X_GO = X_GO, self._current_X_GO()
                 if not (self._is_touched() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
                 at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
-                if look * steps_a_look * self._step >= steady_from and at_rest >= STEADY_LOOKS:
+                if check * steps_per_check * self._step >= steady_from and at_rest >= STEADY_CHECKS:
                     return True
             return True
         finally:
@@ -138,9 +138,9 @@ class Grip:
         settings = self._trial.settings
         braking = settings.acceleration
         speed = self._trial.hand.lift.get_translation_rate(self._plant_context)
-        looks = math.ceil(speed / (braking * settings.poll))
-        for i in range(looks):
-            self._trial.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / looks)]))
+        checks = math.ceil(speed / (braking * settings.poll))
+        for i in range(checks):
+            self._trial.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / checks)]))
             self._advance()
         self._trial.command("lift", np.zeros(2))
 
@@ -151,7 +151,7 @@ class Grip:
             self._advance()
             before, X_GO = X_GO, self._current_X_GO()
             at_rest = at_rest + 1 if self._is_at_rest(before, X_GO) else 0
-            if at_rest >= REST_LOOKS:
+            if at_rest >= REST_CHECKS:
                 return
 
     def _advance(self) -> None:

@@ -71,7 +71,7 @@ def tug(
     """
 
     def bears(direction: Array, amplitude: float) -> bool:
-        return grip.bears(
+        return grip.withstands(
             lambda t: amplitude * min(1.0, t / settings.tug_rise) * direction,
             settings.tug_rise + settings.tug_time,
             settings.slide,
@@ -104,7 +104,7 @@ def shake(
     omega = 2.0 * np.pi * settings.frequency
 
     def bears(axis: Array, amplitude: float) -> bool:
-        return grip.bears(
+        return grip.withstands(
             lambda t: amplitude * min(1.0, t * settings.frequency) * np.sin(omega * t) * axis,
             settings.periods / settings.frequency,
             settings.slide,
@@ -124,12 +124,12 @@ def _chosen(known: Mapping[str, Array], names: Iterable[str]) -> dict[str, Array
 def _hold_forces(
     grip: Grip,
     directions: Mapping[str, Array],
-    bears: Callable[[Array, float], bool],
+    withstands: Callable[[Array, float], bool],
     settings: LoadSettings,
 ) -> HoldForces:
     found = {
         name: largest_passing(
-            partial(bears, direction),
+            partial(withstands, direction),
             guess=grip.friction_force / grip.weight,
             low=settings.smallest,
             high=settings.largest,

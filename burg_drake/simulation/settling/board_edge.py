@@ -50,7 +50,7 @@ class BoardEdgeGuard:
         self._least, self._most = np.full(2, margin), np.array(scene.board.size) - margin
         self._braking = share * FRICTION * GRAVITY
 
-    def drive(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
+    def push_back(self, context: Context, bodies: Iterable[BodyIndex]) -> None:
         """Gives those that are too far out the speed at which they slide back.
 
         Args:
@@ -63,10 +63,10 @@ class BoardEdgeGuard:
             p_S = transform_points(self._X_SW @ X_WO.GetAsMatrix4(), self._corners[index])[:, :2]
             inwards = np.maximum(0.0, self._least - p_S.min(axis=0))
             outwards = np.maximum(0.0, p_S.max(axis=0) - self._most)
-            way = np.append(inwards - outwards, 0.0)
-            distance = np.linalg.norm(way)
+            shift = np.append(inwards - outwards, 0.0)
+            distance = np.linalg.norm(shift)
             if distance > TOLERANCE and not body.is_locked(context):
-                direction = self._X_WS[:3, :3] @ way / distance
+                direction = self._X_WS[:3, :3] @ shift / distance
                 V_WO = self._plant.EvalBodySpatialVelocityInWorld(context, body)
                 V_WOcm = V_WO.Shift(X_WO.rotation() @ body.default_com())
                 wanted = np.sqrt(2.0 * self._braking * distance)

@@ -66,6 +66,6 @@ def _fallen(
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     reduce_friction(built, FRICTION)
     held = [index for name, index in built.free.items() if name not in falling]
-    herd = BoardEdgeGuard(built, shapes, margin=margin, share=FRICTION)
-    end = fall(built, time_limit, held=held, before_poll=herd.drive)
+    guard = BoardEdgeGuard(built, shapes, margin=margin, share=FRICTION)
+    end = fall(built, time_limit, held=held, before_poll=guard.push_back)
     return placed_scene(built, end.X_WO)

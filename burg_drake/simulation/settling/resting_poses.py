@@ -22,7 +22,7 @@ import numpy as np
 from burg_drake.core import Array, BurgError
 from burg_drake.objects.collision import primitive_mesh
 from burg_drake.objects.library import ObjectLibrary, StablePose
-from burg_drake.objects.physics import Landscape, PoseClasses
+from burg_drake.objects.physics import PoseClasses, PotentialLandscape
 from burg_drake.simulation.settling.drop_test import DropTest
 
 TILTS = 4
@@ -95,7 +95,7 @@ def _outcomes(library: ObjectLibrary, name: str) -> list[_Outcome]:
     """Drops the object on all its poses."""
     entry = library.entry(name)
     p_OOcm = np.array(entry.mass_properties.center_of_mass)
-    landscape = Landscape(support_points(library, name), p_OOcm)
+    landscape = PotentialLandscape(support_points(library, name), p_OOcm)
     classes = PoseClasses(entry.stable_poses, landscape, lambda: library.surface(name), p_OOcm)
     drop = DropTest(library, name, landscape.points + p_OOcm)
     return [_outcome(drop, classes, k) for k in range(len(entry.stable_poses))]
@@ -119,7 +119,7 @@ def _outcome(drop: DropTest, classes: PoseClasses, k: int) -> _Outcome:
     return _Outcome(residual, None, True)
 
 
-def weakest_side(landscape: Landscape, R_SO: Array, tilt: float) -> float:
+def weakest_side(landscape: PotentialLandscape, R_SO: Array, tilt: float) -> float:
     """Azimuth in S towards which a tilt lifts the centre of mass least, or lowers it [rad]."""
     azimuth = 2.0 * np.pi * np.arange(SIDES) / SIDES
     # what points down in O after the tilt is this in the S that is not tilted

@@ -131,27 +131,27 @@ def _at_rest(
     pace = np.inf
     for rounds in itertools.count():
         built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
-        foretold = predict_drift(built, among=suspects, once=rounds == 0)
+        predicted = predict_drift(built, among=suspects, once=rounds == 0)
         if progress is not None:
-            progress(0.0, len(foretold.moving))
-        if not foretold.moving:
+            progress(0.0, len(predicted.moving))
+        if not predicted.moving:
             break
         before = scene
         if rounds == 0:
             reduce_friction(built)
-            relaxed = relax(built, foretold.moving, RELAXING_TIME)
+            relaxed = relax(built, predicted.moving, RELAXING_TIME)
             scene = placed_scene(built, relaxed.X_WO, exact=relaxed.together)
         else:
             beside = touching(built, built.free.values())
-            exact = [name for name in foretold.doubtful if built.free[name] in beside]
-            scene = placed_scene(built, foretold.X_WO, exact)
-        suspects = foretold.doubtful & scene.instances.keys()
-        goes_on = rounds <= 1 or foretold.pace < SLOWER * pace
+            exact = [name for name in predicted.doubtful if built.free[name] in beside]
+            scene = placed_scene(built, predicted.X_WO, exact)
+        suspects = predicted.doubtful & scene.instances.keys()
+        goes_on = rounds <= 1 or predicted.pace < SLOWER * pace
         stays = rounds > 0 and scene.document == before.document  # the first look is a short one
         if rounds == ROUNDS or not goes_on or stays:
             break
-        pace = foretold.pace
-    return scene, foretold.moving
+        pace = predicted.pace
+    return scene, predicted.moving
 
 
 def _require_above(built: StationDiagram) -> None:

@@ -19,10 +19,10 @@ from burg_drake.station.diagram import MountedHand
 
 SPACING = 0.01
 """Hand's way between two looks along the rest of the lift [m]."""
-LITTLE = 0.01
+NEGLIGIBLE_LOAD = 0.01
 """Relative difference of loads that does not count."""
 DIGITS = 3
-"""Of directions: a plan may leave its straight way by half a millimetre."""
+"""Of directions: a plan may leave its straight segment by half a millimetre."""
 
 
 class ArmCarrier:
@@ -37,7 +37,7 @@ class ArmCarrier:
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
         ways: from there on, at least one; the hand goes straight on each.
-        look_ahead: gives what looks along the way ahead, with the target in the hand.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
     def __init__(
@@ -45,32 +45,32 @@ class ArmCarrier:
         trial: GraspTrial,
         target: BodyIndex,
         approach: CommandSequence,
-        ways: Sequence[CommandSequence],
-        look_ahead: Callable[[], ArmLiftClearance],
+        segments: Sequence[CommandSequence],
+        lift_clearance: Callable[[], ArmLiftClearance],
     ) -> None:
         assert isinstance(trial.hand, MountedHand)
         diagram = trial.diagram
         self._trial = trial
         self._mounted = trial.hand
-        self._look_ahead = look_ahead
+        self._lift_clearance = lift_clearance
         self._step = diagram.engine.time_step
         self._plant_context = diagram.plant.GetMyMutableContextFromRoot(trial.context)
         self._port = diagram.diagram.GetInputPort("arm.desired_state")
-        self._approach, self._ways = approach, tuple(ways)
+        self._approach, self._commands = approach, tuple(segments)
         self._gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
-        interval = ways[-1].steps_a_look * self._step
-        self._loads = _loads(ways[-1].p_WG, interval, self._gravity)
-        speed = np.linalg.norm(np.diff(ways[-1].p_WG, axis=0), axis=1)
+        interval = segments[-1].steps_per_check * self._step
+        self._loads = _loads(segments[-1].p_WG, interval, self._gravity)
+        speed = np.linalg.norm(np.diff(segments[-1].p_WG, axis=0), axis=1)
         self._fastest = int(speed.argmax())
         self._touches = RobotContactWatch(diagram, trial.hand.links, target)
-        self._course: CommandSequence | None = None
+        self._current: CommandSequence | None = None
         self._number = 0
         self._start = 0
         self._arrived = False
-        self.approach_looks = approach.looks
-        self.approach_steps = approach.steps_a_look
-        self.segments = tuple(_segment(way) for way in ways)
-        self.lift_time = sum(way.looks for way in ways) * interval
+        self.approach_checks = approach.checks
+        self.approach_steps = approach.steps_per_check
+        self.segments = tuple(_segment(segment) for segment in segments)
+        self.lift_time = sum(segment.checks for segment in segments) * interval
         self.tracking_error = self.tracking_distance = math.nan
 
     @property
@@ -94,11 +94,11 @@ class ArmCarrier:
             self._mounted.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
             trial.simulator.Initialize()
 
-    def lift(self, number: int, look: int) -> None:
+    def lift(self, number: int, check: int) -> None:
         """Follows one of the ways."""
-        if look == 0:
+        if check == 0:
             self._number = number
-            self._follow(self._ways[number])
+            self._follow(self._commands[number])
 
     def stop(self) -> None:
         """Stays where the last way ends."""
@@ -107,79 +107,79 @@ class ArmCarrier:
     def advance_to(self, time: float) -> None:
         """Steps, with a command of its own for each step."""
         context, simulator = self._trial.context, self._trial.simulator
-        if self._course is None:
+        if self._current is None:
             simulator.AdvanceTo(time)
             return
         done, last = self._steps(context.get_time()), self._steps(time)
         for step in range(done + 1, last + 1):
-            self._port.FixValue(context, self._course.at(step - self._start))
+            self._port.FixValue(context, self._current.at(step - self._start))
             simulator.AdvanceTo(step * self._step)
 
     def watch(self, contacts: list[BodyContact]) -> str:
         """Looks at the whole robot's contacts, and at how well it follows its command."""
-        if self._course is not None:
-            self._track(self._course)
-        return self._touches.look(contacts, self._arrived)
+        if self._current is not None:
+            self._track(self._current)
+        return self._touches.update(contacts, self._arrived)
 
-    def gone(self) -> float:
+    def travelled(self) -> float:
         """Of the grasp frame since the beginning of a way as it was commanded [m]."""
         p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
-        p_GG_W = p_WG - self._ways[self._number].p_WG[0]
+        p_GG_W = p_WG - self._commands[self._number].p_WG[0]
         return float(p_GG_W @ self.segments[self._number].direction_W)
 
-    def bears_the_most(self, look: int) -> bool:
+    def carries_full_load(self, check: int) -> bool:
         """Compares what gravity and acceleration of the planned motion have loaded and will.
 
         Not straight up, the load when the hand brakes is another one than when it accelerates, and
         both count.
         """
         polls = self._trial.settings.steady_polls
-        window = self._loads[max(0, look + 1 - polls) : look + 1]
-        ahead = np.append(self._loads[look + 1 :], self._gravity).max()
-        brakes = self.segments[-1].is_straight_up or look >= self._fastest + polls
-        return bool(brakes and ahead <= (1.0 + LITTLE) * window.max())
+        window = self._loads[max(0, check + 1 - polls) : check + 1]
+        ahead = np.append(self._loads[check + 1 :], self._gravity).max()
+        brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
+        return bool(brakes and ahead <= (1.0 + NEGLIGIBLE_LOAD) * window.max())
 
     def is_free_ahead(self) -> bool:
         """Looks along the planned motion."""
-        course = self._ways[-1]
-        look = self._looks_done(course)
-        p_WG = course.p_WG[look:]
+        commands = self._commands[-1]
+        check = self._checks_done(commands)
+        p_WG = commands.p_WG[check:]
         gone = np.append(0.0, np.linalg.norm(np.diff(p_WG, axis=0), axis=1).cumsum())
         marks = np.append(np.arange(SPACING, gone[-1], SPACING), gone[-1])
-        rows = look + np.searchsorted(gone, marks - 1e-9)
-        q = np.array([course.q_at_look(row) for row in rows])
+        rows = check + np.searchsorted(gone, marks - 1e-9)
+        q = np.array([commands.q_at_check(row) for row in rows])
         positions = self._trial.diagram.plant.GetPositions(self._plant_context)
-        return self._look_ahead().is_free(positions, q)
+        return self._lift_clearance().is_free(positions, q)
 
-    def _follow(self, course: CommandSequence | None) -> None:
+    def _follow(self, commands: CommandSequence | None) -> None:
         """Follows a course from now on; without one the last command stays."""
-        self._course = course
+        self._current = commands
         self._start = self._steps(self._trial.context.get_time())
 
     def _steps(self, time: float) -> int:
         return round(time / self._step)
 
-    def _looks_done(self, course: CommandSequence) -> int:
+    def _checks_done(self, commands: CommandSequence) -> int:
         """Looks since the start of the course that is followed."""
         steps = self._steps(self._trial.context.get_time()) - self._start
-        return steps // course.steps_a_look
+        return steps // commands.steps_per_check
 
-    def _track(self, course: CommandSequence) -> None:
-        look = self._looks_done(course)
+    def _track(self, commands: CommandSequence) -> None:
+        check = self._checks_done(commands)
         q = self._mounted.q(self._plant_context)
         p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
-        error = float(np.abs(q - course.q_at_look(look)).max())
-        distance = float(np.linalg.norm(p_WG - course.p_WG[look]))
+        error = float(np.abs(q - commands.q_at_check(check)).max())
+        distance = float(np.linalg.norm(p_WG - commands.p_WG[check]))
         self.tracking_error = float(np.fmax(self.tracking_error, error))
         self.tracking_distance = float(np.fmax(self.tracking_distance, distance))
 
 
-def _segment(course: CommandSequence) -> HandSegment:
-    """The straight way along which a course leads the hand."""
-    p_GG_W = course.p_WG[-1] - course.p_WG[0]
+def _segment(commands: CommandSequence) -> HandSegment:
+    """The straight segment along which a course leads the hand."""
+    p_GG_W = commands.p_WG[-1] - commands.p_WG[0]
     direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), DIGITS)
     direction_W /= np.linalg.norm(direction_W)
-    return HandSegment(direction_W, float(p_GG_W @ direction_W), course.looks)
+    return HandSegment(direction_W, float(p_GG_W @ direction_W), commands.checks)
 
 
 def _loads(p_WG: Array, interval: float, gravity: float) -> Array:

@@ -86,8 +86,8 @@ class ArmTrial(GraspTrial):
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(diagram)
-        self._steps_a_look = max(1, round(settings.poll / engine.time_step))
-        self._rises: dict[BodyIndex, ArmLiftClearance] = {}
+        self.steps_per_check = max(1, round(settings.poll / engine.time_step))
+        self._lift_clearances: dict[BodyIndex, ArmLiftClearance] = {}
 
     def run(
         self,
@@ -147,24 +147,27 @@ class ArmTrial(GraspTrial):
         self.prepare(instance, moving, friction, mass)
         step = self.diagram.engine.time_step
         to_grasp = [plan.transfer, plan.approach] if self._transfer else [plan.approach]
-        steps = 1 if self._transfer else self._steps_a_look
+        steps = 1 if self._transfer else self.steps_per_check
         rest = max(1, round(REST / (steps * step)))
         approach = CommandSequence(to_grasp, step, steps, self._p_WG, rest)
-        ways = [CommandSequence([way], step, self._steps_a_look, self._p_WG) for way in _ways(plan)]
+        segments = [
+            CommandSequence([segment], step, self.steps_per_check, self._p_WG)
+            for segment in _phases_with_target(plan)
+        ]
         plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
-        self.hand.place(plant_context, approach.q_at_look(0))
+        self.hand.place(plant_context, approach.q_at_check(0))
         self.command("arm", approach.at(0))
         self.command("hand", self.hand.opening_command())
         self.simulator.Initialize()
-        look_ahead = partial(self.rise, target)
-        carrier = ArmCarrier(self, target, approach, ways, look_ahead)
+        lift_clearance = partial(self.lift_clearance, target)
+        carrier = ArmCarrier(self, target, approach, segments, lift_clearance)
         return Execution(self, target, moving, carrier)
 
-    def rise(self, target: BodyIndex) -> ArmLiftClearance:
+    def lift_clearance(self, target: BodyIndex) -> ArmLiftClearance:
         """Looks along the way up with a target in the hand."""
-        if target not in self._rises:
-            self._rises[target] = ArmLiftClearance(self.diagram, target)
-        return self._rises[target]
+        if target not in self._lift_clearances:
+            self._lift_clearances[target] = ArmLiftClearance(self.diagram, target)
+        return self._lift_clearances[target]
 
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
         """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
@@ -179,7 +182,7 @@ class ArmTrial(GraspTrial):
         parts = {name: part for name, part in plan.phases.items() if name != "close"}
         if not self._transfer:
             del parts["transfer"]
-        if not _ways(plan):
+        if not _phases_with_target(plan):
             raise InvalidInputError("the plan does not move the hand with what it holds")
         for name, part in parts.items():
             if part.q.shape[1] != joints:
@@ -212,7 +215,7 @@ class ArmTrial(GraspTrial):
         return self._X_WG_at(q)[:, :3, 3]
 
 
-def _ways(plan: Plan) -> list[Trajectory]:
+def _phases_with_target(plan: Plan) -> list[Trajectory]:
     """Those of retreat and lift that move the hand."""
     parts = [plan.retreat, plan.lift]
     return [part for part in parts if part is not None and (part.q[-1] != part.q[0]).any()]

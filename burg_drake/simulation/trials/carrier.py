@@ -11,17 +11,17 @@ from burg_drake.simulation.trials.contacts import BodyContact
 
 @dataclass(frozen=True, eq=False)
 class HandSegment:
-    """A straight way of the hand with the target, from rest to rest.
+    """A straight segment of the hand with the target, from rest to rest.
 
     Attributes:
         direction_W: (3,) unit vector in the world.
         length: [m].
-        looks: at the contacts, up to its end.
+        checks: at the contacts, up to its end.
     """
 
     direction_W: Array
     length: float
-    looks: int
+    checks: int
 
     @property
     def is_straight_up(self) -> bool:
@@ -33,7 +33,7 @@ class Carrier(Protocol):
     """Brings the hand to the grasp and away from it, and watches what is met on the way.
 
     Attributes:
-        approach_looks: looks at the contacts on the way to the grasp; 0 if the hand starts there.
+        approach_checks: looks at the contacts on the way to the grasp; 0 if the hand starts there.
         approach_steps: of the simulation from one of these looks to the next.
         segments: of the way with the target, at least one: the retreat, if there is one, and the
             lift.
@@ -41,7 +41,7 @@ class Carrier(Protocol):
         tracking_error, tracking_distance: see `Margins`; NaN if not measured.
     """
 
-    approach_looks: int
+    approach_checks: int
     approach_steps: int
     segments: tuple[HandSegment, ...]
     lift_time: float
@@ -61,7 +61,7 @@ class Carrier(Protocol):
         """Commands the fingers to close, with the hand standing at the grasp."""
         ...
 
-    def lift(self, number: int, look: int) -> None:
+    def lift(self, number: int, check: int) -> None:
         """Commands the way in one of the segments, counted from 0, from one look, counted from 0
         where the segment begins, to the next."""
         ...
@@ -82,13 +82,13 @@ class Carrier(Protocol):
         """
         ...
 
-    def gone(self) -> float:
+    def travelled(self) -> float:
         """How far the hand has gone in the present segment [m]."""
         ...
 
-    def bears_the_most(self, look: int) -> bool:
+    def carries_full_load(self, check: int) -> bool:
         """Whether the load on the grip was as large as it will ever be during the last looks, up to
-        the end of interval `look` of the last segment."""
+        the end of interval `check` of the last segment."""
         ...
 
     def is_free_ahead(self) -> bool:

@@ -19,13 +19,13 @@ class CommandSequence:
     Args:
         trajectories: at least one; each begins where the one before it ends.
         step: of the simulation [s].
-        steps_a_look: steps from one look at the contacts to the next.
+        steps_per_check: steps from one look at the contacts to the next.
         forward: (K, 3) positions of the grasp frame in the world at arm positions (K, n) [m].
         rest: looks that follow after the end.
 
     Attributes:
-        steps_a_look: as given.
-        looks: from start to end.
+        steps_per_check: as given.
+        checks: from start to end.
         desired: (S + 1, 2 n) positions and velocities, by steps since the start.
         p_WG: (looks + 1, 3) where that leads the grasp frame in the world, by looks [m].
     """
@@ -34,7 +34,7 @@ class CommandSequence:
         self,
         trajectories: Sequence[Trajectory],
         step: float,
-        steps_a_look: int,
+        steps_per_check: int,
         forward: Callable[[Array], Array],
         rest: int = 0,
     ) -> None:
@@ -43,18 +43,18 @@ class CommandSequence:
             count = int(np.ceil(trajectory.duration / step - 1e-6))
             parts.append(_desired(trajectory, step * np.arange(1.0, count + 1.0)))
         self.desired = np.concatenate(parts)
-        self.looks = -(-(len(self.desired) - 1) // steps_a_look) + rest
-        self.steps_a_look = steps_a_look
-        self.p_WG = forward(np.array([self.q_at_look(look) for look in range(self.looks + 1)]))
+        self.checks = -(-(len(self.desired) - 1) // steps_per_check) + rest
+        self.steps_per_check = steps_per_check
+        self.p_WG = forward(np.array([self.q_at_check(check) for check in range(self.checks + 1)]))
 
     def at(self, step: int) -> Array:
         """(2 n,) positions and velocities to be reached at the end of a step since the start."""
         desired: Array = self.desired[min(step, len(self.desired) - 1)]
         return desired
 
-    def q_at_look(self, look: int) -> Array:
+    def q_at_check(self, check: int) -> Array:
         """(n,) desired positions some looks after the start."""
-        return self.at(look * self.steps_a_look)[: self.desired.shape[1] // 2]
+        return self.at(check * self.steps_per_check)[: self.desired.shape[1] // 2]
 
 
 def _desired(trajectory: Trajectory, time: Array) -> Array:

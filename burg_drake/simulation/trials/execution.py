@@ -63,7 +63,7 @@ class Execution:
         self._others = {name: index for name, index in diagram.free.items() if index != target}
         self._still = set(diagram.free.values()) - moving
         self._robot = set(diagram.robot_bodies)
-        self._way = sum(segment.length for segment in carrier.segments)
+        self._path_length = sum(segment.length for segment in carrier.segments)
         self._direction = carrier.segments[0].direction_W
         self._center_start = self._center()
         self._followed = 0.0
@@ -75,10 +75,10 @@ class Execution:
         self._touched = False
         self._blocker = ""
         self._steps = 0
-        self._steps_a_look = max(1, round(self._settings.poll / diagram.engine.time_step))
-        self._creep: list[float] = []
+        self._steps_per_check = max(1, round(self._settings.poll / diagram.engine.time_step))
+        self._creeping_since: list[float] = []
         self._in_free_air = 0.0
-        self._way_blocked = False
+        self._path_blocker = False
         self._left_to_go = 0.0
 
     def run(self) -> TrialResult:
@@ -96,13 +96,13 @@ class Execution:
     def approach(self) -> Outcome | None:
         """Brings the hand to the grasp; None if nothing fixed is in its way."""
         carrier = self._carrier
-        if not carrier.approach_looks:
+        if not carrier.approach_checks:
             return None
         target = self._displacements(self._itself.values())
         carrier.approach()
-        for _ in range(carrier.approach_looks):
+        for _ in range(carrier.approach_checks):
             self.advance(carrier.approach_steps)
-            target.look(self._still)
+            target.update(self._still)
             if self._blocker:
                 break
         self._pushed = self._moved.by_name(self._others) | target.by_name(self._itself)
@@ -137,17 +137,21 @@ class Execution:
         last = len(carrier.segments) - 1
         for number, segment in enumerate(carrier.segments):
             self._turn(segment)
-            for look in range(segment.looks):
-                carrier.lift(number, look)
+            for check in range(segment.checks):
+                carrier.lift(number, check)
                 self.advance()
                 if self._blocker:
                     return Outcome.BLOCKED
                 if not self.contact.any:
                     return Outcome.SLIPPED
-                if number == last and carrier.bears_the_most(look) and self._is_decided(segment):
+                if (
+                    number == last
+                    and carrier.carries_full_load(check)
+                    and self._is_decided(segment)
+                ):
                     return self.held()
         carrier.stop()
-        if self.contact.both and self.followed() >= MINIMUM_LIFT * self._way:
+        if self.contact.both and self.followed() >= MINIMUM_LIFT * self._path_length:
             return None
         return Outcome.SLIPPED
 
@@ -157,14 +161,14 @@ class Execution:
         Unless the whole trial is asked for, the end is early when the grip is steady.
         """
         settings = self._settings
-        self._creep.clear()
+        self._creeping_since.clear()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
             if self._blocker:
                 return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.DROPPED
-            if self._sticks() and not self._trial.diagram.engine.whole_trial:
+            if self._is_held_steadily() and not self._trial.diagram.engine.whole_trial:
                 break
         return None if self.contact.both else Outcome.DROPPED
 
@@ -186,28 +190,28 @@ class Execution:
         carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
         not get faster, in free air and with all others at rest, is held to the end, too.
         """
-        if self._trial.diagram.engine.whole_trial or self._way_blocked:
+        if self._trial.diagram.engine.whole_trial or self._path_blocker:
             return False
-        if not self.contact.both or not (self._sticks() or self._creeps_to_a_halt()):
+        if not self.contact.both or not (self._is_held_steadily() or self._is_coming_to_rest()):
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
-        left = last.length - self._carrier.gone()
-        if self.followed() + left < MINIMUM_LIFT * self._way:
+        left = last.length - self._carrier.travelled()
+        if self.followed() + left < MINIMUM_LIFT * self._path_length:
             return False
-        self._way_blocked = not self._carrier.is_free_ahead()
-        if not self._way_blocked:
+        self._path_blocker = not self._carrier.is_free_ahead()
+        if not self._path_blocker:
             self._left_to_go = left
-        return not self._way_blocked
+        return not self._path_blocker
 
-    def _sticks(self) -> bool:
+    def _is_held_steadily(self) -> bool:
         """Whether the grip has been steady for `steady_time`."""
         settings = self._settings
-        recent = self._creep[-settings.steady_polls :]
+        recent = self._creeping_since[-settings.steady_polls :]
         enough = len(recent) == settings.steady_polls
         return enough and max(recent) <= settings.creep_speed * settings.poll
 
-    def _creeps_to_a_halt(self) -> bool:
+    def _is_coming_to_rest(self) -> bool:
         """Whether the target moves in the hand no faster than before, and not far any more.
 
         Drake's friction is slightly viscous: below its limit a load does not slide but creeps, at a
@@ -215,9 +219,9 @@ class Execution:
         """
         settings = self._settings
         n = settings.steady_polls
-        before, now = sum(self._creep[-2 * n : -n]), sum(self._creep[-n:])
+        before, now = sum(self._creeping_since[-2 * n : -n]), sum(self._creeping_since[-n:])
         ahead = (self._carrier.lift_time + settings.hold_time) / settings.poll
-        enough = len(self._creep) >= 2 * n
+        enough = len(self._creeping_since) >= 2 * n
         return enough and now <= before and now / n * ahead <= settings.creep_distance
 
     def advance(self, steps: int | None = None) -> float:
@@ -230,7 +234,7 @@ class Execution:
             RuntimeError: the simulation failed.
         """
         before = self._time()
-        self._steps += self._steps_a_look if steps is None else steps
+        self._steps += self._steps_per_check if steps is None else steps
         time = self._time()
         while True:
             state = self._context.get_discrete_state().Clone() if self._still else None
@@ -247,14 +251,14 @@ class Execution:
             found = self._trial.neighbours.close_to(found) & self._still
             self._still -= found
             self._trial.release(found, self._still)
-        self._look(contacts)
+        self._record_contacts(contacts)
         return time
 
     def _time(self) -> float:
         """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
         return self._steps * self._trial.diagram.engine.time_step
 
-    def _look(self, contacts: list[BodyContact]) -> None:
+    def _record_contacts(self, contacts: list[BodyContact]) -> None:
         """Takes down what the contacts and poses say."""
         settings, target = self._settings, self._target.index()
         self.contact = finger_contact(contacts, self._trial.hand.fingers, target)
@@ -262,10 +266,10 @@ class Execution:
         X_GO = self.X_GO()
         distance, angle = motion_in_hand(self._X_GO_last, X_GO)
         self._X_GO_last = X_GO
-        if self._moved.look(self._still) <= settings.settled_speed * settings.poll:
-            self._creep.append(max(distance, angle * LEVER))
+        if self._moved.update(self._still) <= settings.settled_speed * settings.poll:
+            self._creeping_since.append(max(distance, angle * LEVER))
         else:
-            self._creep.clear()
+            self._creeping_since.clear()
         self._blocker = self._carrier.watch(contacts)
         free = not touched_from_outside(contacts, self._robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0

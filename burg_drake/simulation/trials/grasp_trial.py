@@ -56,5 +56,5 @@ class GraspTrial(SceneTrial):
             found = begin().run()
             return replace(found, margins=replace(found.margins, clearance=screen.clearance))
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.spoil()
+            self.invalidate()
             return failure(error, screen, self.context.get_time())

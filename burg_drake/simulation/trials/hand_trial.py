@@ -77,7 +77,7 @@ class HandTrial(GraspTrial):
         clearance = HandClearance(diagram)
         super().__init__(diagram, FloatingHand(diagram), settings, clearance, motion)
         self._lock = lock
-        self._rises: dict[BodyIndex, HandLiftClearance] = {}
+        self._lift_clearances: dict[BodyIndex, HandLiftClearance] = {}
 
     def run(
         self,
@@ -106,15 +106,15 @@ class HandTrial(GraspTrial):
         """
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
-        ways = self.ways(X_WG, lift)
-        begin = partial(self.begin, instance, X_WG, ways, friction=friction, mass=mass)
+        paths = self.lift_paths(X_WG, lift)
+        begin = partial(self.begin, instance, X_WG, paths, friction=friction, mass=mass)
         return self.execute(instance, X_WG, begin)
 
     def begin(
         self,
         instance: str,
         X_WG: Array,
-        ways: Sequence[LiftPath] | None = None,
+        paths: Sequence[LiftPath] | None = None,
         *,
         friction: float | None = None,
         mass: float | None = None,
@@ -129,24 +129,24 @@ class HandTrial(GraspTrial):
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world at which the open hand is clear.
-            ways: of the hand with the target; those of the motion if None.
+            paths: of the hand with the target; those of the motion if None.
             friction, mass: as in `run`.
         """
         target = self.diagram.free[instance]
         everything = set(self.diagram.free.values())
         moving = self.neighbours.close_to({target}) if self._lock else everything
         self.prepare(instance, moving, friction, mass)
-        ways = self.ways(X_WG) if ways is None else ways
+        paths = self.lift_paths(X_WG) if paths is None else paths
         plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
         closed = self.clearance.free_travel(X_WG)
-        self.hand.place(plant_context, X_WG, closed, direction_W=ways[0].direction_W)
+        self.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
         self.command("lift", np.zeros(2))
         self.command("hand", self.hand.closing_command())
         self.simulator.Initialize()
-        look_ahead = partial(self.rise, target)
-        return Execution(self, target, moving, LiftCarrier(self, ways, look_ahead))
+        lift_clearance = partial(self.lift_clearance, target)
+        return Execution(self, target, moving, LiftCarrier(self, paths, lift_clearance))
 
-    def ways(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
+    def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
         """Straight ways of the hand with the target.
 
         Args:
@@ -157,22 +157,22 @@ class HandTrial(GraspTrial):
             One or two, each longer than 0.
 
         Raises:
-            InvalidInputError: there is no way at all, or a length is not one.
+            InvalidInputError: the hand would not move, or a length is not one.
         """
         height = self.motion.lift_height if lift is None else lift
         if not 0.0 <= height < math.inf or self.motion.retreat + height <= 0.0:
             raise InvalidInputError(
-                f"lift is {height:g} m; with a retreat of {self.motion.retreat:g} m that is no way"
-                " of the hand; give more than 0"
+                f"lift is {height:g} m and retreat {self.motion.retreat:g} m, with which the hand"
+                " would not move; give more than 0"
             )
-        ways = (
+        paths = (
             LiftPath(-X_WG[:3, 2], self.motion.retreat),
             LiftPath(self.motion.direction_W, height),
         )
-        return tuple(way for way in ways if way.length > 0.0)
+        return tuple(path for path in paths if path.length > 0.0)
 
-    def rise(self, target: BodyIndex) -> HandLiftClearance:
+    def lift_clearance(self, target: BodyIndex) -> HandLiftClearance:
         """Looks along the way ahead with a target in the hand."""
-        if target not in self._rises:
-            self._rises[target] = HandLiftClearance(self.diagram, target)
-        return self._rises[target]
+        if target not in self._lift_clearances:
+            self._lift_clearances[target] = HandLiftClearance(self.diagram, target)
+        return self._lift_clearances[target]

@@ -21,7 +21,7 @@ DOWN = -1e-6
 
 
 class LiftPath(NamedTuple):
-    """A straight way of the hand.
+    """A straight segment of the hand's path.
 
     Attributes:
         direction_W: (3,) unit vector in the world.
@@ -42,35 +42,35 @@ class LiftCarrier:
         trial: a trial that has been brought to its start, with the floating hand at the grasp and
             the joint along the first of the ways.
         ways: of the hand, at least one.
-        look_ahead: gives what looks along the way ahead, with the target in the hand.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
-    approach_looks = approach_steps = 0
+    approach_checks = approach_steps = 0
     tracking_error = tracking_distance = math.nan
     touched = ""
 
     def __init__(
         self,
         trial: SceneTrial,
-        ways: Sequence[LiftPath],
-        look_ahead: Callable[[], HandLiftClearance],
+        paths: Sequence[LiftPath],
+        lift_clearance: Callable[[], HandLiftClearance],
     ) -> None:
         assert isinstance(trial.hand, FloatingHand)
         settings = trial.settings
         self._trial = trial
         self._floating = trial.hand
-        self._look_ahead = look_ahead
+        self._lift_clearance = lift_clearance
         self._plant = trial.diagram.plant
         self._plant_context = self._plant.GetMyMutableContextFromRoot(trial.context)
         self._names = trial.diagram.body_names
         self._hand = set(trial.diagram.robot_bodies)
         self.segments = tuple(
-            HandSegment(*way, _looks(way.length, settings) + (number + 1 < len(ways)))
-            for number, way in enumerate(ways)
+            HandSegment(*way, _check_count(way.length, settings) + (number + 1 < len(paths)))
+            for number, way in enumerate(paths)
         )
-        self.lift_time = sum(settings.time_of(way.length) for way in ways)
+        self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._number = 0
-        self._leaves = False
+        self._start_time = False
         self._X_WG_start = self._floating.X_WG(self._plant_context)
 
     def approach(self) -> None:
@@ -79,19 +79,19 @@ class LiftCarrier:
     def close(self) -> None:
         """The fingers have been closing from the start."""
 
-    def lift(self, number: int, look: int) -> None:
+    def lift(self, number: int, check: int) -> None:
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
         segment, settings = self.segments[number], self._trial.settings
-        self._leaves = True
+        self._start_time = True
         if number != self._number:
             self._number = number
             self._X_WG_start = self._floating.X_WG(self._plant_context)
             self._floating.turn_lift(self._plant_context, segment.direction_W)
             self._trial.simulator.Initialize()
-        looks = _looks(segment.length, settings)
-        top_speed = 2 * segment.length / (looks * settings.poll)
-        speed = top_speed * max(0.0, 1 - abs(2 * look + 1 - looks) / looks)
+        checks = _check_count(segment.length, settings)
+        top_speed = 2 * segment.length / (checks * settings.poll)
+        speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
         self._trial.command("lift", np.array([0.0, speed]))
 
     def stop(self) -> None:
@@ -106,33 +106,33 @@ class LiftCarrier:
         """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
         goes down."""
         fixed = set(self._trial.diagram.fixed.values())
-        if self._leaves and self.segments[self._number].direction_W[2] < DOWN:
+        if self._start_time and self.segments[self._number].direction_W[2] < DOWN:
             fixed.add(self._trial.diagram.table)
         hit = reached(contacts, self._hand, fixed)
         return self._names[min(hit)] if hit else ""
 
-    def gone(self) -> float:
+    def travelled(self) -> float:
         """Position of the joint [m]."""
-        return self._floating.gone(self._plant_context)
+        return self._floating.travelled(self._plant_context)
 
-    def bears_the_most(self, look: int) -> bool:
+    def carries_full_load(self, check: int) -> bool:
         """The hand accelerates in the first half of a segment and brakes in the second. Straight
         up, the first adds to the weight and the second takes away from it. Otherwise both count,
         and standing still is in between."""
-        half = _looks(self.segments[-1].length, self._trial.settings) // 2
+        half = _check_count(self.segments[-1].length, self._trial.settings) // 2
         if self.segments[-1].is_straight_up:
-            return look < half
-        return look >= half + self._trial.settings.steady_polls
+            return check < half
+        return check >= half + self._trial.settings.steady_polls
 
     def is_free_ahead(self) -> bool:
         """Looks along the joint's axis."""
         positions = self._plant.GetPositions(self._plant_context)
         last = self.segments[-1]
-        return self._look_ahead().is_free(
-            self._X_WG_start, positions, last.length - self.gone(), last.direction_W
+        return self._lift_clearance().is_free(
+            self._X_WG_start, positions, last.length - self.travelled(), last.direction_W
         )
 
 
-def _looks(length: float, settings: TrialSettings) -> int:
+def _check_count(length: float, settings: TrialSettings) -> int:
     """Looks on a way of a length [m]: as many to speed up as to brake."""
     return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))

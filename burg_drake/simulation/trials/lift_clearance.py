@@ -19,7 +19,7 @@ GAP = 0.002
 
 
 class HandLiftClearance:
-    """Looks along the straight way ahead of one target in the hand.
+    """Looks along the straight segment ahead of one target in the hand.
 
     Args:
         station_diagram: a diagram built with `robot="hand"`.
@@ -48,22 +48,22 @@ class HandLiftClearance:
         start = plant.get_body(target).floating_positions_start() + 4
         self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
-    def is_free(self, X_WG: Array, positions: Array, way: float, direction_W: Array) -> bool:
+    def is_free(self, X_WG: Array, positions: Array, length: float, direction_W: Array) -> bool:
         """Whether nothing is met on the way.
 
         Args:
             X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
             positions: of the plant, at present.
-            way: how far there is to go [m].
+            length: how far there is to go [m].
             direction_W: (3,) unit vector of the lift.
         """
         self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
         self._plant.SetPositions(self._plant_context, positions)
-        if not self._boxes_meet(way * direction_W):
+        if not self._boxes_meet(length * direction_W):
             return True
-        for gone in np.append(np.arange(STEP, way, STEP), way):
+        for travelled in np.append(np.arange(STEP, length, STEP), length):
             moved = positions.copy()
-            moved[self._places] += gone * np.append(direction_W, 1.0)
+            moved[self._places] += travelled * np.append(direction_W, 1.0)
             self._plant.SetPositions(self._plant_context, moved)
             if self._query().HasCollisions():
                 return False

@@ -38,7 +38,7 @@ class MassCenterTracker:
         """The largest of the peaks [m]; 0 without bodies."""
         return max(self.peaks.values(), default=0.0)
 
-    def look(self, still: Collection[BodyIndex]) -> float:
+    def update(self, still: Collection[BodyIndex]) -> float:
         """Measures; those in `still` are at rest.
 
         Returns:

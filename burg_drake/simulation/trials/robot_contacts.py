@@ -10,7 +10,7 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.simulation.trials.contacts import BodyContact
 from burg_drake.station.diagram import StationDiagram
 
-REFLEX = 20.0
+STOP_FORCE = 20.0
 """Force of the table on the hand at which the robot stops on its way to the grasp [N]: the nominal
 threshold of a Panda's reflex in libfranka's examples (`setCollisionBehavior` in
 generate_joint_velocity_motion.cpp)."""
@@ -39,7 +39,7 @@ class RobotContactWatch:
         self._planned = (target, diagram.table)
         self.first = ""
 
-    def look(self, contacts: Collection[BodyContact], arrived: bool) -> str:
+    def update(self, contacts: Collection[BodyContact], arrived: bool) -> str:
         """Takes down the contacts of a look.
 
         Args:
@@ -50,7 +50,7 @@ class RobotContactWatch:
         Returns:
             What stops the robot: "panda_link5 vs shelf" of a link that touches something fixed or
             another link, "shelf" of the hand; on the way to the grasp `table`, if the hand presses
-            on it with more than `REFLEX`. "" if nothing does.
+            on it with more than `STOP_FORCE`. "" if nothing does.
         """
         stops, on_table = [], np.zeros(3)
         for contact in contacts:
@@ -70,6 +70,6 @@ class RobotContactWatch:
                     on_table += sign * contact.f_B_W
                 elif other not in self._free:
                     stops.append(self._names[other])
-        if not arrived and np.linalg.norm(on_table) > REFLEX:
+        if not arrived and np.linalg.norm(on_table) > STOP_FORCE:
             stops.append(self._names[self._table])
         return min(stops, default="")

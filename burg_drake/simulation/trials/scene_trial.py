@@ -106,7 +106,7 @@ class SceneTrial:
             context.SetTime(0.0)
             context.SetDiscreteState(self._default.get_discrete_state())
 
-    def spoil(self) -> None:
+    def invalidate(self) -> None:
         """Has the next trial prepare the Context from scratch."""
         self._prepared = None
 

@@ -34,8 +34,8 @@ class TrialSettings:
 
     Attributes:
         motion: where the hand goes; None if as the station says.
-        lift_time: duration of a straight way of 0.30 m with the target [s]: half of it accelerates
-            and half of it brakes, as they do, as hard, on a shorter way.
+        lift_time: duration of a straight segment of 0.30 m with the target [s]: half of it
+            accelerates and half of it brakes, as they do, as hard, on a shorter way.
         hold_time: how long the target must be held at the end of the way [s].
         creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
         creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
@@ -66,12 +66,12 @@ class TrialSettings:
 
     @property
     def acceleration(self) -> float:
-        """Of the hand on its straight ways with the target [m/s^2]."""
+        """Of the hand on its straight segments with the target [m/s^2]."""
         return 4.0 * USUAL_LIFT / self.lift_time**2
 
-    def time_of(self, way: float) -> float:
-        """Duration of a straight way with the target [s], by its length [m]."""
-        return self.lift_time * math.sqrt(way / USUAL_LIFT)
+    def time_of(self, length: float) -> float:
+        """Duration of a straight segment with the target [s], by its length [m]."""
+        return self.lift_time * math.sqrt(length / USUAL_LIFT)
 
     @property
     def steady_polls(self) -> int:

@@ -6,4 +6,4 @@ from .scene_issues import (
     check_scene as check_scene,
     overlaps as overlaps,
 )
-from .sound_scene import require_sound_scene as require_sound_scene
+from .valid_scene import require_valid_scene as require_valid_scene

@@ -47,7 +47,7 @@ def object_shapes(library: ObjectLibrary, name: str, packages: Packages) -> Pose
 
 
 def surrounding_shapes(station_diagram: StationDiagram) -> dict[str, PosedShapes]:
-    """Shapes in the world of all that is no instance of the scene: the table, the station's
+    """Shapes in the world of all that is not an instance of the scene: the table, the station's
     obstacles, and the links of the robot in its home posture, by their names."""
     plant, inspector = station_diagram.plant, station_diagram.scene_graph.model_inspector()
     obstacles = station_diagram.station.document.background

@@ -26,7 +26,7 @@ from burg_drake.station.checks.body_shapes import PosedShapes
 
 PLACES = 256
 """Bodies that there is room for at first, those that wait included."""
-AWAY = 1e4
+PARKING_HEIGHT = 1e4
 """How far below the world, and below each other, bodies wait that are not there [m]."""
 
 
@@ -80,7 +80,7 @@ class CollisionWorld:
         for name, body in list(self._used.items()):
             if name not in bodies or bodies[name][0] != body.kind:
                 self._waiting.setdefault(body.kind, []).append(self._used.pop(name))
-                self._frame_poses.set_value(self._frames[body.index], _away(body.index))
+                self._frame_poses.set_value(self._frames[body.index], _parking_pose(body.index))
         if self._taken + len(bodies) - len(self._used) > len(self._frames):
             self._start(max(len(self._frames), 2 * len(bodies)))
         for name, (kind, X_WB) in bodies.items():
@@ -146,7 +146,7 @@ class CollisionWorld:
         self._context = graph.CreateDefaultContext()
         self._frame_poses = FramePoseVector()
         for index, frame in enumerate(frames):
-            self._frame_poses.set_value(frame, _away(index))
+            self._frame_poses.set_value(frame, _parking_pose(index))
         self._taken = 0
         self._used: dict[str, MovableBody] = {}
         self._waiting: dict[str, list[MovableBody]] = {}
@@ -172,5 +172,5 @@ def _instance(name: str, X_FG: RigidTransform, shape: Shape) -> GeometryInstance
     return instance
 
 
-def _away(index: int) -> RigidTransform:
-    return RigidTransform([0.0, 0.0, -AWAY * (index + 1)])
+def _parking_pose(index: int) -> RigidTransform:
+    return RigidTransform([0.0, 0.0, -PARKING_HEIGHT * (index + 1)])

@@ -37,7 +37,7 @@ from burg_drake.station.checks.sinking import push_up
 from burg_drake.station.checks.travel import Travel
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import Station, StationLike, as_station
-from burg_drake.station.world import ROBOT_MODELS, Robot, taken_name, taken_obstacle
+from burg_drake.station.world import ROBOT_MODELS, Robot, name_taken_error, obstacle_name_error
 
 GRAVITY = 9.81
 """[m/s^2]."""
@@ -115,7 +115,7 @@ class SceneCheck:
         for a, b, depth in self._overlaps(scene):
             if b == "table" and a in buried:
                 continue
-            message = _overlap(a, b, depth, self._parts, self._station.path)
+            message = _overlap_issue(a, b, depth, self._parts, self._station.path)
             issues.append(
                 SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
             )
@@ -162,7 +162,7 @@ class SceneCheck:
         self._place(scene)
         if self._travel is None:
             self._travel = Travel(self._world)
-        return self._travel.way(chosen, self._X_WS[:3, :3] @ direction / length, limit)
+        return self._travel.free_distance(chosen, self._X_WS[:3, :3] @ direction / length, limit)
 
     def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
         """Instances, what they overlap, and how deep [m], in the order of the document."""
@@ -177,13 +177,13 @@ class SceneCheck:
             for _, _, a, b, depth in sorted(found)
             if depth > (SINK_TOLERANCE if b in yielding else TOUCH_TOLERANCE)
             and a in scene.instances
-            and not (b == "table" and depth < DEEPEST and self._is_borne(a, scene))
+            and not (b == "table" and depth < DEEPEST and self._is_supported(a, scene))
         ]
 
     def _may_sink(self, issue: SceneIssue, scene: Scene) -> bool:
-        return issue.amount < DEEPEST and self._is_borne(issue.instance, scene)
+        return issue.amount < DEEPEST and self._is_supported(issue.instance, scene)
 
-    def _is_borne(self, name: str, scene: Scene) -> bool:
+    def _is_supported(self, name: str, scene: Scene) -> bool:
         """Whether what an instance is below the table's top is no more than what it sinks in by
         under its own weight and that of what may lie on it: all free objects at most."""
         weight = GRAVITY * sum(scene.entry(n).mass_properties.mass for n in scene.instances)
@@ -204,14 +204,14 @@ class SceneCheck:
         self._placed = {
             name: known[name]
             if name in known and known[name].instance == instance
-            else self._look_at(scene, name, instance)
+            else self._placed_instance(scene, name, instance)
             for name, instance in instances.items()
         }
         self._world.place(
             {name: (one.instance.object, one.X_WO) for name, one in self._placed.items()}
         )
 
-    def _look_at(self, scene: Scene, name: str, instance: Instance) -> _PlacedInstance:
+    def _placed_instance(self, scene: Scene, name: str, instance: Instance) -> _PlacedInstance:
         X_SO = check_pose(instance.X_SO.matrix(), f"{scene.path}: X_SO of {name!r}")
         if instance.object not in self._surfaces:
             self._surfaces[instance.object] = surface_vertices(self._library, instance.object)
@@ -221,9 +221,9 @@ class SceneCheck:
     def _require_free_names(self, scene: Scene) -> None:
         for name in (*scene.instances, *scene.background):
             if name in self._station.document.background:
-                raise taken_obstacle(self._station, name)
+                raise obstacle_name_error(self._station, name)
             if name in ROBOT_MODELS or self._around.plant.HasModelInstanceNamed(name):
-                raise taken_name(scene, name)
+                raise name_taken_error(scene, name)
 
     def _table_issue(self, name: str) -> SceneIssue | None:
         """Whether the centre of mass is beside the table, so that the object cannot stay."""
@@ -267,7 +267,9 @@ def _robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[str, str]]:
     }
 
 
-def _overlap(a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path) -> str:
+def _overlap_issue(
+    a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path
+) -> str:
     """One line about two bodies that overlap; a is an instance."""
     by = f"by {depth * 1e3:.1f} mm"
     if b not in parts:

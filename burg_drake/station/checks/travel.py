@@ -53,7 +53,7 @@ class Travel:
         self._fixed = [_convex_shapes(shapes) for shapes in world.fixed.values()]
         self._known: dict[str, ConvexShapes] = {}
 
-    def way(self, names: Sequence[str], direction: Array, limit: float) -> float:
+    def free_distance(self, names: Sequence[str], direction: Array, limit: float) -> float:
         """How far bodies can be moved together.
 
         Args:

@@ -65,12 +65,12 @@ class ArmDriver(LeafSystem):
             self._check_jump(q - context.get_discrete_state(self._last).value()[:-1])
         values.set_value(self._last, np.append(q, 1.0))
 
-    def _check_jump(self, way: Array) -> None:
-        worst = int(np.abs(way).argmax())
-        if abs(way[worst]) > JUMP:
+    def _check_jump(self, jump: Array) -> None:
+        worst = int(np.abs(jump).argmax())
+        if abs(jump[worst]) > JUMP:
             raise InvalidInputError(
-                f"the plan wants {self._joints[worst]} {abs(way[worst]):.2g} rad from where the arm"
-                " is; bring the arm to where the plan begins, or set plan.start_time"
+                f"the plan wants {self._joints[worst]} {abs(jump[worst]):.2g} rad from where it"
+                " is now; bring the arm to where the plan begins, or set plan.start_time"
             )
 
     def _calc(self, context: Context, output: BasicVector) -> None:

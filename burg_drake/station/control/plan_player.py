@@ -89,7 +89,7 @@ class PlanPlayer:
     def __init__(self, joints: tuple[str, ...], scene: Scene, station: Station) -> None:
         self._joints, self._scene, self._station = joints, scene, station
         self._plan: object = None
-        self._course: _PlannedSamples | None = None
+        self._samples: _PlannedSamples | None = None
 
     def command(self, plan: object, time: float) -> PlannedCommand | None:
         """What arm and hand are to do.
@@ -103,23 +103,23 @@ class PlanPlayer:
             it ends.
 
         Raises:
-            InvalidInputError: it is no plan, or one for another arm, scene or station; or the time
-                is no number.
+            InvalidInputError: it is not a plan, or one for another arm, scene or station; or the
+                time is not a number.
         """
         if plan is None:
             return None
-        if self._course is None or plan is not self._plan:
-            self._course, self._plan = self._checked(plan), plan
+        if self._samples is None or plan is not self._plan:
+            self._samples, self._plan = self._checked(plan), plan
         if np.isnan(time):
             raise InvalidInputError("plan.start_time is nan s; give the time at which it begins")
         if time < 0.0:
             return None
-        course = self._course
-        when = min(time, course.duration)
-        q = course.q.value(when)[:, 0]
-        v = course.q.EvalDerivative(when, 1)[:, 0] if time < course.duration else np.zeros(len(q))
-        closed = [closing for start, closing in course.switches if start <= time]
-        return PlannedCommand(q, v, bool(closed and closed[-1]), course.opening)
+        samples = self._samples
+        when = min(time, samples.duration)
+        q = samples.q.value(when)[:, 0]
+        v = samples.q.EvalDerivative(when, 1)[:, 0] if time < samples.duration else np.zeros(len(q))
+        closed = [closing for start, closing in samples.switches if start <= time]
+        return PlannedCommand(q, v, bool(closed and closed[-1]), samples.opening)
 
     def _checked(self, plan: object) -> _PlannedSamples:
         if not isinstance(plan, PlayablePlan):
@@ -133,7 +133,7 @@ class PlanPlayer:
         opening = plan.opening
         if np.isnan(opening):
             opening = self._station.hand.opening[1]
-        return _course(plan.phases, len(self._joints), opening)
+        return _sample_plan(plan.phases, len(self._joints), opening)
 
     def _check_joints(self, joints: Sequence[str]) -> None:
         if tuple(joints) != self._joints:
@@ -143,7 +143,9 @@ class PlanPlayer:
             )
 
 
-def _course(phases: Mapping[str, SampledMotion], joints: int, opening: float) -> _PlannedSamples:
+def _sample_plan(
+    phases: Mapping[str, SampledMotion], joints: int, opening: float
+) -> _PlannedSamples:
     """Joins phases to one trajectory, and notes when the hand closes and opens."""
     times, positions, velocities = [np.zeros(1)], list[Array](), list[Array]()
     switches, end, before = [], 0.0, ""

@@ -55,9 +55,9 @@ from burg_drake.station.world import (
     add_cameras,
     add_instance,
     add_obstacles,
-    add_rise,
     add_robot,
     add_table,
+    add_vertical_joint,
     set_default_posture,
     set_packages,
 )
@@ -130,7 +130,7 @@ def build_station_diagram(
         X_WO = instance_pose(scene, station, name)
         plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
     for name, body in (free if weld_objects else {}).items():
-        add_rise(plant, body, RigidTransform(instance_pose(scene, station, name)))
+        add_vertical_joint(plant, body, RigidTransform(instance_pose(scene, station, name)))
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot)
 

@@ -21,7 +21,7 @@ class FloatingHand(HandHandle):
 
     Attributes:
         document, body, fingers, joints, pads: see `HandHandle`.
-        lift: the joint that carries the hand along a straight way.
+        lift: the joint that carries the hand along a straight segment.
 
     Raises:
         InvalidInputError: the diagram has no floating hand.
@@ -53,19 +53,19 @@ class FloatingHand(HandHandle):
             closed: how far the fingers are closed, from 0 (open) to 1 (pads together).
             direction_W: (3,) unit vector, in which the lift goes from there.
         """
-        self._hang(plant_context, X_WG @ self._X_GH, direction_W)
+        self._set_mount(plant_context, X_WG @ self._X_GH, direction_W)
         self.set_fingers(plant_context, closed)
 
     def turn_lift(self, plant_context: Context, direction_W: Array) -> None:
         """Has the lift go in another direction (3,) from where the hand is, at rest there; the
         fingers stay as they are, and move on as they do."""
-        self._hang(plant_context, self.X_WH(plant_context), direction_W)
+        self._set_mount(plant_context, self.X_WH(plant_context), direction_W)
 
-    def gone(self, plant_context: Context) -> float:
+    def travelled(self, plant_context: Context) -> float:
         """How far the hand has gone along the lift [m]."""
         return float(self.lift.get_translation(plant_context))
 
-    def _hang(self, plant_context: Context, X_WH: Array, direction_W: Array) -> None:
+    def _set_mount(self, plant_context: Context, X_WH: Array, direction_W: Array) -> None:
         # The lift joint goes along z of its frames L: the base has the hand's position, and the
         # mount takes up the hand's orientation.
         R_WL = RotationMatrix(_turned_from_z(direction_W))

@@ -51,12 +51,12 @@ def crosses(box: Obstacle, p_WA: Array, p_WQ: Array) -> NDArray[np.bool_]:
     where they are between each pair of its faces (Kay and Kajiya, SIGGRAPH 1986)."""
     X_BW = inverse(box.X_WB.matrix())
     p_BA = transform_points(X_BW, p_WA[None])[0]
-    way = transform_points(X_BW, p_WQ) - p_BA
+    ray = transform_points(X_BW, p_WQ) - p_BA
     half = np.array(box.size) / 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([(-half - p_BA) / way, (half - p_BA) / way])
+        ends = np.stack([(-half - p_BA) / ray, (half - p_BA) / ray])
     # Along a face there is no crossing: the line is between the two all the way, or never.
-    level = way == 0.0
+    level = ray == 0.0
     ends = np.where(level, np.where(np.abs(p_BA) < half, [[[-np.inf]], [[np.inf]]], np.inf), ends)
     enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
     return np.asarray((enter < leave) & (leave > 0.0) & (enter < 1.0 - SLACK))

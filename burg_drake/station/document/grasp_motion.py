@@ -1,4 +1,5 @@
-"""How the hand goes to a grasp and away from it: lengths and directions of the straight ways."""
+"""How the hand goes to a grasp and away from it: lengths and directions of the straight
+segments."""
 
 from __future__ import annotations
 
@@ -85,7 +86,7 @@ class GraspMotion:
                 " world, such as [0, 0, 1] for up",
                 "lift_direction",
             )
-        shortest = self.retreat + self.least
+        shortest = self.retreat + self.shortest
         if shortest < SHORTEST:
             raise FieldError(
                 f"retreat and lift together may be as short as {1e3 * shortest:g} mm; the hand"
@@ -94,7 +95,7 @@ class GraspMotion:
             )
 
     @property
-    def least(self) -> float:
+    def shortest(self) -> float:
         """The part of the lift that has to be free [m]."""
         return self.lift_height if self.least_lift is None else self.least_lift
 

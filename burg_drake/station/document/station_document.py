@@ -305,7 +305,7 @@ def _stated(document: StationDocument, path: Path) -> dict[str, Path]:
             found[name] = resolve(reference, base=path.parent)
         if not found[name].is_dir():
             raise InvalidInputError(
-                f"{path}: packages.{name}: {reference} is no folder; give the one that"
+                f"{path}: packages.{name}: {reference} is not a folder; give the one that"
                 f" package://{name}/... is relative to"
             )
     return found

@@ -23,13 +23,13 @@ from .instances import (
     PLACE as PLACE,
     RISE as RISE,
     add_instance as add_instance,
-    add_rise as add_rise,
-    taken_name as taken_name,
+    add_vertical_joint as add_vertical_joint,
+    name_taken_error as name_taken_error,
 )
 from .mesh_pieces import is_mesh as is_mesh
 from .model_file import (
     add_models as add_models,
-    held_remarks as held_remarks,
+    buffered_remarks as buffered_remarks,
     set_packages as set_packages,
 )
 from .robot import (
@@ -54,6 +54,6 @@ from .surroundings import (
     add_obstacles as add_obstacles,
     add_table as add_table,
     obstacle_boxes as obstacle_boxes,
+    obstacle_name_error as obstacle_name_error,
     table_box as table_box,
-    taken_obstacle as taken_obstacle,
 )

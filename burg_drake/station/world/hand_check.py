@@ -146,9 +146,9 @@ class _Bench:
             self._put(self._at(closed))
             one, other = (self.bounds(i).mean(axis=0) for i in (0, 1))
             gaps.append(one - other)
-        way = gaps[0] - gaps[1]
-        if np.hypot(way[1], way[2]) > TOLERANCE:
-            x, y, z = np.round(way / np.linalg.norm(way), 2) + 0.0
+        gap = gaps[0] - gaps[1]
+        if np.hypot(gap[1], gap[2]) > TOLERANCE:
+            x, y, z = np.round(gap / np.linalg.norm(gap), 2) + 0.0
             raise self._error(
                 "x of G is not the closing direction: the fingers open along"
                 f" ({x:.2f}, {y:.2f}, {z:.2f}) of G; turn X_HG"

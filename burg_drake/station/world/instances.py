@@ -15,7 +15,7 @@ from burg_drake.core.paths import Packages
 from burg_drake.objects.library import LINK, MassProperties
 from burg_drake.scene.document import Scene
 from burg_drake.station.world.mesh_pieces import is_mesh, sdf_by_pieces
-from burg_drake.station.world.model_file import add_models, held_remarks
+from burg_drake.station.world.model_file import add_models, buffered_remarks
 from burg_drake.station.world.robot import ROBOT_MODELS
 from burg_drake.station.world.rolling import add_rolling, is_ball
 
@@ -33,10 +33,10 @@ def add_instance(
     """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-        raise taken_name(scene, name)
+        raise name_taken_error(scene, name)
     path = scene.library.path(scene.entry(name).sdf)
     try:
-        with held_remarks() as remarks:
+        with buffered_remarks() as remarks:
             if by_pieces and is_mesh(scene, name):
                 (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
             else:
@@ -56,7 +56,7 @@ def add_instance(
     return body
 
 
-def taken_name(scene: Scene, name: str) -> InvalidInputError:
+def name_taken_error(scene: Scene, name: str) -> InvalidInputError:
     """The error of an instance whose name is one of the station's."""
     return InvalidInputError(
         f"{scene.path}: instance name {name!r} is taken by the station; choose another"
@@ -79,7 +79,7 @@ def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
         raise ValueError("its inertia is not what library.yaml says")
 
 
-def add_rise(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
+def add_vertical_joint(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:
     """Hangs a body on a joint along world z, which stands at 0 where the body is placed."""
     model = body.model_instance()
     place = plant.AddFrame(FixedOffsetFrame(PLACE, plant.world_frame(), X_WO, model))

@@ -95,21 +95,21 @@ def require_loose(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) 
 
 
 @contextmanager
-def held_remarks() -> Iterator[list[logging.LogRecord]]:
+def buffered_remarks() -> Iterator[list[logging.LogRecord]]:
     """Keeps back what Drake logs, such as its doubts about a model.
 
     Yields:
         What is kept back, and grows meanwhile; hand on with `logging.getLogger("drake").handle`.
     """
-    logger, held = logging.getLogger("drake"), list[logging.LogRecord]()
+    logger, buffered = logging.getLogger("drake"), list[logging.LogRecord]()
 
     def hold(record: logging.LogRecord) -> bool:
-        held.append(record)
+        buffered.append(record)
         return False
 
     logger.addFilter(hold)
     try:
-        yield held
+        yield buffered
     finally:
         logger.removeFilter(hold)
 

@@ -60,7 +60,7 @@ def add_robot(
     plant.RenameModelInstance(added.instance, "hand")
     models = {"hand": added.instance}
     if robot == "hand":
-        models["lift"] = _add_lift(plant, added.body, _hover(station))
+        models["lift"] = _add_lift(plant, added.body, _hover_pose(station))
     else:
         models["arm"] = _add_arm(builder, station, added.body)
     for model in models.values():
@@ -74,7 +74,7 @@ def inverse_dynamics(station: Station) -> bool:
     return arm is not None and arm.control.kind == "inverse_dynamics"
 
 
-def _hover(station: Station) -> Array:
+def _hover_pose(station: Station) -> Array:
     """`X_WH` (4, 4) of a hand that points down, well above the origin of the board."""
     X_SG = np.diag([1.0, -1.0, -1.0, 1.0])
     X_SG[2, 3] = HOVER

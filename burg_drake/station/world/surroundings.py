@@ -117,12 +117,12 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
     bodies = {}
     for name, box in obstacle_boxes(station).items():
         if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
-            raise taken_obstacle(station, name)
+            raise obstacle_name_error(station, name)
         bodies[name] = _add_box(plant, name, box)
     return bodies
 
 
-def taken_obstacle(station: Station, name: str) -> InvalidInputError:
+def obstacle_name_error(station: Station, name: str) -> InvalidInputError:
     """The error of an obstacle whose name the scene or the robot has, too."""
     return InvalidInputError(
         f"{station.path}: background.{name}: the name is taken by the scene or the robot;"

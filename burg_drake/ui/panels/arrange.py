@@ -63,14 +63,16 @@ class ArrangePanel:
 
     def _contact(self) -> None:
         self._gui.add_html(all_of(box(head("Move until it touches"))))
-        ways: tuple[tuple[str, Direction, str], ...] = (
+        directions: tuple[tuple[str, Direction, str], ...] = (
             ("←", "-x", "to the left"),
             ("→", "x", "to the right"),
             ("↓", "-y", "to the front"),
             ("↑", "y", "to the back"),
         )
-        for label, way, where in ways:
-            self._button(label, 2, f"Move {where} until it touches something", partial(_snap, way))
+        for label, direction, where in directions:
+            self._button(
+                label, 2, f"Move {where} until it touches something", partial(_snap, direction)
+            )
         self._button("Put down", 4, "Lower it until it stands (B)", PutDown)
 
     def _alignment(self) -> None:

@@ -40,18 +40,22 @@ class BackdropPanel:
             upload = upload_button(gui, "Photo of the board", icon=icon.PHOTO, mime_type="image/*")
             upload.on_upload(self._uploaded)
             self._camera = gui.add_dropdown("Camera", CAMERAS)
-            actions.clicked(quiet_button(gui, "Take a picture", icon=icon.CAMERA), self._take)
+            actions.clicked(
+                quiet_button(gui, "Take a picture", icon=icon.CAMERA), self._take_picture
+            )
             self._on = actions.chosen(
                 gui.add_checkbox("Live", False, hint="Show what the camera sees, again and again"),
                 self._watch,
             )
             self._opacity = actions.chosen(
-                gui.add_slider("Opacity", 0.0, 1.0, 0.05, OPACITY), self._fade, key="backdrop"
+                gui.add_slider("Opacity", 0.0, 1.0, 0.05, OPACITY),
+                self._set_opacity,
+                key="backdrop",
             )
             self._remove = actions.clicked(
                 quiet_button(gui, "Remove the picture", icon=icon.X), self._clear
             )
-            self._lay(None, "")
+            self._show_sheet(None, "")
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view; a picture stays as it is."""
@@ -68,18 +72,18 @@ class BackdropPanel:
     def _clear(self) -> None:
         self.close()
         self._on.value = False
-        self._lay(None, "")
+        self._show_sheet(None, "")
 
     async def _uploaded(self, event: Any) -> None:
         file = event.target.value
-        self._actions.ask(lambda: self._look_at(file.content, file.name), event.client)
+        self._actions.submit(lambda: self._use_file(file.content, file.name), event.client)
 
-    def _look_at(self, data: bytes, name: str) -> None:
+    def _use_file(self, data: bytes, name: str) -> None:
         from burg_drake.cameras.sources import decode_image
 
-        self._use(decode_image(data), name)
+        self._use_image(decode_image(data), name)
 
-    def _take(self) -> None:
+    def _take_picture(self) -> None:
         """Takes a picture with a camera of this machine.
 
         Raises:
@@ -95,7 +99,7 @@ class BackdropPanel:
             live.wait(LETS_GO)
         with open_source(number) as source:
             frame = source.read()
-        self._use(None if frame is None else frame.image, f"camera {number}")
+        self._use_image(None if frame is None else frame.image, f"camera {number}")
 
     def _chosen_camera(self) -> str:
         number = str(self._camera.value)
@@ -103,17 +107,17 @@ class BackdropPanel:
             raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
         return number
 
-    def _use(self, image: Image | None, name: str) -> None:
+    def _use_image(self, image: Image | None, name: str) -> None:
         if image is None:
             raise InvalidInputError(f"{name} is not an image that can be read; give PNG or JPEG")
         from burg_drake.cameras.rectification import board_picture
 
-        self._lay_found(board_picture(image, self._actions.session.view.document.board), name)
+        self._show_picture(board_picture(image, self._actions.session.view.document.board), name)
 
-    def _lay_found(self, found: BoardPicture, name: str) -> None:
+    def _show_picture(self, found: BoardPicture, name: str) -> None:
         words = f"{name}: {len(found.ids)} markers, off by {1e3 * found.error:.1f} mm"
         sheet = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
-        self._lay(sheet, f"{words}. {found.note}" if found.note else words)
+        self._show_sheet(sheet, f"{words}. {found.note}" if found.note else words)
 
     def _watch(self, on: bool) -> None:
         """Shows what a camera sees from now on, or no more."""
@@ -121,9 +125,9 @@ class BackdropPanel:
         self.close()
         if on:
             camera, board = self._chosen_camera(), self._actions.session.view.document.board
-            self._live = LivePicture(camera, board, self._seen, before)
+            self._live = LivePicture(camera, board, self._on_live_picture, before)
 
-    def _seen(self, what: BoardPicture | str) -> None:
+    def _on_live_picture(self, what: BoardPicture | str) -> None:
         """Called by the live picture's thread."""
         live = self._live
 
@@ -131,22 +135,22 @@ class BackdropPanel:
             if live is None or live is not self._live:
                 return
             if isinstance(what, str):
-                self._say(what)
+                self._show_line(what)
             else:
-                self._lay_found(what, f"camera {live.camera}")
+                self._show_picture(what, f"camera {live.camera}")
 
-        self._actions.ask(lay, key="live picture", patient=True)
+        self._actions.submit(lay, key="live picture", wait_for_typing=True)
 
-    def _fade(self, opacity: float) -> None:
+    def _set_opacity(self, opacity: float) -> None:
         if self._sheet is not None:
             self._sheet = replace(self._sheet, opacity=min(max(float(opacity), 0.0), 1.0))
             self._layers.show("backdrop", self._sheet)
 
-    def _lay(self, sheet: BoardOverlay | None, words: str) -> None:
+    def _show_sheet(self, sheet: BoardOverlay | None, words: str) -> None:
         self._sheet = sheet
         self._layers.show("backdrop", sheet)
-        self._say(words or "Lay a picture of the printed board under the objects.")
+        self._show_line(words or "Lay a picture of the printed board under the objects.")
         self.show(self._actions.session.view)
 
-    def _say(self, line: str) -> None:
+    def _show_line(self, line: str) -> None:
         self._text.content = all_of(box(quiet(line)))

@@ -28,7 +28,9 @@ class BoardPanel:
         self._own = False
         with gui.add_folder("Board"):
             self._size = actions.chosen(gui.add_dropdown("Size", (*BOARD_SIZES, OWN)), self._choose)
-            self._way = actions.chosen(gui.add_dropdown("Lies", (ACROSS, UPRIGHT)), self._turn)
+            self._orientation = actions.chosen(
+                gui.add_dropdown("Lies", (ACROSS, UPRIGHT)), self._turn
+            )
             self._extents = actions.typed(
                 gui.add_vector2(
                     "Width, depth [mm]",
@@ -46,8 +48,8 @@ class BoardPanel:
         name = board_size_name(size)
         self._own = self._own or name is None
         self._size.value = OWN if self._own or name is None else name
-        self._way.value = UPRIGHT if size[1] > size[0] else ACROSS
-        self._way.visible = not self._own
+        self._orientation.value = UPRIGHT if size[1] > size[0] else ACROSS
+        self._orientation.visible = not self._own
         self._extents.handle.visible = self._own
         self._extents.show(tuple(round(1e3 * side, 3) for side in size))
 
@@ -59,9 +61,9 @@ class BoardPanel:
         width, depth = self._actions.session.view.document.board.size
         self._set(board_size(name, upright=depth > width))
 
-    def _turn(self, way: str) -> None:
+    def _turn(self, orientation: str) -> None:
         short, long = sorted(self._actions.session.view.document.board.size)
-        self._set((short, long) if way == UPRIGHT else (long, short))
+        self._set((short, long) if orientation == UPRIGHT else (long, short))
 
     def _resize(self, extents_mm: tuple[float, float]) -> None:
         width, depth = (round(1e-3 * side, 6) for side in extents_mm)

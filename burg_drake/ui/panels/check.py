@@ -6,7 +6,7 @@ import viser
 
 from burg_drake.compose.editing import STATUS, SessionView
 from burg_drake.core import listing as names_of
-from burg_drake.ui.widgets import all_of, box, dot, listing, look_of, quiet
+from burg_drake.ui.widgets import all_of, box, dot, listing, quiet, style_of
 from burg_drake.visualization.style import Child, element
 
 MOST = 30
@@ -37,13 +37,13 @@ def findings(view: SessionView) -> list[Child]:
         return [quiet("Add objects; they are checked as they are moved.")]
     unknown = [name for name, status in view.status.items() if status == "unknown"]
     if not view.issues and not unknown:
-        return [dot(look_of("ok").hex), "All objects are on the board, free and supported."]
+        return [dot(style_of("ok").hex), "All objects are on the board, free and supported."]
     rows = [
-        element("span", dot(look_of(STATUS[issue.kind]).hex), issue.message)
+        element("span", dot(style_of(STATUS[issue.kind]).hex), issue.message)
         for issue in view.issues[:MOST]
     ]
     if unknown:
         line = f"cannot be checked: {names_of(unknown)}"
-        rows.insert(0, element("span", dot(look_of("unknown").hex), line))
+        rows.insert(0, element("span", dot(style_of("unknown").hex), line))
     more = len(view.issues) - MOST
     return [listing(rows), quiet(f"and {more} more" if more > 0 else None)]

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from burg_drake.compose import ComposeSession
-from burg_drake.ui.view import Coloring, look
+from burg_drake.ui.view import Coloring, set_view
 from burg_drake.ui.widgets import PageActions, quiet_button
 
 COLORINGS: dict[str, Coloring] = {
@@ -68,9 +68,9 @@ class DisplayPanel:
     def look_from_above(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera above the board."""
         if client is not None:
-            look(client, self._session.view.document.board, from_above=True)
+            set_view(client, self._session.view.document.board, from_above=True)
 
     def look_from_front(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera in front of the board."""
         if client is not None:
-            look(client, self._session.view.document.board, from_above=False)
+            set_view(client, self._session.view.document.board, from_above=False)

@@ -92,7 +92,7 @@ class FilePanel:
             )
             return
         assert view.path is not None
-        self._actions.tell(client, str(view.path), "Saved")
+        self._actions.show_message(client, str(view.path), "Saved")
 
     def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
         """Goes over to another scene, and asks first if something would be lost."""
@@ -115,7 +115,7 @@ class FilePanel:
         session = self._actions.session
         printout = session.printout(PrintSettings(page=self._page.value))
         for warning in printout.warnings:
-            self._actions.warn(client, warning, "On the printout")
+            self._actions.show_warning(client, warning, "On the printout")
         if client is not None:
             client.send_file_download(
                 f"{session.view.document.name}_{self._page.value}.pdf",

@@ -54,7 +54,7 @@ def _counts(grasps: Mapping[str, GraspCount]) -> str | None:
     if not grasps:
         return None
     rows = [
-        (name, _in_the_way(count.in_the_way), count.clear, _reachable(count))
+        (name, _blockers_text(count.in_the_way), count.clear, _reachable(count))
         for name, count in grasps.items()
     ]
     return table(("Object", "In the way", "Clear", "Reached"), rows, numbers=2)
@@ -64,5 +64,5 @@ def _reachable(count: GraspCount) -> str:
     return "–" if count.reachable is None else str(count.reachable)
 
 
-def _in_the_way(blockers: Mapping[str, int]) -> str:
+def _blockers_text(blockers: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {number}" for name, number in list(blockers.items())[:MOST])

@@ -67,7 +67,7 @@ class LibraryPanel:
         view = self._actions.session.do(AddObject(name))
         (added,) = view.selection
         if view.status[added] in ("collision", "out_of_bounds"):
-            self._actions.warn(
+            self._actions.show_warning(
                 client,
                 f"There is no free place for {added!r}: it is in the middle of the board; move it,"
                 " make room, or choose a larger board.",
@@ -95,9 +95,9 @@ class LibraryPanel:
             text = f"{name} {self._library.entry(name).description}".lower()
             button.visible = all(word in text for word in wanted)
             found += button.visible
-        self._say(found)
+        self._show_count(found)
 
-    def _say(self, found: int) -> None:
+    def _show_count(self, found: int) -> None:
         library = self._library
         assert library is not None
         total = len(library.objects)
@@ -117,4 +117,4 @@ class LibraryPanel:
         assert self._pictures is not None
         for name, button in self._buttons.items():
             show_picture(button, self._pictures.get(name))
-        self._say(sum(button.visible for button in self._buttons.values()))
+        self._show_count(sum(button.visible for button in self._buttons.values()))

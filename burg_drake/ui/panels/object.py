@@ -16,9 +16,9 @@ from burg_drake.ui.widgets import (
     all_of,
     box,
     dot,
-    look_of,
     quiet,
     quiet_button,
+    style_of,
     title,
 )
 
@@ -68,7 +68,7 @@ class ObjectPanel:
         self._restrict.value = view.planar
         self._one.visible = len(names) == 1
         self._some.visible = bool(names)
-        self._text.content = _about(view)
+        self._text.content = _description(view)
         if len(names) == 1:
             self._name.show(names[0])
             self._fixed.value = view.instances[names[0]] in view.document.background
@@ -165,7 +165,7 @@ def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return position, tuple((np.round(angles, DECIMALS_DEG) + 0.0).tolist())
 
 
-def _about(view: SessionView) -> str:
+def _description(view: SessionView) -> str:
     names = view.selection
     if not names:
         return all_of(
@@ -183,5 +183,5 @@ def _about(view: SessionView) -> str:
     kind = view.instances[names[0]].object
     if entry is not None and not entry.is_fixed:
         kind = f"{kind}, {1e3 * entry.mass:.0f} g"
-    look = look_of(status)
+    look = style_of(status)
     return all_of(box(title(names[0]), quiet(kind), dot(look.hex), look.words))

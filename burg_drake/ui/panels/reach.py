@@ -36,7 +36,7 @@ class ReachPanel:
     def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
         self._actions, self._layers = actions, layers
         self._worker = BackgroundWorker()
-        self._asked: tuple[Board, float] | None = None
+        self._shown_for: tuple[Board, float] | None = None
         self._job: BackgroundJob[ReachLayer] | None = None
         with gui.add_folder("Reach"):
             self._on = gui.add_checkbox(
@@ -62,39 +62,39 @@ class ReachPanel:
         """Brings layer and panel to a view; computes what is not known yet."""
         self._height.visible = bool(self._on.value)
         if not self._on.value:
-            self._drop()
+            self._discard()
             return
         asked = view.document.board, 1e-3 * float(self._height.value)
-        if asked == self._asked:
+        if asked == self._shown_for:
             return
-        self._drop()
-        self._asked = asked
+        self._discard()
+        self._shown_for = asked
         station = self._actions.session.station
         if station.document.arm is None:
-            self._say("The station has no arm.")
+            self._show_line("The station has no arm.")
             return
-        self._say("Computing, the first time for half a minute ...")
-        self._job = self._worker.ask(ReachTask(station, *asked), self._told)
+        self._show_line("Computing, the first time for half a minute ...")
+        self._job = self._worker.submit(ReachTask(station, *asked), self._on_job_change)
 
-    def _drop(self) -> None:
-        self._asked = None
+    def _discard(self) -> None:
+        self._shown_for = None
         job, self._job = self._job, None
         if job is not None:
             job.cancel()
         self._layers.show("reach", None)
-        self._say("")
+        self._show_line("")
 
-    def _told(self, job: BackgroundJob[ReachLayer]) -> None:
+    def _on_job_change(self, job: BackgroundJob[ReachLayer]) -> None:
         """Called by the worker's thread."""
         if job.done:
-            self._actions.ask(lambda: self._finish(job), patient=True)
+            self._actions.submit(lambda: self._finish(job), wait_for_typing=True)
 
     def _finish(self, job: BackgroundJob[ReachLayer]) -> None:
         if job is not self._job:
             return
         if job.error is not None:
             if not isinstance(job.error, TaskCancelled):
-                self._say(str(job.error))
+                self._show_line(str(job.error))
             return
         from burg_drake.visualization.pictures import reach_image, reachability_key
 
@@ -105,7 +105,7 @@ class ReachPanel:
         share = f"Some turn of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = all_of(box(reachability_key(), quiet(share)))
 
-    def _say(self, line: str) -> None:
+    def _show_line(self, line: str) -> None:
         content = all_of(box(quiet(line))) if line else ""
         if self._text.content != content:
             self._text.content = content

@@ -59,12 +59,12 @@ class SettlePanel:
         self._settle.disabled = not view.instances
         self._accept.visible = self._revert.visible = view.proposal is not None
         self._cancel.visible = view.working is not None
-        text = all_of(box(*_said(view)))
+        text = all_of(box(*_status_lines(view)))
         if self._text.content != text:
             self._text.content = text
 
 
-def _said(view: SessionView) -> list[Child]:
+def _status_lines(view: SessionView) -> list[Child]:
     if view.working is not None:
         return [view.working[:1].upper() + view.working[1:]]
     if view.proposal is None:
@@ -76,14 +76,14 @@ def _outcome(proposal: SettlingProposal, *, outdated: bool) -> list[Child]:
     moved = [(name, proposal.displacements[name]) for name in moved_names(proposal)]
     moved.sort(key=lambda item: -item[1].distance)
     rows = [(name, f"{1e3 * d.distance:.1f} mm", f"{degrees(d.angle):.1f}°") for name, d in moved]
-    said: list[Child] = []
+    lines: list[Child] = []
     if outdated:
-        said.append(notice("The scene has changed since; settle it again."))
-    said += [notice(f"{name} falls off the table") for name in proposal.fallen]
-    said += [notice(f"{name} still moves: {how}") for name, how in proposal.moving.items()]
+        lines.append(notice("The scene has changed since; settle it again."))
+    lines += [notice(f"{name} falls off the table") for name in proposal.fallen]
+    lines += [notice(f"{name} still moves: {how}") for name, how in proposal.moving.items()]
     if rows:
-        said.append(table(("Moves", "by", "turns by"), rows[:MOST], numbers=2))
+        lines.append(table(("Moves", "by", "turns by"), rows[:MOST], numbers=2))
     elif not proposal.fallen:
-        said.append("Everything stays where it is.")
-    said.append(quiet(f"{proposal.duration:.1f} s were simulated."))
-    return said
+        lines.append("Everything stays where it is.")
+    lines.append(quiet(f"{proposal.duration:.1f} s were simulated."))
+    return lines

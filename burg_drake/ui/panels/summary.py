@@ -9,7 +9,7 @@ import viser
 
 from burg_drake.compose.editing import SessionView
 from burg_drake.ui.widgets import (
-    LOOKS,
+    STATUS_STYLES,
     PageActions,
     all_of,
     box,
@@ -57,14 +57,14 @@ class SummaryPanel:
             (self._undo, view.undo_label, "Undo"),
             (self._redo, view.redo_label, "Redo"),
         ):
-            _offer(button, label, verb)
+            _set_enabled(button, label, verb)
 
     def _read(self) -> None:
         for line in self._session.view.notices:
             self._session.dismiss(line)
 
 
-def _offer(button: Any, label: str | None, verb: str) -> None:
+def _set_enabled(button: Any, label: str | None, verb: str) -> None:
     button.disabled = label is None
     button.hint = f"{verb}: {label}" if label else f"Nothing to {verb.lower()}"
 
@@ -73,7 +73,7 @@ def _summary(view: SessionView) -> list[Html]:
     count: Counter[str] = Counter(view.status.values())
     state = "saved" if view.saved else "not saved"
     where = view.path.name if view.path else "no file yet"
-    chips = [status_chip(status, count[status]) for status in LOOKS if count[status]]
+    chips = [status_chip(status, count[status]) for status in STATUS_STYLES if count[status]]
     return [
         title(view.document.name),
         quiet(f"{where}, {state}"),

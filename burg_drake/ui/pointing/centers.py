@@ -10,7 +10,7 @@ from burg_drake.compose.editing import SessionView
 from burg_drake.core import Array, make_pose
 
 
-def middle(view: SessionView, name: str) -> Array:
+def center(view: SessionView, name: str) -> Array:
     """(3,) middle of an instance's bounding box in S [m]; its origin if its object is unknown."""
     X_SO = view.X_SO(name)
     entry = view.library.objects.get(view.instances[name].object)
@@ -20,11 +20,11 @@ def middle(view: SessionView, name: str) -> Array:
     return np.asarray(X_SO[:3, :3] @ p_OM + X_SO[:3, 3])
 
 
-def common_middle(view: SessionView, names: Iterable[str]) -> Array:
+def mean_center(view: SessionView, names: Iterable[str]) -> Array:
     """(3,) mean of the middles of one or more instances in S [m]."""
-    return np.asarray(np.mean([middle(view, name) for name in names], axis=0))
+    return np.asarray(np.mean([center(view, name) for name in names], axis=0))
 
 
-def about(p_SM: Array, R: Array, offset: Array) -> Array:
+def motion_about(p_SM: Array, R: Array, offset: Array) -> Array:
     """(4, 4) motion in S: a rotation (3, 3) about a point (3,), then an offset (3,) [m]."""
     return make_pose(R, p_SM + offset - R @ p_SM)

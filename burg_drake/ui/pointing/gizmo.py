@@ -18,7 +18,7 @@ from burg_drake.core import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from burg_drake.ui.pointing.centers import common_middle
+from burg_drake.ui.pointing.centers import mean_center
 from burg_drake.ui.widgets import PageActions
 
 SIZE = 0.11
@@ -53,13 +53,13 @@ class Gizmo:
             self._handle = self._made()
         alone = len(view.selection) == 1
         R_SG = view.X_SO(view.selection[0])[:3, :3] if alone else np.eye(3)
-        self._handle.position = common_middle(view, view.selection)
+        self._handle.position = mean_center(view, view.selection)
         self._handle.wxyz = quaternion_from_rotation(R_SG)
         self._handle.visible = True
 
     def drop(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
-        self._actions.ask(lambda: self._end(client_id))
+        self._actions.submit(lambda: self._end(client_id))
 
     def put_back(self, client_id: int) -> bool:
         """Puts back what a page drags; False if it drags nothing."""
@@ -84,11 +84,11 @@ class Gizmo:
             )
             who, client = event.client_id, event.client
             if event.phase == "start":
-                self._actions.ask(lambda: self._begin(who, X_SG), client)
+                self._actions.submit(lambda: self._begin(who, X_SG), client)
             elif event.phase == "update":
-                self._actions.ask(lambda: self._move(who, X_SG), client, key=f"gizmo {who}")
+                self._actions.submit(lambda: self._move(who, X_SG), client, key=f"gizmo {who}")
             else:
-                self._actions.ask(lambda: self._end(who), client)
+                self._actions.submit(lambda: self._end(who), client)
 
         return handle
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from burg_drake.compose.editing import Drag
 from burg_drake.core import Array, BurgError, make_pose, rot_z
-from burg_drake.ui.pointing.centers import about, common_middle
-from burg_drake.ui.pointing.pointer import Eye
+from burg_drake.ui.pointing.centers import mean_center, motion_about
+from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -66,7 +66,7 @@ class ObjectDrags:
 
     def drop(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
-        self._actions.ask(lambda: self._end(client_id))
+        self._actions.submit(lambda: self._end(client_id))
 
     def put_back(self, client_id: int) -> bool:
         """Puts back what a page drags; False if it drags nothing."""
@@ -82,16 +82,16 @@ class ObjectDrags:
         x = float(event.end_screen_pos[0])
         if event.phase == "start":
             p_SG = np.array(event.start_position)
-            self._actions.ask(lambda: self._begin(who, name, p_SG, x), client)
+            self._actions.submit(lambda: self._begin(who, name, p_SG, x), client)
         elif event.phase == "update":
-            eye, p_SQ = Eye.of(client.camera), np.array(event.end_position)
-            self._actions.ask(
-                lambda: self._turn(who, x) if turns else self._move(who, eye, p_SQ),
+            camera, p_SQ = PageCamera.of(client.camera), np.array(event.end_position)
+            self._actions.submit(
+                lambda: self._turn(who, x) if turns else self._move(who, camera, p_SQ),
                 client,
                 key=f"drag {who}",
             )
         else:
-            self._actions.ask(lambda: self._end(who), client)
+            self._actions.submit(lambda: self._end(who), client)
 
     def _begin(self, who: int, name: str, p_SG: Array, x: float) -> None:
         self._end(who)
@@ -99,13 +99,13 @@ class ObjectDrags:
         names = view.selection if name in view.selection else (name,)
         X_SO = {held: view.X_SO(held) for held in names}
         drag = self._actions.session.drag(names)
-        self._held[who] = _Held(drag, X_SO, common_middle(view, names), p_SG, x)
+        self._held[who] = _Held(drag, X_SO, mean_center(view, names), p_SG, x)
 
-    def _move(self, who: int, eye: Eye, p_SQ: Array) -> None:
+    def _move(self, who: int, camera: PageCamera, p_SQ: Array) -> None:
         held = self._held.get(who)
         if held is None:
             return
-        p_SP = eye.on_plane(p_SQ, held.p_SG, UP)
+        p_SP = camera.on_plane(p_SQ, held.p_SG, UP)
         if p_SP is not None:
             self._carry(who, held, make_pose(p_AB=p_SP - held.p_SG))
 
@@ -113,7 +113,7 @@ class ObjectDrags:
         held = self._held.get(who)
         if held is not None:
             R = rot_z(FULL_TURN * (x - held.x))
-            self._carry(who, held, about(held.p_SM, R, np.zeros(3)))
+            self._carry(who, held, motion_about(held.p_SM, R, np.zeros(3)))
 
     def _carry(self, who: int, held: _Held, X: Array) -> None:
         """Holds what is dragged where a motion (4, 4) in S brings it from the start."""

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from burg_drake.ui.pointing.centers import middle
-from burg_drake.ui.pointing.pointer import Eye
+from burg_drake.ui.pointing.centers import center
+from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
 ADD = "cmd/ctrl"
@@ -32,7 +32,7 @@ class Picking:
         async def beside(event: Any) -> None:
             last, self._last = self._last, None
             if last != (event.client_id, tuple(event.screen_pos)):
-                actions.ask(lambda: actions.session.select(()), event.client)
+                actions.submit(lambda: actions.session.select(()), event.client)
 
         scene.on_click()(beside)  # type: ignore[arg-type]
         for modifier in ("shift", "cmd/ctrl+shift"):
@@ -43,24 +43,26 @@ class Picking:
 
         async def choose(event: Any) -> None:
             self._last = (event.client_id, tuple(event.screen_pos))
-            self._actions.ask(lambda: self._actions.session.select((name,)), event.client)
+            self._actions.submit(lambda: self._actions.session.select((name,)), event.client)
 
         async def add(event: Any) -> None:
             self._last = (event.client_id, tuple(event.screen_pos))
-            self._actions.ask(lambda: self._toggle(name), event.client)
+            self._actions.submit(lambda: self._toggle(name), event.client)
 
         handle.on_click(choose)
         handle.on_click(modifier=ADD)(add)
 
     async def _rectangle(self, event: Any) -> None:
-        eye = Eye.of(event.client.camera)
+        camera = PageCamera.of(event.client.camera)
         lower, upper = np.array(event.screen_min), np.array(event.screen_max)
         more = ADD in (event.modifier or "")
-        self._actions.ask(lambda: self._within(eye, lower, upper, more), event.client)
+        self._actions.submit(lambda: self._within(camera, lower, upper, more), event.client)
 
-    def _within(self, eye: Eye, lower: Any, upper: Any, more: bool) -> None:
+    def _within(self, camera: PageCamera, lower: Any, upper: Any, more: bool) -> None:
         view = self._actions.session.view
-        names = [name for name in view.instances if _middle_in(view, name, eye, lower, upper)]
+        names = [
+            name for name in view.instances if _center_within(view, name, camera, lower, upper)
+        ]
         before = view.selection if more else ()
         self._actions.session.select(dict.fromkeys((*before, *names)))
 
@@ -72,7 +74,7 @@ class Picking:
             self._actions.session.select((*selection, name))
 
 
-def _middle_in(view: Any, name: str, eye: Eye, lower: Any, upper: Any) -> bool:
+def _center_within(view: Any, name: str, camera: PageCamera, lower: Any, upper: Any) -> bool:
     """Whether the middle of an instance's bounds is seen within a rectangle."""
-    seen = eye.on_screen(middle(view, name))[0]
+    seen = camera.on_screen(center(view, name))[0]
     return bool((seen >= lower).all() and (seen <= upper).all())

@@ -23,7 +23,7 @@ FARTHEST = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Eye:
+class PageCamera:
     """The camera of a page.
 
     Attributes:
@@ -37,7 +37,7 @@ class Eye:
     aspect: float
 
     @classmethod
-    def of(cls, camera: Any) -> Eye:
+    def of(cls, camera: Any) -> PageCamera:
         """That of a viser client's `camera`."""
         X_SC = make_pose(rotation_from_quaternion(camera.wxyz), camera.position)
         return cls(X_SC, float(camera.fov), float(camera.aspect))

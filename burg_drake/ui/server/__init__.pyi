@@ -1,5 +1,5 @@
 from .door import (
-    Door as Door,
+    ServedPage as ServedPage,
     require_viser as require_viser,
     serve as serve,
 )

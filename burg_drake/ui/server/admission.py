@@ -14,7 +14,7 @@ from urllib.parse import parse_qs
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from burg_drake.core import HEADERS, BrowserToken, RequestError, require_own_host
+from burg_drake.core import HEADERS, BrowserToken, RequestError, require_local_host
 from burg_drake.ui.server.html_page import POLICY, first_page
 
 MOST_CONNECTIONS = 32
@@ -65,7 +65,9 @@ class Admission:
                 raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
         path, _, query = request.path.partition("?")
         upgrade = "Upgrade" in request.headers
-        require_own_host(request.headers.get, served=self.host, is_page=path == "/" and not upgrade)
+        require_local_host(
+            request.headers.get, served=self.host, is_page=path == "/" and not upgrade
+        )
         if path != "/":
             raise RequestError(HTTPStatus.NOT_FOUND, "there is only one page, /")
         if upgrade:

@@ -18,7 +18,13 @@ from importlib.util import find_spec
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from burg_drake.core import LOCALHOST, InvalidInputError, MissingDependencyError, page_url, taken
+from burg_drake.core import (
+    LOCALHOST,
+    InvalidInputError,
+    MissingDependencyError,
+    address_in_use_error,
+    page_url,
+)
 
 if TYPE_CHECKING:
     import viser
@@ -30,7 +36,7 @@ FIRST_PORT, PORTS = 7200, 50
 
 
 @dataclass(frozen=True)
-class Door:
+class ServedPage:
     """An open door; closed by `close` or at the end of a `with`.
 
     Attributes:
@@ -63,7 +69,7 @@ class Door:
 
         stop(self.server)
 
-    def __enter__(self) -> Door:
+    def __enter__(self) -> ServedPage:
         return self
 
     def __exit__(
@@ -86,7 +92,9 @@ def require_viser() -> None:
             raise MissingDependencyError(f"the page needs {name}: pip install 'burg-drake[ui]'")
 
 
-def serve(host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_drake") -> Door:
+def serve(
+    host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_drake"
+) -> ServedPage:
     """Opens the door to an empty page.
 
     Args:
@@ -114,7 +122,7 @@ def serve(host: str = LOCALHOST, port: int | None = None, *, title: str = "burg_
         stop(server)
         raise
     server.gui.configure_theme(show_share_button=False, show_logo=False)
-    return Door(server, host, bound, admission)
+    return ServedPage(server, host, bound, admission)
 
 
 def listen(host: str, port: int | None) -> socket.socket:
@@ -140,4 +148,6 @@ def listen(host: str, port: int | None) -> socket.socket:
                 raise InvalidInputError(
                     f"the page cannot be served on {host}: {error.strerror or error}"
                 ) from error
-    raise InvalidInputError(taken(host, ports, any_of_them=port is None)) from failure
+    raise InvalidInputError(
+        address_in_use_error(host, ports, any_of_them=port is None)
+    ) from failure

@@ -13,9 +13,9 @@ from .object_pictures import ObjectPictures as ObjectPictures
 from .objects import (
     Coloring as Coloring,
     SceneView as SceneView,
-    Shown as Shown,
+    ShownInstance as ShownInstance,
 )
 from .viewpoints import (
-    begin_with as begin_with,
-    look as look,
+    set_initial_view as set_initial_view,
+    set_view as set_view,
 )

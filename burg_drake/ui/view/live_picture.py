@@ -69,13 +69,13 @@ class LivePicture:
                         frame = source.read()
                         if frame is None:
                             return
-                        self._tell(rectifier.picture(frame.image))
+                        self._report(rectifier.picture(frame.image))
                     except BurgError as error:  # the board is hidden, or the camera unplugged
-                        self._tell(str(error))
+                        self._report(str(error))
                     self._over.wait(PAUSE)
         except BurgError as error:
-            self._tell(str(error))
+            self._report(str(error))
 
-    def _tell(self, what: BoardPicture | str) -> None:
+    def _report(self, what: BoardPicture | str) -> None:
         if not self._over.is_set():
             self._show(what)

@@ -69,9 +69,9 @@ def _read(library: ObjectLibrary, name: str) -> ObjectMesh:
             scene = trimesh.load_scene(path, process=False)
             parts = [g for g in scene.geometry.values() if isinstance(g, trimesh.Trimesh)]
             for part in parts:
-                _calm(part)
+                _make_matte(part)
             glb = scene.export(file_type="glb", include_normals=True)
-        plain = trimesh.util.concatenate([_plain(part) for part in parts])
+        plain = trimesh.util.concatenate([_geometry_only(part) for part in parts])
     except Exception as error:  # the reader raises whatever it stumbles over
         raise library.damaged(path) from error
     if not len(plain.faces):
@@ -84,7 +84,7 @@ def _read(library: ObjectLibrary, name: str) -> ObjectMesh:
     )
 
 
-def _calm(part: trimesh.Trimesh) -> None:
+def _make_matte(part: trimesh.Trimesh) -> None:
     """Gives a part a surface that does not shine like metal, which glTF takes for the default."""
     material = getattr(part.visual, "material", None)
     if material is None:
@@ -103,5 +103,5 @@ def _calm(part: trimesh.Trimesh) -> None:
     part.visual.material = material
 
 
-def _plain(part: trimesh.Trimesh) -> trimesh.Trimesh:
+def _geometry_only(part: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.asarray(part.vertices), np.asarray(part.faces), process=False)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core import BurgError, MissingDependencyError, WorkerDied, content_hash, kept
+from burg_drake.core import BurgError, MissingDependencyError, WorkerDied, cached, content_hash
 from burg_drake.core.workers import WorkerPool
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
@@ -87,7 +87,7 @@ class ObjectPictures:
             return None
         try:
             content = content_hash(self.library.content[name], str(stable_pose), list(SIZE))
-            arrays = kept("picture", content, lambda: {"png": self._rendered(wanted)})
+            arrays = cached("picture", content, lambda: {"png": self._rendered(wanted)})
             return bytes(np.asarray(arrays["png"], dtype=np.uint8))
         except MissingDependencyError as error:
             self.missing = f"no pictures: {error}"

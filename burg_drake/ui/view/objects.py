@@ -14,7 +14,7 @@ from burg_drake.core.terminal import distinct_colors
 from burg_drake.geometry import hull_mesh
 from burg_drake.ui.view.object_meshes import ObjectMeshes
 from burg_drake.ui.view.outlines import footprint
-from burg_drake.ui.widgets import FIXED, Rgb, look_of
+from burg_drake.ui.widgets import FIXED, Rgb, style_of
 
 Coloring = Literal["objects", "random", "status"]
 
@@ -29,7 +29,7 @@ UNKNOWN_RADIUS = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ShownInstance:
     """An instance as it is to be shown.
 
     Attributes:
@@ -53,7 +53,7 @@ class _Nodes:
 
     object: str
     frame: viser.FrameHandle
-    look: Any
+    mesh: Any
     p_OV: Array
     outline: viser.LineSegmentsHandle
     color: Rgb
@@ -89,7 +89,7 @@ class SceneView:
             self.show({}, self._coloring)
             self._shapes = shapes
 
-    def show(self, instances: Mapping[str, Shown], coloring: Coloring) -> None:
+    def show(self, instances: Mapping[str, ShownInstance], coloring: Coloring) -> None:
         """Brings the browser to a scene; only what is not yet so is sent."""
         self._coloring = coloring
         for name in list(self._nodes):
@@ -105,20 +105,20 @@ class SceneView:
         nodes.outline.remove()
         nodes.frame.remove()
 
-    def _add(self, name: str, shown: Shown) -> _Nodes:
+    def _add(self, name: str, shown: ShownInstance) -> _Nodes:
         frame = self._scene.add_frame(f"{ROOT}/{name}", show_axes=False)
-        look: Any
+        mesh: Any
         try:
             shape = self._shapes[shown.object]
         except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
-            look = self._scene.add_icosphere(
+            mesh = self._scene.add_icosphere(
                 f"{ROOT}/{name}/look", radius=UNKNOWN_RADIUS, color=MISSING
             )
             p_OV = UNKNOWN_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
         else:
-            look = self._scene.add_glb(f"{ROOT}/{name}/look", shape.glb)
+            mesh = self._scene.add_glb(f"{ROOT}/{name}/look", shape.glb)
             p_OV = hull_mesh(shape.vertices.astype(float)).vertices
-        self._attach(look, name)
+        self._attach(mesh, name)
         outline = self._scene.add_line_segments(
             f"/outlines/{name}",
             np.zeros((1, 2, 3)),
@@ -129,9 +129,9 @@ class SceneView:
         self._made += 1
         red, green, blue = distinct_colors(self._made)[-1]
         color = (round(255 * red), round(255 * green), round(255 * blue))
-        return _Nodes(shown.object, frame, look, np.asarray(p_OV), outline, color)
+        return _Nodes(shown.object, frame, mesh, np.asarray(p_OV), outline, color)
 
-    def _update(self, nodes: _Nodes, name: str, shown: Shown) -> None:
+    def _update(self, nodes: _Nodes, name: str, shown: ShownInstance) -> None:
         nodes.frame.position = shown.X_SO[:3, 3]
         nodes.frame.wxyz = quaternion_from_rotation(shown.X_SO[:3, :3])
         self._paint(nodes, name, shown)
@@ -143,9 +143,9 @@ class SceneView:
             nodes.outline.colors = np.array(_status_color(shown), dtype=np.uint8)
             nodes.outline.thickness = THICK if shown.selected else THIN
 
-    def _paint(self, nodes: _Nodes, name: str, shown: Shown) -> None:
+    def _paint(self, nodes: _Nodes, name: str, shown: ShownInstance) -> None:
         if self._coloring == "objects":
-            nodes.look.visible = True
+            nodes.mesh.visible = True
             if nodes.tint is not None:
                 nodes.tint.visible = False
             return
@@ -156,7 +156,7 @@ class SceneView:
             nodes.tint.color = color
         if nodes.tint is not None:
             nodes.tint.visible = True
-            nodes.look.visible = False
+            nodes.mesh.visible = False
 
     def _tinted(self, name: str, object: str, color: Rgb) -> viser.MeshHandle | None:
         try:
@@ -170,5 +170,5 @@ class SceneView:
         return tint
 
 
-def _status_color(shown: Shown) -> Rgb:
-    return FIXED if shown.fixed and shown.status == "ok" else look_of(shown.status).color
+def _status_color(shown: ShownInstance) -> Rgb:
+    return FIXED if shown.fixed and shown.status == "ok" else style_of(shown.status).color

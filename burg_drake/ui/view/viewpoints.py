@@ -42,7 +42,7 @@ def viewpoint(board: Board, *, from_above: bool, aspect: float) -> tuple[Array, 
     return target + distance * back, target, fov
 
 
-def look(client: viser.ClientHandle, board: Board, *, from_above: bool) -> None:
+def set_view(client: viser.ClientHandle, board: Board, *, from_above: bool) -> None:
     """Brings a page's camera there."""
     camera = client.camera
     position, target, fov = viewpoint(board, from_above=from_above, aspect=camera.aspect)
@@ -53,7 +53,7 @@ def look(client: viser.ClientHandle, board: Board, *, from_above: bool) -> None:
         camera.look_at = target
 
 
-def begin_with(server: viser.ViserServer, board: Board) -> None:
+def set_initial_view(server: viser.ViserServer, board: Board) -> None:
     """Where the camera of a new page is."""
     position, target, fov = viewpoint(board, from_above=False, aspect=FIRST_ASPECT)
     server.initial_camera.position = position

@@ -15,9 +15,9 @@ from .shortcuts import (
 )
 from .status_colors import (
     FIXED as FIXED,
-    LOOKS as LOOKS,
+    STATUS_STYLES as STATUS_STYLES,
     Rgb as Rgb,
-    look_of as look_of,
+    style_of as style_of,
 )
 from .texts import (
     all_of as all_of,

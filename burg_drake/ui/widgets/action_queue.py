@@ -17,13 +17,13 @@ from typing import Any
 from burg_drake.core import BurgError
 
 Action = Callable[[], Any]
-Complaint = Callable[[Any, str], None]
+ErrorCallback = Callable[[Any, str], None]
 
 _log = logging.getLogger("burg_drake")
 
 
 @dataclass(frozen=True, eq=False)
-class _Asked:
+class _QueuedAction:
     """An action that waits.
 
     Attributes:
@@ -31,14 +31,14 @@ class _Asked:
         who: asked for it, and hears of its errors.
         key: a newer action of the same key takes the place of one that is still the last to wait.
         due: when it may run if nothing waits behind it [s of the monotonic clock].
-        patient: it hurries none that waits before it, but runs before that.
+        wait_for_typing: it hurries none that waits before it, but runs before that.
     """
 
     action: Action
     who: Any
     key: str
     due: float
-    patient: bool
+    wait_for_typing: bool
 
 
 class ActionQueue:
@@ -48,23 +48,23 @@ class ActionQueue:
         complain: gets who asked, and one line that says what went wrong.
     """
 
-    def __init__(self, complain: Complaint) -> None:
-        self._complain = complain
-        self._waiting: deque[_Asked] = deque()
+    def __init__(self, on_error: ErrorCallback) -> None:
+        self._on_error = on_error
+        self._waiting: deque[_QueuedAction] = deque()
         self._condition = threading.Condition()
         self._busy = False
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="setup-page", daemon=True)
         self._thread.start()
 
-    def ask(
+    def submit(
         self,
         action: Action,
         who: Any = None,
         *,
         key: str = "",
         after: float = 0.0,
-        patient: bool = False,
+        wait_for_typing: bool = False,
     ) -> None:
         """Puts an action last.
 
@@ -74,13 +74,13 @@ class ActionQueue:
             key: it replaces an action of the same key that nothing waits behind, as of a drag only
                 the last position counts.
             after: it waits that long for a newer one of its key [s], but never holds up others.
-            patient: it only shows what is so, and does not hurry those that wait before it.
+            wait_for_typing: it only shows what is so, and does not hurry those that wait before it.
         """
-        asked = _Asked(action, who, key, time.monotonic() + after, patient)
+        asked = _QueuedAction(action, who, key, time.monotonic() + after, wait_for_typing)
         with self._condition:
             if self._closed:
                 return
-            last = self._last(patient=patient)
+            last = self._last(wait_for_typing=wait_for_typing)
             if key and last is not None and last.key == key:
                 self._waiting.remove(last)
             self._waiting.append(asked)
@@ -104,16 +104,18 @@ class ActionQueue:
             try:
                 asked.action()
             except BurgError as error:
-                self._complain(asked.who, str(error))
+                self._on_error(asked.who, str(error))
             except Exception as error:  # the page goes on, whatever one action stumbled over
                 _log.exception("the setup page could not do what it was asked")
-                self._complain(asked.who, f"that failed unexpectedly: {error!r}")
+                self._on_error(asked.who, f"that failed unexpectedly: {error!r}")
 
-    def _last(self, *, patient: bool) -> _Asked | None:
+    def _last(self, *, wait_for_typing: bool) -> _QueuedAction | None:
         """The last action that waits; the last that is not patient for those that are not."""
-        return next((a for a in reversed(self._waiting) if patient or not a.patient), None)
+        return next(
+            (a for a in reversed(self._waiting) if wait_for_typing or not a.wait_for_typing), None
+        )
 
-    def _next(self) -> _Asked | None:
+    def _next(self) -> _QueuedAction | None:
         """The next action, as soon as it may run; None at the end."""
         with self._condition:
             self._busy = False
@@ -128,10 +130,10 @@ class ActionQueue:
                     return None
                 self._condition.wait(min((a.due - now for a in self._waiting), default=None))
 
-    def _ready(self, now: float) -> _Asked | None:
+    def _ready(self, now: float) -> _QueuedAction | None:
         """The first that may run at a time."""
-        hurried = self._closed or len([a for a in self._waiting if not a.patient]) > 1
+        hurried = self._closed or len([a for a in self._waiting if not a.wait_for_typing]) > 1
         for asked in self._waiting:
-            if asked.due <= now or (hurried and not asked.patient) or self._closed:
+            if asked.due <= now or (hurried and not asked.wait_for_typing) or self._closed:
                 return asked
         return None

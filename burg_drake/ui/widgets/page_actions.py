@@ -34,21 +34,21 @@ class PageActions:
         self.on_refused: Callable[[], None] = lambda: None
         self._server = server
 
-    def ask(
+    def submit(
         self,
         action: Callable[[], Any],
         client: viser.ClientHandle | None = None,
         *,
         key: str = "",
         after: float = 0.0,
-        patient: bool = False,
+        wait_for_typing: bool = False,
     ) -> None:
-        """Has something done; see `ActionQueue.ask`."""
-        self.queue.ask(action, client, key=key, after=after, patient=patient)
+        """Has something done; see `ActionQueue.submit`."""
+        self.queue.submit(action, client, key=key, after=after, wait_for_typing=wait_for_typing)
 
     def do(self, command: Command, client: viser.ClientHandle | None = None) -> None:
         """Has a step taken."""
-        self.ask(lambda: self.session.do(command), client)
+        self.submit(lambda: self.session.do(command), client)
 
     def with_selection(self, command: Callable[[tuple[str, ...]], Command]) -> Callable[[], Any]:
         """An action that takes a step with whatever is selected when it is done."""
@@ -63,7 +63,7 @@ class PageActions:
 
         @button.on_click
         async def _(event: Any) -> None:
-            self.ask(lambda: action(event.client), event.client)
+            self.submit(lambda: action(event.client), event.client)
 
         return button
 
@@ -73,7 +73,7 @@ class PageActions:
         Args:
             field: of viser.
             action: gets the value.
-            key: see `ActionQueue.ask`.
+            key: see `ActionQueue.submit`.
         """
 
         @field.on_update
@@ -81,7 +81,7 @@ class PageActions:
             if event.client_id is None:  # it was this program
                 return
             value = event.target.value
-            self.ask(lambda: action(value), event.client, key=key)
+            self.submit(lambda: action(value), event.client, key=key)
 
         return field
 
@@ -89,13 +89,13 @@ class PageActions:
         self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING
     ) -> TypedField:
         """The same of a field that is typed in: `after` the last key, or when typing ends."""
-        return TypedField(field, self.ask, action, after)
+        return TypedField(field, self.submit, action, after)
 
-    def tell(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
+    def show_message(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what was done; every page if `client` is None."""
         self._show(client, title or "Done", line, "green", SHORT)
 
-    def warn(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
+    def show_warning(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what it should know."""
         self._show(client, title or "Please note", line, "orange", LONG)
 

@@ -110,13 +110,13 @@ def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, Call]) ->
 
         @command.on_trigger
         async def _(event: Any, call: Call = call) -> None:
-            actions.ask(lambda: call(event.client), event.client)
+            actions.submit(lambda: call(event.client), event.client)
 
     typed = gui.add_command("Take what was typed", hotkey="enter", modifier="alt+shift")
 
     @typed.on_trigger  # by first_page.js; any action makes what was typed before it count
     async def _(event: Any) -> None:
-        actions.ask(lambda: None, event.client)
+        actions.submit(lambda: None, event.client)
 
 
 def show_overlay(client: viser.ClientHandle | None) -> None:

@@ -8,7 +8,7 @@ Rgb = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class StatusLook:
+class StatusStyle:
     """How a status of an instance is shown.
 
     Attributes:
@@ -25,23 +25,23 @@ class StatusLook:
         return hex_color(self.color)
 
 
-LOOKS: dict[str, StatusLook] = {
-    "ok": StatusLook((46, 160, 67), "ok"),
-    "collision": StatusLook((214, 40, 40), "in collision"),
-    "out_of_bounds": StatusLook((236, 90, 180), "out of bounds"),
-    "in_ground": StatusLook((140, 80, 30), "in the ground"),
-    "hovering": StatusLook((64, 140, 230), "hovering"),
+STATUS_STYLES: dict[str, StatusStyle] = {
+    "ok": StatusStyle((46, 160, 67), "ok"),
+    "collision": StatusStyle((214, 40, 40), "in collision"),
+    "out_of_bounds": StatusStyle((236, 90, 180), "out of bounds"),
+    "in_ground": StatusStyle((140, 80, 30), "in the ground"),
+    "hovering": StatusStyle((64, 140, 230), "hovering"),
 }
 """By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022)."""
 
-OTHER = StatusLook((120, 120, 120), "not checked")
+OTHER = StatusStyle((120, 120, 120), "not checked")
 FIXED: Rgb = (150, 155, 162)
 """Of background objects and obstacles."""
 
 
-def look_of(status: str) -> StatusLook:
+def style_of(status: str) -> StatusStyle:
     """How a status is shown."""
-    return LOOKS.get(status, OTHER)
+    return STATUS_STYLES.get(status, OTHER)
 
 
 def hex_color(color: Rgb) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
 
-from burg_drake.ui.widgets.status_colors import look_of
+from burg_drake.ui.widgets.status_colors import style_of
 from burg_drake.visualization.style import Child, Html, element, join
 
 STYLE_FILE = "panels.css"
@@ -47,8 +47,8 @@ def dot(color: str) -> Html:
 
 def status_chip(status: str, count: int) -> Html:
     """How many instances have a status."""
-    look = look_of(status)
-    return element("span", dot(look.hex), f"{count} {look.words}", class_="bd-chip")
+    style = style_of(status)
+    return element("span", dot(style.hex), f"{count} {style.words}", class_="bd-chip")
 
 
 def listing(items: Iterable[Child]) -> Html:

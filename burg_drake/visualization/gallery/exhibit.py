@@ -52,7 +52,7 @@ LIFT = 1e-3
 
 
 @dataclass(frozen=True)
-class Exhibit:
+class GalleryObject:
     """One object, ready to be placed.
 
     Attributes:
@@ -78,9 +78,9 @@ class Exhibit:
     row: GalleryRow
 
 
-def prepare_exhibit(
+def prepare_object(
     library: ObjectLibrary, name: str, contact: tuple[HydroelasticMesh, ...], unit: float
-) -> Exhibit:
+) -> GalleryObject:
     entry = library.entry(name)
     camera = camera_rotation(ELEVATION)
     meshes = [library.mesh(piece) for piece in entry.pieces]
@@ -96,14 +96,14 @@ def prepare_exhibit(
     touching = np.vstack([m.vertices for m in contact]) if contact else corners
     things = [corners @ R_WO.T, np.vstack(apart) @ R_WO.T, touching @ R_WO.T]
     things += [corners @ R.T for R in poses]
-    label, label_width = label_mesh(_about(name, entry), LINE * unit, STRETCH)
+    label, label_width = label_mesh(_description(name, entry), LINE * unit, STRETCH)
     size = CAPTION * LINE * unit
     captions = [label_mesh((text,), size, STRETCH) for text in _captions(entry, contact)]
     items = [
         Item(points.min(axis=0), points.max(axis=0), width)
         for points, (_, width) in zip(things, captions, strict=True)
     ]
-    return Exhibit(
+    return GalleryObject(
         name=name,
         R_WO=R_WO,
         R_WO_poses=tuple(poses),
@@ -116,7 +116,7 @@ def prepare_exhibit(
     )
 
 
-def _about(name: str, entry: ObjectEntry) -> tuple[str, ...]:
+def _description(name: str, entry: ObjectEntry) -> tuple[str, ...]:
     size = " x ".join(f"{1e3 * (b - a):.0f}" for a, b in zip(entry.lower, entry.upper, strict=True))
     about = "" if entry.mass_properties.source == "given" else "~"
     return name, f"{size} mm", f"{about}{grams(entry.mass)}, friction {entry.friction:g}"
@@ -141,7 +141,9 @@ def _touching(entry: ObjectEntry) -> str:
     }.get(entry.contact.kind, entry.contact.kind)
 
 
-def draw_exhibit(meshcat: Meshcat, exhibit: Exhibit, placed: PlacedGalleryRow, unit: float) -> None:
+def draw_object(
+    meshcat: Meshcat, exhibit: GalleryObject, placed: PlacedGalleryRow, unit: float
+) -> None:
     name = exhibit.name
     write_label(meshcat, f"{ROOT}/labels/{name}", exhibit.label, placed.p_WL)
     poses = [f"poses/{name}/{k}" for k in range(len(exhibit.R_WO_poses))]

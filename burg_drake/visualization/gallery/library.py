@@ -14,10 +14,10 @@ from burg_drake.visualization.gallery.exhibit import (
     ROOT,
     STRETCH,
     TILE_HEIGHT,
-    Exhibit,
-    draw_exhibit,
+    GalleryObject,
+    draw_object,
     draw_slab,
-    prepare_exhibit,
+    prepare_object,
 )
 from burg_drake.visualization.gallery.layout import ELEVATION, GalleryLayout, lay_out
 from burg_drake.visualization.meshcat import (
@@ -74,10 +74,10 @@ def show_library(
     entries = [library.entry(name) for name in chosen]
     unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
     contact = hydroelastic_meshes(library, chosen)
-    exhibits = [prepare_exhibit(library, name, contact[name], unit) for name in chosen]
+    exhibits = [prepare_object(library, name, contact[name], unit) for name in chosen]
     layout = lay_out([e.row for e in exhibits], unit, STRETCH * LINE * unit)
     for exhibit, placed in zip(exhibits, layout.rows, strict=True):
-        draw_exhibit(meshcat, exhibit, placed, unit)
+        draw_object(meshcat, exhibit, placed, unit)
     for k, bank in enumerate(layout.banks):
         draw_slab(meshcat, f"{ROOT}/floor/{k}", bank, -TILE_HEIGHT, FLOOR)
     aim(meshcat, layout)
@@ -99,7 +99,7 @@ def aim(meshcat: Meshcat, layout: GalleryLayout) -> None:
     meshcat.SetProperty(lamp, "angle", LAMP_ANGLE)
 
 
-def _legend(exhibits: Sequence[Exhibit]) -> tuple[LegendEntry, ...]:
+def _legend(exhibits: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
     compliant = any(mesh.compliant for e in exhibits for mesh in e.contact)
     contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
     red = "#" + "".join(f"{round(255 * c):02x}" for c in HIGH_PRESSURE)

@@ -45,7 +45,7 @@ has room for one and a half, and captions of two smaller ones stand in it."""
 
 
 @dataclass(frozen=True)
-class Stand:
+class ObjectWithGrasps:
     """An object that is to be placed.
 
     Attributes:
@@ -82,7 +82,7 @@ def show_with_grasps(
     counts = Counter(grasps.object.tolist())
     entries = [library.entry(name) for name in counts]
     unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
-    stands = [_stand(library, name, grasps, width, unit) for name in counts]
+    stands = [_object_with_grasps(library, name, grasps, width, unit) for name in counts]
     layout, rows = _in_rows(stands, unit)
     X_WO = {}
     for members, row in zip(rows, layout.rows, strict=True):
@@ -99,7 +99,9 @@ def show_with_grasps(
     return np.stack([X_WO[name] for name in grasps.object.tolist()]) @ grasps.X_OG
 
 
-def _stand(library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float) -> Stand:
+def _object_with_grasps(
+    library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float
+) -> ObjectWithGrasps:
     corners = np.asarray(hull_mesh(library.surface(name).vertices).vertices)
     R_WO = upright(library.entry(name))
     R_WO = rot_z(best_yaw(corners @ R_WO.T, camera_rotation(ELEVATION))) @ R_WO
@@ -109,10 +111,14 @@ def _stand(library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, un
     count = int(own.sum())
     text = (name, f"{count} grasp{'' if count == 1 else 's'}")
     caption = label_mesh(text, CAPTION * LINE * unit, STRETCH)
-    return Stand(name, R_WO, Item(points.min(axis=0), points.max(axis=0), caption[1]), caption)
+    return ObjectWithGrasps(
+        name, R_WO, Item(points.min(axis=0), points.max(axis=0), caption[1]), caption
+    )
 
 
-def _in_rows(stands: list[Stand], unit: float) -> tuple[GalleryLayout, list[list[Stand]]]:
+def _in_rows(
+    stands: list[ObjectWithGrasps], unit: float
+) -> tuple[GalleryLayout, list[list[ObjectWithGrasps]]]:
     """As many rows, one behind the other, as let the camera come nearest."""
     layouts = []
     for count in range(1, len(stands) + 1):

@@ -79,14 +79,14 @@ def hand_visuals(
     )
     for finger, joint in zip(hand.fingers, added.joints, strict=True):
         joint.set_translation(closed, finger.closed)
-    way = hand.opening[1] - hand.opening[0]
+    stroke = hand.opening[1] - hand.opening[0]
     inspector = diagram.scene_graph().model_inspector()
     visuals = []
     for index in plant.GetBodyIndices(added.instance):
         body = plant.get_body(index)
         X_HB = plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
         p_HB_closed = plant.EvalBodyPoseInWorld(closed, body).translation()
-        slide = np.round((p_HB_closed - X_HB[:3, 3]) / way, 9)
+        slide = np.round((p_HB_closed - X_HB[:3, 3]) / stroke, 9)
         for geometry in plant.GetVisualGeometriesForBody(body):
             shape = inspector.GetShape(geometry)
             given = inspector.GetIllustrationProperties(geometry).GetPropertyOrDefault(

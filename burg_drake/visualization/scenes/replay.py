@@ -72,7 +72,7 @@ def record_trial(
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
     offset = camera_offset(X_WG, np.reshape(others, (-1, 3)))
-    steps = [way.length * way.direction_W for way in trial.ways(X_WG, lift)]
+    steps = [path.length * path.direction_W for path in trial.lift_paths(X_WG, lift)]
     on_way = [hand + p_W for p_W in np.cumsum(steps, axis=0)]
     aim_at(meshcat, np.vstack([scene_points(scene, station), hand, *on_way]), -offset)
     meshcat.StartRecording(FRAMES_PER_SECOND, set_visualizations_while_recording=False)
@@ -104,13 +104,13 @@ def camera_offset(X_WG: Array, p_WB: Array) -> Array:
     cost = (
         (headings @ closing) ** 2
         + 1.5 * np.maximum(headings @ -approach, 0.0)
-        + 0.3 * np.array([min(_in_the_way(X_WG[:3, 3], h, p_WB), 2) for h in headings])
+        + 0.3 * np.array([min(_blocks_view(X_WG[:3, 3], h, p_WB), 2) for h in headings])
         + 0.25 * (1.0 - headings[:, :2] @ VIEW)
     )
     return DISTANCE * headings[np.argmin(cost)] + (0.0, 0.0, CAMERA_HEIGHT)
 
 
-def _in_the_way(p_WG: Array, heading: Array, p_WB: Array) -> int:
+def _blocks_view(p_WG: Array, heading: Array, p_WB: Array) -> int:
     """How many points (M, 3) are less than `CLEAR_VIEW` beside the horizontal line of sight."""
     offset = (p_WB - p_WG) * (1.0, 1.0, 0.0)
     along = offset @ heading

@@ -25,7 +25,7 @@ def test_both_painters_see_the_same(
 ) -> None:
     for trial in (runs.sheet.trials[0], runs.sheet.trials[5]):
         (one, placed, view), (two, also, other) = (
-            painter.look(trial, SMALL) for painter in (pictures, by_rays)
+            painter.paint_grasp(trial, SMALL) for painter in (pictures, by_rays)
         )
         assert np.array_equal(view.X_SC, other.X_SC)
         for name in (HAND, *runs.of(trial).scene.instances):
@@ -36,7 +36,7 @@ def test_both_painters_see_the_same(
 
 def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: TrialPictures) -> None:
     for trial in runs.sheet.trials:
-        painting, placed, view = pictures.look(trial, SMALL)
+        painting, placed, view = pictures.paint_grasp(trial, SMALL)
         # A projection of its own: pinhole, pixel centres at integers, S to C.
         R, p = view.X_SC[:3, :3], view.X_SC[:3, 3]
         X_SG, half = runs.X_SG(trial), runs.width(trial) / 2 + 0.006
@@ -56,7 +56,7 @@ def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: Trial
 
 def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
     trial = runs.sheet.trials[2]
-    painting, placed, _ = pictures.look(trial, SMALL)
+    painting, placed, _ = pictures.paint_grasp(trial, SMALL)
     data = np.frombuffer(pictures.grasp(trial, SMALL), np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
     orange = np.abs(image - RIM).max(axis=2) < 70

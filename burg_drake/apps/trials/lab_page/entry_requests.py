@@ -80,7 +80,7 @@ def _fits(kind: type, value: Any) -> bool:
 
 
 def _require_line(name: str, value: str) -> None:
-    """Refuses what is too long, and what is no text: parts of characters, control characters."""
+    """Refuses what is too long, and what is not a text: parts of characters, control characters."""
     most = LONGEST.get(name, 64)
     if len(value) > most:
         raise _bad(f"{name} has {len(value)} characters; at most {most}")
@@ -103,7 +103,7 @@ def _time(value: str) -> str:
     except ValueError:
         moment = None
     if moment is None or moment.tzinfo is None:
-        raise _bad(f"time {quoted(value)} is no date and time with its zone")
+        raise _bad(f"time {quoted(value)} is not a date and time with its zone")
     return moment.isoformat(timespec="seconds")
 
 

@@ -26,7 +26,7 @@ from typing import Any
 
 from burg_drake.apps.trials.lab_page.entry_requests import lab_entry, trial_number
 from burg_drake.apps.web import Answer, PageHandler, PageServer, address, picture_number
-from burg_drake.core import LOCALHOST, BrowserToken, BurgError, RequestError, require_own_host
+from burg_drake.core import LOCALHOST, BrowserToken, BurgError, RequestError, require_local_host
 from burg_drake.experiment.pages import (
     EntryConflict,
     LabBook,
@@ -134,7 +134,7 @@ class LabHandler(PageHandler):
     def admitted(self) -> tuple[str, dict[str, str]]:
         """This machine is meant, and the browser was admitted or brings the token."""
         path, query = address(self.path)
-        require_own_host(self._header, served=self.server.host, is_page=path == "/")
+        require_local_host(self._header, served=self.server.host, is_page=path == "/")
         self._require_browser(path, query)
         return path, query
 

@@ -62,11 +62,11 @@ class Aligner(Protocol):
 
     view: PinholeView
     evidence: Array
-    fine: float
+    residual_floor: float
     """Residuals below this tell nothing about which of two alignments is better."""
-    convincing: float
+    convincing_rating: float
     """Rating of a place near the target's angle at which no other is tried; at most 3."""
-    better: float
+    required_gain: float
     """By how much a place far from the target's angle must be rated higher."""
     clearly: float
     """By how much a place must be rated higher than any other to be sure."""

@@ -73,8 +73,8 @@ def outline(view: PinholeView, shape: TargetShape, q: Array, others: Array) -> I
     _, e = view.project(ends.reshape(-1, 3))
     e = e.reshape(-1, 2, 2)
     _, m = view.project(third)
-    way = e[:, 1] - e[:, 0]
-    normal = np.stack([way[:, 1], -way[:, 0]], axis=1)
+    normal_C = e[:, 1] - e[:, 0]
+    normal = np.stack([normal_C[:, 1], -normal_C[:, 0]], axis=1)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
     inward = np.einsum("ni,ni->n", normal, m - e[:, 0])
     normal = (normal * np.where(inward > 0.0, -1.0, 1.0)[:, None])[edge]

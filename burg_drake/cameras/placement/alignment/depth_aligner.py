@@ -84,7 +84,12 @@ class DepthAligner:
 
     def __init__(self, view: PinholeView, depth: NDArray[np.float32]) -> None:
         self.view = view
-        self.convincing, self.better, self.clearly, self.strict = 2.94, 0.02, 0.03, True
+        self.convincing_rating, self.required_gain, self.clearly, self.strict = (
+            2.94,
+            0.02,
+            0.03,
+            True,
+        )
         self._depth = depth.astype(float)
         u, v = np.meshgrid(np.arange(view.size[0]), np.arange(view.size[1]))
         fx, fy, cx, cy = view.K[0, 0], view.K[1, 1], view.K[0, 2], view.K[1, 2]
@@ -96,7 +101,7 @@ class DepthAligner:
         low = np.abs(height[self._valid & (np.abs(height) < 0.01)])
         spread = 1.4826 * float(np.median(low)) if len(low) > 100 else 2.0 * LEAST_NOISE
         self._noise = max(spread, LEAST_NOISE)
-        self.fine, self.rough = self._noise, ROUGH
+        self.residual_floor, self.rough = self._noise, ROUGH
         self._stands = self._valid & (height > HEIGHT * self._noise)
         evidence = np.clip(height / (HEIGHT * self._noise), 0.0, 1.0) * 2.0 - 1.0
         self.evidence = np.where(self._valid, evidence, 0.0)
@@ -257,7 +262,7 @@ class _Measurements:
         return Alignment(
             q,
             solved.covariance,
-            solved.gain @ self._camera,
+            solved.sensitivity @ self._camera,
             float(share),
             float(share),
             float(np.sqrt(np.mean(left[fits] ** 2))) if fits.any() else float("nan"),

@@ -29,14 +29,14 @@ class DisplacementFit:
         covariance: (3, 3) of it.
         weights: (N,) of the measurements, in [0, 1]; 0 for outliers.
         scale: standard deviation of the measurements over what they claim.
-        gain: (3, N) by how much each measurement moves the result.
+        sensitivity: (3, N) by how much each measurement moves the result.
     """
 
     step: Array
     covariance: Array
     weights: Array
     scale: float
-    gain: Array
+    sensitivity: Array
 
 
 def fit_displacement(

@@ -50,15 +50,15 @@ class PhotoEdges:
         shading: (N,) how far inwards it is measured, per share by which the object is darker at its
             very edge than beside it, as round objects are [pixels].
         found: (N,) there is one.
-        looked: (N,) there should be one: nothing else is in the way, and what is beside the outline
-            inside and outside looks different.
+        expected: (N,) there should be one: nothing else is in the way, and what is inside the
+            outline looks different from what is outside.
     """
 
     offset: Array
     deviation: Array
     shading: Array
     found: NDArray[np.bool_]
-    looked: NDArray[np.bool_]
+    expected: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,16 +70,16 @@ class NormalProfiles:
         image: (N, T, 3) the photo.
         board: (N, T, 3) the board without objects.
         known: (N, T) `board` can be relied on.
-        own: (N, T) the object covers it.
-        other: (N, T) another object covers it.
+        covered: (N, T) the object covers it.
+        occluded: (N, T) another object covers it.
     """
 
     t: Array
     image: Array
     board: Array
     known: NDArray[np.bool_]
-    own: NDArray[np.bool_]
-    other: NDArray[np.bool_]
+    covered: NDArray[np.bool_]
+    occluded: NDArray[np.bool_]
 
 
 def normal_profiles(
@@ -118,10 +118,10 @@ def far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     """The best place on each line for a step from the object to the background."""
     t, reach = on.t, float(on.t[-1])
     far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
-    object_color = _mean(on.image, on.own & far_in)
-    around = _mean(on.image, np.broadcast_to(far_out, on.own.shape))
-    usable: NDArray[np.bool_] = np.asarray((on.own & far_in).any(axis=1))
-    usable &= ~(on.other & (t > -1.0)).any(axis=1)
+    object_color = _mean(on.image, on.covered & far_in)
+    around = _mean(on.image, np.broadcast_to(far_out, on.covered.shape))
+    usable: NDArray[np.bool_] = np.asarray((on.covered & far_in).any(axis=1))
+    usable &= ~(on.occluded & (t > -1.0)).any(axis=1)
     tolerance = DIFFERENT * picture.contrast
     known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, t > 0.0], axis=1))
     behind = np.where(known[:, None, None], on.board, around[:, None])
@@ -147,19 +147,19 @@ def near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     t = on.t
     blur = float(np.hypot(picture.blur, PIXEL))
     clear = max(SHARP * blur, 0.9)
-    core = on.own & np.roll(on.own, 2, axis=1)
+    core = on.covered & np.roll(on.covered, 2, axis=1)
     inner = core & (t <= -clear) & (t >= -clear - BESIDE)
-    outer = np.broadcast_to((t >= clear) & (t <= clear + 2.0), on.own.shape) & ~on.own
-    usable = inner.any(axis=1) & outer.any(axis=1) & ~(on.own & (t > 0.7)).any(axis=1)
-    mixed = (on.other & (t > 0.0)).any(axis=1) & ~(on.other | (t < 0.0)).all(axis=1)
-    usable &= ~mixed & ~(on.other & (t < 0.0) & (t > -2.0) & ~on.own).any(axis=1)
+    outer = np.broadcast_to((t >= clear) & (t <= clear + 2.0), on.covered.shape) & ~on.covered
+    usable = inner.any(axis=1) & outer.any(axis=1) & ~(on.covered & (t > 0.7)).any(axis=1)
+    mixed = (on.occluded & (t > 0.0)).any(axis=1) & ~(on.occluded | (t < 0.0)).all(axis=1)
+    usable &= ~mixed & ~(on.occluded & (t < 0.0) & (t > -2.0) & ~on.covered).any(axis=1)
     color = _mean(on.image, inner)
     known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
     drift = _mean(on.image - on.board, outer)
     board = on.board + drift[:, None]
     behind = np.where(known[:, None, None], board, _mean(on.image, outer)[:, None])
     step = color[:, None] - behind
-    weight = ((t > 0.0) | on.own | (t > -1.0)).astype(float) * (t > -clear - BESIDE) * (t < 3.6)
+    weight = ((t > 0.0) | on.covered | (t > -1.0)).astype(float) * (t > -clear - BESIDE) * (t < 3.6)
     offset, slope = np.zeros(len(color)), np.zeros_like(weight)
     for _ in range(4):
         away = (offset[:, None] - t) / blur

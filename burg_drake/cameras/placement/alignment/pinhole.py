@@ -69,9 +69,9 @@ class PinholeView:
         rays[:, :2] = (at - self.K[:2, 2]) / self.K[[0, 1], [0, 1]]
         length = np.linalg.norm(rays, axis=1)
         X_OC = inverse(shape.displacement(q)) @ self.X_SC
-        way = (rays / length[:, None]) @ X_OC[:3, :3].T
-        origins = np.broadcast_to(X_OC[:3, 3], way.shape)
-        _, distance = shape.rays.first_hits(origins, way)
+        direction = (rays / length[:, None]) @ X_OC[:3, :3].T
+        origins = np.broadcast_to(X_OC[:3, 3], direction.shape)
+        _, distance = shape.rays.first_hits(origins, direction)
         return (distance / length).reshape(pixels.shape[:-1])
 
     def buffer(self, shape: TargetShape, q: Array, window: Window) -> Array:

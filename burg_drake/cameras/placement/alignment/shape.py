@@ -79,7 +79,7 @@ class TargetShape:
         """Whether two displacements (3,) look the same: a box turned by half a turn."""
         X_SS = inverse(self.displacement(a)) @ self.displacement(b)
         points, _ = self.surface
-        return self._itself.holds(transform_points(X_SS, points[::12]))
+        return self._itself.contains_points(transform_points(X_SS, points[::12]))
 
     @cached_property
     def _itself(self) -> _SurfaceMatcher:
@@ -143,7 +143,7 @@ def _is_round(surface: trimesh.Trimesh) -> bool:
     """Whether a surface looks the same after any turn about the z axis of its frame."""
     points, normals = sample_surface(surface, SAMPLES)
     itself = _SurfaceMatcher(points, normals)
-    return all(itself.holds(points[::12] @ rot_z(float(angle)).T) for angle in TURNS)
+    return all(itself.contains_points(points[::12] @ rot_z(float(angle)).T) for angle in TURNS)
 
 
 class _SurfaceMatcher:
@@ -160,7 +160,7 @@ class _SurfaceMatcher:
         apart = self._tree.query(points[::12], k=2)[0][:, 1]
         self._beside = 6.0 * float(np.median(apart)) + self._tolerance
 
-    def holds(self, moved: Array) -> bool:
+    def contains_points(self, moved: Array) -> bool:
         """Whether most of some moved points (M, 3) are on the surface."""
         distance, near = self._tree.query(moved, k=3)
         away = moved[:, None] - self._points[near]

@@ -59,10 +59,15 @@ class SilhouetteAligner:
 
     def __init__(self, view: PinholeView, image: Array, picture: EmptyBoard) -> None:
         self.view = view
-        self.convincing, self.better, self.clearly, self.strict = 2.8, 0.15, 0.08, False
+        self.convincing_rating, self.required_gain, self.clearly, self.strict = (
+            2.8,
+            0.15,
+            0.08,
+            False,
+        )
         self.evidence = picture.evidence
         self.rough = ROUGH * max(1.0, picture.blur)
-        self.fine = FINE
+        self.residual_floor = FINE
         self._image: NDArray[np.float32] = np.ascontiguousarray(image, dtype=np.float32)
         self._picture = picture
 
@@ -81,8 +86,8 @@ class SilhouetteAligner:
         Returns:
             None if the photo does not determine where it is.
         """
-        near = self._roughly(shape, q, others) if far else q
-        return None if near is None else self._exactly(shape, near, others, turn)
+        near = self._coarse_fit(shape, q, others) if far else q
+        return None if near is None else self._fine_fit(shape, near, others, turn)
 
     def misfit(
         self, shape: TargetShape, q: Array, others: Array, window: Window
@@ -98,7 +103,7 @@ class SilhouetteAligner:
         evidence = np.where(free, sample_nearest(self.evidence, at, 0.0), 0.0)
         return float(np.maximum(np.where(own, -evidence, evidence), 0.0).sum()), float(own.sum())
 
-    def _roughly(self, shape: TargetShape, q: Array, others: Array) -> Array | None:
+    def _coarse_fit(self, shape: TargetShape, q: Array, others: Array) -> Array | None:
         """The displacement to a pixel or so, from many away; None without an outline."""
         for share in FAR:
             contour = outline(self.view, shape, q, others)
@@ -110,10 +115,12 @@ class SilhouetteAligner:
             solved = _solve(shape, contour, far_edges(on, self._picture))
             if solved is None:
                 break
-            q = q + _limited(solved.step)
+            q = q + _limit_step(solved.step)
         return q
 
-    def _exactly(self, shape: TargetShape, q: Array, others: Array, turn: bool) -> Alignment | None:
+    def _fine_fit(
+        self, shape: TargetShape, q: Array, others: Array, turn: bool
+    ) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
         start, result = q, None
         for _ in range(NEAR_ROUNDS):
@@ -126,7 +133,7 @@ class SilhouetteAligner:
             solved = _solve(shape, contour, edges, turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > LOST:
                 return None
-            q = q + _limited(solved.step)
+            q = q + _limit_step(solved.step)
             result = _result(q, contour, edges, solved)
             if np.abs(contour.along @ solved.step).max() < SETTLED:
                 break
@@ -152,7 +159,7 @@ def _solve(
     )
 
 
-def _limited(step: Array) -> Array:
+def _limit_step(step: Array) -> Array:
     """No round moves an object farther than edges were looked for, or turns it out of sight."""
     return np.clip(step, [-0.02, -0.02, -0.3], [0.02, 0.02, 0.3])
 
@@ -166,13 +173,15 @@ def _result(
     residual = _rms(left[agrees], edges.deviation[used][agrees])
     normals = contour.normals[used]
     rough = max(residual, FINE) if np.isfinite(residual) else AGREES
-    shifted = SHIFTED * rough * solved.gain @ normals
-    twisted = TWISTED * rough * solved.gain @ (normals * _ends(contour.pixels[used])[:, None])
+    shifted = SHIFTED * rough * solved.sensitivity @ normals
+    twisted = (
+        TWISTED * rough * solved.sensitivity @ (normals * _ends(contour.pixels[used])[:, None])
+    )
     return Alignment(
         q,
         solved.covariance + shifted @ shifted.T + twisted @ twisted.T,
-        -solved.gain @ contour.camera[used],
-        float(agrees.sum() / max(edges.looked.sum(), 1)),
+        -solved.sensitivity @ contour.camera[used],
+        float(agrees.sum() / max(edges.expected.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
         residual,
         int(agrees.sum()),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import Array
-from burg_drake.core.terminal import count, figure
+from burg_drake.core.terminal import format_count, format_number
 from burg_drake.evaluation.report.elements.blocks import Html, element
 from burg_drake.evaluation.report.elements.charts import BINS, Series, nice_step
 
@@ -128,9 +128,9 @@ def _bars(series: Sequence[Series], axis: _Axis, base: float, way: int) -> list[
             below += n
         if k == BINS and below:
             y = base + way * (BAR * below / highest + 3) + (8 if way > 0 else 0)
-            bars.append(element("text", count(below), x=right, y=f"{y:.1f}", class_="end"))
+            bars.append(element("text", format_count(below), x=right, y=f"{y:.1f}", class_="end"))
     y = base + way * BAR
-    bars.append(element("text", count(highest), x=LEFT - 4, y=y, dy="0.35em", class_="end"))
+    bars.append(element("text", format_count(highest), x=LEFT - 4, y=y, dy="0.35em", class_="end"))
     return bars
 
 
@@ -182,4 +182,5 @@ def _spoken(name: str, values: Array, unit: str) -> str:
     median = float(np.median(values))
     decimals = 2 if abs(median) < 10.0 else 1 if abs(median) < 100.0 else 0
     space = "" if unit == "°" else " "
-    return f"{name}: {count(len(values))}, median {figure(median, decimals)}{space}{unit}"
+    middle = f"{format_number(median, decimals)}{space}{unit}"
+    return f"{name}: {format_count(len(values))}, median {middle}"

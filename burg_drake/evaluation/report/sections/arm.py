@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.core.terminal import percent
+from burg_drake.core.terminal import format_percent
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -36,12 +36,13 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
         count = summary.total.outcomes[outcome]
         if count:
             cells = [
-                element("td", cell, class_="number") for cell in (count, percent(count / clear))
+                element("td", cell, class_="number")
+                for cell in (count, format_percent(count / clear))
             ]
             name = element("th", outcome.value.replace("_", " "), scope="row")
             way = element("td", _blockers(columns, outcome))
             rows.append(element("tr", name, *cells, element("td", MEANING.get(outcome, "")), way))
-    share = f" ({percent(planned / clear)})" if clear else ""
+    share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute {planned}{share}:"
         " along a collision-free way from home to the pregrasp, straight to the grasp, and straight"

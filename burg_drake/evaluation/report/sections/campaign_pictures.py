@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import BurgError, make_pose, transform_points
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.report.elements import (
     LIFTED,
     DrawnGrasps,
@@ -65,7 +65,9 @@ def object_pictures(
     text += " right all others. Forks are the fingers, with their stem toward the arm."
     total = int(numbers[shown].sum())
     if drawn < total:
-        text += f" Drawn are {count(drawn)} of {count(total)}, evenly from all outcomes."
+        text += (
+            f" Drawn are {format_count(drawn)} of {format_count(total)}, evenly from all outcomes."
+        )
     if len(shown) < len(ranked):
         text += f" Of {len(ranked)} objects the {len(shown)} with most grasps are shown."
     legend = group_legend(present(groups))
@@ -109,6 +111,6 @@ def _figure(
     X_SO = make_pose(upright(library.entry(name)))
     surface = surface_of(library, name)
     solid = SolidMesh(transform_points(X_SO, surface.vertices), surface.faces)
-    lifted = f" {count(int(counts[LIFTED]))} of {count(len(rows))} lifted"
+    lifted = f" {format_count(int(counts[LIFTED]))} of {format_count(len(rows))} lifted"
     caption = element("figcaption", element("b", name), lifted)
     return element("figure", caption, grasp_drawing(name, solid, X_SO, grasps))

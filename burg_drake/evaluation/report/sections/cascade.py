@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from burg_drake.core.terminal import count, percent
+from burg_drake.core.terminal import format_count, format_percent
 from burg_drake.evaluation.report.elements import STYLES, Html, element, section
 from burg_drake.evaluation.report.sections.outcomes import STOPPED, label
 from burg_drake.evaluation.results import OutcomeCounts, Summary
@@ -36,15 +36,15 @@ def cascade_section(summary: Summary) -> Html:
 
 def _row(total: OutcomeCounts, step: str, before: int | None) -> Html:
     passed, whole = total.funnel[step], max(total.judged, 1)
-    share = f"{percent(passed / whole)} of all"
+    share = f"{format_percent(passed / whole)} of all"
     if before and passed < before < whole:
-        share += f", {percent(passed / before)} of the stage before"
+        share += f", {format_percent(passed / before)} of the stage before"
     lost = _lost(total, step)
     name = element("b", step), " ", element("span", MEANING[step], class_="faint")
     return element(
         "li",
         element("span", *name, class_="step"),
-        element("span", count(passed), class_="passed"),
+        element("span", format_count(passed), class_="passed"),
         _bar(total, step, passed, whole),
         element(
             "span",
@@ -69,5 +69,5 @@ def _lost(total: OutcomeCounts, step: str) -> str:
     lost = [(total.outcomes[o], label(o)) for o in STOPPED.get(step, ()) if total.outcomes[o]]
     if not lost:
         return ""
-    parts = [f"{count(n)} {name}" for n, name in sorted(lost, key=lambda pair: -pair[0])]
-    return f"{count(sum(n for n, _ in lost))}: {', '.join(parts)}"
+    parts = [f"{format_count(n)} {name}" for n, name in sorted(lost, key=lambda pair: -pair[0])]
+    return f"{format_count(sum(n for n, _ in lost))}: {', '.join(parts)}"

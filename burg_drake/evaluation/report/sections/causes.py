@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array
 from burg_drake.core.grasps import Outcome
-from burg_drake.core.terminal import count, percent
+from burg_drake.core.terminal import format_count, format_percent
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import STYLES, Html, command, element, section
 from burg_drake.evaluation.report.sections.outcomes import label
@@ -162,7 +162,9 @@ def _entry(cause: Cause, whole: int, replay: str) -> Html:
             "h3",
             element("i", class_=style, aria_hidden="true"),
             label(cause.outcome),
-            element("span", f"{count(cause.number)} ({percent(cause.number / whole)})"),
+            element(
+                "span", f"{format_count(cause.number)} ({format_percent(cause.number / whole)})"
+            ),
         ),
         element("p", f"{MEANING[cause.outcome]}; {'; '.join(where)}"),
         command(replay),
@@ -170,4 +172,4 @@ def _entry(cause: Cause, whole: int, replay: str) -> Html:
 
 
 def _listed(named: tuple[tuple[str, int], ...]) -> str:
-    return ", ".join(f"{name} ({count(number)})" for name, number in named)
+    return ", ".join(f"{name} ({format_count(number)})" for name, number in named)

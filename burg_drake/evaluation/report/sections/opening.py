@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from burg_drake.core import clustered_interval
-from burg_drake.core.terminal import count, percent
+from burg_drake.core.terminal import format_count, format_percent
 from burg_drake.evaluation.report.elements import Child, Html, element, tiles
 from burg_drake.evaluation.report.sections.outcomes import STOPPED
 from burg_drake.evaluation.results import OutcomeCounts, Summary
@@ -58,7 +58,7 @@ def interval_text(summary: Summary, *, executed: bool) -> str:
 
 def grasps(number: int) -> str:
     """So many grasps."""
-    return f"{count(number)} grasp{'' if number == 1 else 's'}"
+    return f"{format_count(number)} grasp{'' if number == 1 else 's'}"
 
 
 def _success(summary: Summary) -> str:
@@ -67,10 +67,9 @@ def _success(summary: Summary) -> str:
         return "No grasp is judged yet."
     if not total.lifted:
         return f"None of {grasps(total.judged)} lifted its object."
-    share = (
-        f"{percent(total.lifted / total.judged)}, interval {interval_text(summary, executed=False)}"
-    )
-    return f"{count(total.lifted)} of {grasps(total.judged)} lifted their object ({share})."
+    interval = interval_text(summary, executed=False)
+    share = f"{format_percent(total.lifted / total.judged)}, interval {interval}"
+    return f"{format_count(total.lifted)} of {grasps(total.judged)} lifted their object ({share})."
 
 
 def _cascade(summary: Summary) -> str:
@@ -80,10 +79,10 @@ def _cascade(summary: Summary) -> str:
     if not total.executed:
         return f"Nothing was executed: {_losses(summary)}."
     whole = "by the whole arm" if summary.mode == "arm" else "by the hand"
-    share = f"{percent(total.lifted / total.executed)}, interval"
+    share = f"{format_percent(total.lifted / total.executed)}, interval"
     share += f" {interval_text(summary, executed=True)}"
-    text = f"Of the {count(total.executed)} that were executed {whole} in simulation,"
-    text += f" {count(total.lifted)} succeeded ({share})."
+    text = f"Of the {format_count(total.executed)} that were executed {whole} in simulation,"
+    text += f" {format_count(total.lifted)} succeeded ({share})."
     if total.executed < total.judged:
         text += f" The others ended before that: {_losses(summary)}."
     return text
@@ -101,7 +100,7 @@ def _losses(summary: Summary) -> str:
         (sum(summary.total.outcomes[o] for o in STOPPED[step]), text)
         for step, text in words.items()
     ]
-    return ", ".join(f"{text} in {count(number)}" for number, text in counts if number)
+    return ", ".join(f"{text} in {format_count(number)}" for number, text in counts if number)
 
 
 def _spread(groups: Sequence[OutcomeCounts], what: str) -> str:
@@ -112,18 +111,18 @@ def _spread(groups: Sequence[OutcomeCounts], what: str) -> str:
     shares = [group.lifted / group.executed for group in tried]
     if min(shares) == max(shares):
         where = "In" if what == "scene" else "On"
-        return f"{where} each {what} that was tried it is {percent(shares[0])}."
+        return f"{where} each {what} that was tried it is {format_percent(shares[0])}."
     if what == "scene" and len(tried) >= MANY:
         low, middle, high = np.quantile(shares, [0.25, 0.5, 0.75])
         return (
-            f"In half of the scenes, success when executed is between {percent(low)} and"
-            f" {percent(high)} (median {percent(middle)})."
+            f"In half of the scenes, success when executed is between {format_percent(low)} and"
+            f" {format_percent(high)} (median {format_percent(middle)})."
         )
     low, high = (tried[shares.index(pick(shares))] for pick in (min, max))
     return (
-        f"By {what}, success when executed is between {percent(min(shares))} ({low.name}:"
-        f" {low.lifted} of {low.executed}) and {percent(max(shares))} ({high.name}: {high.lifted}"
-        f" of {high.executed})."
+        f"By {what}, success when executed is between {format_percent(min(shares))} ({low.name}:"
+        f" {low.lifted} of {low.executed}) and {format_percent(max(shares))} ({high.name}:"
+        f" {high.lifted} of {high.executed})."
     )
 
 
@@ -131,23 +130,27 @@ def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
     total = summary.total
     screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a way"
     disturbed = total.held - total.lifted
-    extra = f"; {count(disturbed)} more disturbed others" if disturbed else ""
-    scenes = f" in {count(len(summary.scenes))} scenes" if summary.scenes else ""
+    extra = f"; {format_count(disturbed)} more disturbed others" if disturbed else ""
+    scenes = f" in {format_count(len(summary.scenes))} scenes" if summary.scenes else ""
     objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
     return [
-        ("Grasps judged", count(total.judged), objects + scenes),
-        ("Executed", count(total.executed), screened),
-        ("Lifted", count(total.lifted), f"of {count(total.executed)} executed{extra}"),
+        ("Grasps judged", format_count(total.judged), objects + scenes),
+        ("Executed", format_count(total.executed), screened),
+        (
+            "Lifted",
+            format_count(total.lifted),
+            f"of {format_count(total.executed)} executed{extra}",
+        ),
         (
             "Success when executed",
-            percent(total.lifted / total.executed) if total.executed else "-",
+            format_percent(total.lifted / total.executed) if total.executed else "-",
             f"{interval_text(summary, executed=True)} (95 % interval)"
             if total.executed
             else "nothing executed",
         ),
         (
             "Success of all",
-            percent(total.lifted / total.judged) if total.judged else "-",
+            format_percent(total.lifted / total.judged) if total.judged else "-",
             f"{interval_text(summary, executed=False)} (95 % interval)"
             if total.judged
             else "nothing judged",

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from burg_drake.core.grasps import Outcome, Stage
-from burg_drake.core.terminal import count as number, duration, figure, percent
+from burg_drake.core.terminal import (
+    format_count as number,
+    format_duration,
+    format_number,
+    format_percent,
+)
 from burg_drake.evaluation.report.elements import (
     STYLES,
     BarPart,
@@ -90,7 +95,7 @@ def group_row(group: OutcomeCounts, style: str = "", name: Child = None) -> Html
     share: Child = element("span", "nothing executed", class_="faint")
     if group.executed:
         mark = interval_mark(group.lifted / group.executed, *group.interval)
-        share = join(mark, f" {percent(group.lifted / group.executed)}")
+        share = join(mark, f" {format_percent(group.lifted / group.executed)}")
     return element(
         "tr",
         element("th", group.name if name is None else name, scope="row"),
@@ -128,8 +133,13 @@ def cost_section(summary: Summary) -> Html:
     head = ["stage", "grasps", "CPU time", "median", "grasps per CPU second"]
     rows = []
     for cost in summary.costs:
-        rate = figure(cost.rate)
-        cells: list[Child] = [cost.grasps, duration(cost.seconds), duration(cost.median), rate]
+        rate = format_number(cost.rate)
+        cells: list[Child] = [
+            cost.grasps,
+            format_duration(cost.seconds),
+            format_duration(cost.median),
+            rate,
+        ]
         numbers = [element("td", cell, class_="number") for cell in cells]
         rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))
     text = "CPU time of the worker processes, without their start."

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, BurgError, rotation_from_quaternion
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.records import Columns, best_rows
 from burg_drake.evaluation.report.elements import (
     LIFTED,
@@ -105,7 +105,9 @@ def grasp_section(pictures: Pictures | None) -> Html | None:
     text += " the right with all others. Forks are the fingers, with their stem toward the arm; a"
     text += " grasp's id shows where the pointer rests."
     if drawn < total:
-        text += f" Drawn are {count(drawn)} of {count(total)}, evenly from all outcomes."
+        text += (
+            f" Drawn are {format_count(drawn)} of {format_count(total)}, evenly from all outcomes."
+        )
     if len(shown) < len(with_grasps):
         text += f" The first {len(shown)} of {len(with_grasps)} objects are shown."
     return section(
@@ -142,7 +144,10 @@ def _figure(
     )
     drawing = grasp_drawing(name, pictures.solids[name], pictures.scene.X_SO(name), grasps)
     best = best_rows({key: values[rows] for key, values in columns.items() if key in RANKED})
-    caption = [element("b", name), f" {count(int(counts[LIFTED]))} of {count(len(rows))} lifted"]
+    caption = [
+        element("b", name),
+        f" {format_count(int(counts[LIFTED]))} of {format_count(len(rows))} lifted",
+    ]
     if best:
         id = str(columns["id"][rows[best[0]]])
         caption += [", best: ", element("code", id, class_="copy")]

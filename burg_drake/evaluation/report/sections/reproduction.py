@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core.terminal import duration
+from burg_drake.core.terminal import format_duration
 from burg_drake.evaluation.records import (
     HASH_DIGITS,
     CampaignDocument,
@@ -165,7 +165,7 @@ def _engine_text(engine: Engine) -> str:
 def _engine_value(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return duration(value) if isinstance(value, float) else str(value).replace("_", " ")
+    return format_duration(value) if isinstance(value, float) else str(value).replace("_", " ")
 
 
 def _listed(settings: dict[str, float]) -> str:
@@ -176,7 +176,7 @@ def _stretches(document: RunDocument | CampaignDocument) -> list[tuple[str, str]
     lines = []
     for stretch in document.stretches:
         judged = "interrupted" if stretch.judged is None else f"{stretch.judged} grasps"
-        took = "" if stretch.seconds is None else f" in {duration(stretch.seconds)}"
+        took = "" if stretch.seconds is None else f" in {format_duration(stretch.seconds)}"
         plural = "" if stretch.workers == 1 else "s"
         text = f"{stretch.started}: {judged}{took}, {stretch.workers} worker{plural}"
         lines.append(("judged", text))

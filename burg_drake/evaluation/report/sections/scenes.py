@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from burg_drake.core.terminal import count, percent
+from burg_drake.core.terminal import format_count, format_percent
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -75,7 +75,7 @@ def ranked_chart(ranked: Sequence[OutcomeCounts]) -> Html:
         marks.append(element("line", x1=LEFT, x2=WIDTH - RIGHT, y1=y, y2=y, class_="grid"))
         text = f"{100 * share:.0f} %"
         marks.append(element("text", text, x=LEFT - 6, y=y, dy="0.35em", class_="end"))
-    label = f"{count(len(ranked))} scenes, worst to best"
+    label = f"{format_count(len(ranked))} scenes, worst to best"
     width = f"stroke-width:{min(max(0.5 * step, 0.5), 2.5):.2f}"
     return element(
         "svg",
@@ -95,7 +95,7 @@ def _dots(tried: Sequence[tuple[float, OutcomeCounts]], step: float) -> list[Htm
     dots = []
     for x, group in tried:
         share = group.lifted / group.executed
-        tip = f"{group.name}: {group.lifted} of {group.executed}, {percent(share)}"
+        tip = f"{group.name}: {group.lifted} of {group.executed}, {format_percent(share)}"
         name = element("title", tip) if len(tried) <= NAMED else None
         place = {"cx": f"{x:.1f}", "cy": f"{_y(share):.1f}", "r": f"{radius:.1f}"}
         dots.append(element("circle", *([name] if name else []), **place, class_="dot"))
@@ -106,7 +106,9 @@ def _spoken(ranked: Sequence[OutcomeCounts]) -> str:
     shares = [group.lifted / group.executed for group in ranked if group.executed]
     if not shares:
         return f"{len(ranked)} scenes: nothing was executed"
-    return f"{len(ranked)} scenes: from {percent(min(shares))} to {percent(max(shares))}"
+    return (
+        f"{len(ranked)} scenes: from {format_percent(min(shares))} to {format_percent(max(shares))}"
+    )
 
 
 def _y(share: float) -> float:
@@ -122,16 +124,22 @@ def _all(ranked: Sequence[OutcomeCounts], link: Callable[[str], str | None]) -> 
     rows = []
     for group in ranked[:LISTED]:
         low, high = (f"{100 * bound:.0f}" for bound in group.interval)
-        share = percent(group.lifted / group.executed) if group.executed else "-"
+        share = format_percent(group.lifted / group.executed) if group.executed else "-"
         interval = f"{low} to {high} %" if group.executed else "-"
-        cells = count(group.judged), count(group.executed), count(group.lifted), share, interval
+        cells = (
+            format_count(group.judged),
+            format_count(group.executed),
+            format_count(group.lifted),
+            share,
+            interval,
+        )
         numbers = (element("td", cell, class_="number") for cell in cells)
         name = element("th", _name(group.name, link), scope="row")
         rows.append(element("tr", name, *numbers))
     head = ["scene", "grasps", "executed", "lifted", "success", "95 % interval"]
-    title = f"All {count(len(ranked))} scenes"
+    title = f"All {format_count(len(ranked))} scenes"
     if len(ranked) > LISTED:
-        title = f"The {count(LISTED)} worst of {count(len(ranked))} scenes"
+        title = f"The {format_count(LISTED)} worst of {format_count(len(ranked))} scenes"
     summary = element("summary", element("h3", title))
     listed = table(head, rows, numbers=(1, 2, 3, 4, 5))
     return element("details", summary, listed, class_="screen")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from burg_drake.core.terminal import count, figure
+from burg_drake.core.terminal import format_count, format_number
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -47,7 +47,7 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
             shown = min(len(cases), MOST_CASES)
             more = f", the first {shown}" if total > shown else ""
             tables += [
-                element("h3", f"{title}: {count(total)}{more}", class_="case"),
+                element("h3", f"{title}: {format_count(total)}{more}", class_="case"),
                 _case_table(cases[:MOST_CASES], photos),
             ]
     text = "Each command shows the trial in simulation."
@@ -69,7 +69,7 @@ def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
             case.ended.replace("_", " "),
         ]
         if real:
-            offset = "-" if case.offset_mm is None else f"{figure(case.offset_mm)} mm"
+            offset = "-" if case.offset_mm is None else f"{format_number(case.offset_mm)} mm"
             cells += [offset, _note(case, photos)]
         cells.append(join(*(command(line) for line in case.replays)))
         rows.append(
@@ -97,7 +97,7 @@ def stopped_section(judged: Judgement, of: str) -> Html:
             element("th", row.outcome.replace("_", " "), scope="row"),
             element("td", row.blocker or "", class_="faint"),
             element("td", row.stage),
-            element("td", count(row.trials), class_="number", data_label="trials"),
+            element("td", format_count(row.trials), class_="number", data_label="trials"),
             element("td", share_mark(row.successes), class_="estimate", data_label="succeeded"),
         )
         for row in judged.stopped[:MOST_STOPPED]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -51,7 +51,7 @@ def _titled(title: str, name: str) -> str:
 
 def _matrix(title: str, found: Agreement, other: str) -> Html:
     def cell(name: str, style: str) -> Html:
-        value = count(round(getattr(found, name)))
+        value = format_count(round(getattr(found, name)))
         tip = CELL_NAMES[name]
         return element(
             "td", element("b", value), element("small", name.upper()), class_=style, title=tip
@@ -127,7 +127,7 @@ def group_section(title: str, text: str, head: str, groups: Sequence[FactorGroup
 def _group_row(group: FactorGroup) -> Html:
     a = group.agreement
     counts = [
-        element("td", count(round(n)), class_="number", data_label=name)
+        element("td", format_count(round(n)), class_="number", data_label=name)
         for name, n in zip(("trials", *map(str.upper, CELLS)), (a.trials, *a.cells), strict=True)
     ]
     shares = [

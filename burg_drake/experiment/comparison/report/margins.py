@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.report.elements import Html, element, section, table
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
@@ -17,7 +17,7 @@ MOST_PLOTS = 4
 def margin_section(judged: Judgement) -> Html | None:
     """What margins tell about success; nothing where there are none."""
     defined = [c for c in judged.calibration if c.auroc.value is not None]
-    found = sorted(defined, key=_telling, reverse=True)
+    found = sorted(defined, key=_informative, reverse=True)
     if not found:
         return None
     weighted = any(c.auroc_weighted is not None for c in found)
@@ -40,7 +40,7 @@ def margin_section(judged: Judgement) -> Html | None:
     )
 
 
-def _telling(found: MarginCalibration) -> float:
+def _informative(found: MarginCalibration) -> float:
     """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
     low, high = found.auroc.low, found.auroc.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
@@ -53,7 +53,7 @@ def _row(c: MarginCalibration, weighted: bool) -> Html:
         element(
             "th", f"{margin_title(c.name)[0]} {'↓' if c.smaller_is_better else '↑'}", scope="row"
         ),
-        element("td", count(c.trials), class_="number"),
+        element("td", format_count(c.trials), class_="number"),
         *(figure_cell(f or Estimate.undefined(""), percent=False) for f in found),
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from burg_drake.core.terminal import count
+from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -94,7 +94,7 @@ def _about(c: Comparison) -> str:
     who = " against ".join(side.label for side in (sides[0], sides[-1]))
     if c.second:
         who = f"{c.first.label} and {c.second.label} against {c.reference.label}"
-    return f"{count(c.coverage.compared)} {what}: {who}; success: {c.success}, {counts}"
+    return f"{format_count(c.coverage.compared)} {what}: {who}; success: {c.success}, {counts}"
 
 
 def _lead(c: Comparison) -> Html:
@@ -192,12 +192,12 @@ def _settings(c: Comparison) -> Html:
     sides = [("predictions", c.first), ("second simulation", c.second), ("truth", c.reference)]
     facts += [(name, _side(side)) for name, side in sides if side is not None]
     v = c.coverage
-    facts.append(("compared", count(v.compared)))
+    facts.append(("compared", format_count(v.compared)))
     if c.kind == "runs":
-        facts.append(("only in the first", count(v.only_first)))
-        facts.append(("only in the second", count(v.only_second)))
-        facts.append(("same id, other grasp", count(v.other_content)))
-    facts += [(f"left out: {k.replace('_', ' ')}", count(n)) for k, n in v.left_out.items()]
+        facts.append(("only in the first", format_count(v.only_first)))
+        facts.append(("only in the second", format_count(v.only_second)))
+        facts.append(("same id, other grasp", format_count(v.other_content)))
+    facts += [(f"left out: {k.replace('_', ' ')}", format_count(n)) for k, n in v.left_out.items()]
     facts += [("differs", text) for text in c.settings]
     facts.append(("intervals", f"95 %, bootstrap seed {c.seed}"))
     entries = [join(element("dt", name), element("dd", fact)) for name, fact in facts]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from burg_drake.core.terminal import figure
+from burg_drake.core.terminal import format_number
 from burg_drake.evaluation.report.elements import Html, element, nice_step
 from burg_drake.experiment.comparison.wording import margin_title
 from burg_drake.experiment.statistics import Bin, MarginCalibration
@@ -97,8 +97,8 @@ def _dot(row: Bin, x: Callable[[float], float], size: float, unit: str) -> list[
     at = row.share if row.weighted is None else row.weighted
     place = f"{x(row.mean):.1f}"
     tip = (
-        f"{row.successes} of {row.trials} trials, {figure(size * row.low)} to"
-        f" {figure(size * row.high)} {unit}".rstrip()
+        f"{row.successes} of {row.trials} trials, {format_number(size * row.low)} to"
+        f" {format_number(size * row.high)} {unit}".rstrip()
     )
     value, low, high = (f"{y_of(v or 0.0):.1f}" for v in (at.value, at.low, at.high))
     return [

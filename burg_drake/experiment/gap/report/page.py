@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from burg_drake.core.files import atomic_write
-from burg_drake.core.terminal import percent
+from burg_drake.core.terminal import format_percent
 from burg_drake.evaluation.records import engine_label
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -36,12 +36,12 @@ REPORT_FILE = "gap.html"
 
 
 def write_gap_report(
-    ladder: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
+    steps: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
 ) -> None:
     """Writes the page into the folder of the steps.
 
     Args:
-        ladder: all steps.
+        steps: all steps.
         success: what counts.
         agreement: with real trials, if there are any.
         command_line: that makes it again.
@@ -49,45 +49,45 @@ def write_gap_report(
     Raises:
         InvalidInputError: it cannot be written.
     """
-    page = gap_page(ladder, success, agreement, command_line)
-    atomic_write(ladder.path / REPORT_FILE, page)
+    page = gap_page(steps, success, agreement, command_line)
+    atomic_write(steps.path / REPORT_FILE, page)
 
 
 def gap_page(
-    ladder: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
+    steps: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
 ) -> str:
     """The page as HTML."""
-    found = gap_changes(ladder, success)
-    document = ladder.first.document
+    found = gap_changes(steps, success)
+    document = steps.first.document
     title = f"{document.scene.name} on {document.station.name}"
     return html_page(
         f"Where grasps are lost: {title}",
         element("style", Html(STYLE)),
-        header("Where grasps are lost", title, _about(ladder, success)),
-        *_told(step_sentences(ladder, found, success)),
-        tiles(_tiles(ladder, found)),
-        flow_section(ladder, found),
-        objects_section(ladder, success),
+        header("Where grasps are lost", title, _about(steps, success)),
+        *_paragraphs(step_sentences(steps, found, success)),
+        tiles(_tiles(steps, found)),
+        flow_section(steps, found),
+        objects_section(steps, success),
         *(change_section(change) for change in found),
-        push_section(ladder),
+        push_section(steps),
         reality_section(agreement),
-        _again(ladder, command_line),
+        _reproduction(steps, command_line),
     )
 
 
-def _about(ladder: GapSteps, success: Success) -> str:
-    document = ladder.first.document
+def _about(steps: GapSteps, success: Success) -> str:
+    document = steps.first.document
     counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
     about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
     return f"{about}; success: {counts}"
 
 
-def _told(sentences: Sequence[str]) -> list[Html]:
+def _paragraphs(sentences: Sequence[str]) -> list[Html]:
     return [element("p", " ".join(sentences), class_="lead")]
 
 
-def _tiles(ladder: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
-    whole = len(ladder.first.candidates)
+def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
+    whole = len(steps.first.candidates)
     entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
     first = found[0].successes if found else 0
     if found and found[0].step != "placed":
@@ -95,7 +95,7 @@ def _tiles(ladder: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, 
     for change in found:
         left = change.successes - len(change.lost) + len(change.won)
         if change.step == "placed":
-            share = percent(left / change.successes) if change.successes else "-"
+            share = format_percent(left / change.successes) if change.successes else "-"
             entries.append(("Objects displaced", share, "of these succeed again"))
         else:
             note = f"{len(change.lost)} lost, {len(change.won)} won"
@@ -103,12 +103,12 @@ def _tiles(ladder: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, 
     return entries
 
 
-def _again(ladder: GapSteps, command_line: str) -> Html:
-    document = ladder.document
-    facts = [("folder", str(ladder.path))]
+def _reproduction(steps: GapSteps, command_line: str) -> Html:
+    document = steps.document
+    facts = [("folder", str(steps.path))]
     facts += [
         (TITLES[step.name], ", ".join(str(run.path) for run in step.runs) or "-")
-        for step in ladder.steps
+        for step in steps.steps
     ]
     if document.samples:
         noise = f"{document.place_mm:g} mm, {document.turn_deg:g} degrees, seed {document.seed}"

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from burg_drake.core.grasps import Stage
-from burg_drake.core.terminal import TextTable, percent
+from burg_drake.core.terminal import TextTable, format_percent
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -37,29 +37,29 @@ def rejudged_words(found: Rejudging) -> list[str]:
     of, p = found.causes, found.paired.p_value
     planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
     count, wrong, low, high = found.explained
-    told = [
+    sentences = [
         f"Of {whole} trials {planned} agree with the robot as planned"
-        f" ({percent(planned / whole)}), and {measured} with the objects where they stood"
-        f" ({percent(measured / whole)}); McNemar's exact test: p = {p:.2g}."
+        f" ({format_percent(planned / whole)}), and {measured} with the objects where they stood"
+        f" ({format_percent(measured / whole)}); McNemar's exact test: p = {p:.2g}."
     ]
     if wrong:
-        told.append(
+        sentences.append(
             f"Of the {wrong} that disagree as planned, placement explains {count}"
-            f" ({percent(count / wrong)}, 95 % interval {100 * low:.0f} to {100 * high:.0f} %), and"
-            f" {of['physics']} are left to physics."
+            f" ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
+            f" {100 * high:.0f} %), and {of['physics']} are left to physics."
         )
     if of["worsened"]:
-        told.append(f"Worsened: {of['worsened']} that agreed as planned.")
+        sentences.append(f"Worsened: {of['worsened']} that agreed as planned.")
     within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
     if within:
-        told.append(
+        sentences.append(
             f"In {within} the open hand would be within a displaced object, which counts as a"
             " collision, though a robot may push it aside."
         )
     not_judged = [trial for trial in found.trials if trial not in found.judged]
     if not_judged:
-        told.append(f"{len(not_judged)} could not be judged again.")
-    return [*told, *_skipped(found)]
+        sentences.append(f"{len(not_judged)} could not be judged again.")
+    return [*sentences, *_skipped(found)]
 
 
 def _skipped(found: Rejudging) -> list[str]:
@@ -75,7 +75,7 @@ def rejudged_view(found: Rejudging) -> TextTable:
     table.texts("verdict as planned, as measured").numbers("trials", "share %")
     for cause, text in CAUSES.items():
         count = found.causes[cause]
-        table.row(text, str(count), percent(count / whole) if whole else "-")
+        table.row(text, str(count), format_percent(count / whole) if whole else "-")
     return table
 
 
@@ -102,7 +102,9 @@ def _counts(found: Rejudging) -> Html:
         count, low, high = found.agreement(measured=measured)
         share: Child = "-"
         if whole:
-            share = join(interval_mark(count / whole, low, high), f" {percent(count / whole)}")
+            share = join(
+                interval_mark(count / whole, low, high), f" {format_percent(count / whole)}"
+            )
         rows.append(
             element(
                 "tr",

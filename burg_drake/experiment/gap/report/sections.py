@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from burg_drake.core.grasps import PUSHED, Outcome
-from burg_drake.core.terminal import percent
+from burg_drake.core.terminal import format_percent
 from burg_drake.evaluation.report.elements import (
     Child,
     Html,
@@ -42,12 +42,12 @@ ABOUT = {
 }
 
 
-def flow_section(ladder: GapSteps, found: Sequence[Change]) -> Html | None:
+def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
     """The picture of all steps."""
     if not found:
         return None
     columns, scale = [], []
-    for step in ladder.steps:
+    for step in steps.steps:
         outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
         plural = "" if len(step.runs) == 1 else "s"
         scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
@@ -61,15 +61,15 @@ def flow_section(ladder: GapSteps, found: Sequence[Change]) -> Html | None:
     )
 
 
-def objects_section(ladder: GapSteps, success: Success) -> Html:
+def objects_section(steps: GapSteps, success: Success) -> Html:
     """Successes of each object in each step."""
-    by_step = [successes_by_object(step, success) for step in ladder.steps]
+    by_step = [successes_by_object(step, success) for step in steps.steps]
     whole = by_step[0]
-    head = ["object", "grasps", *(TITLES[step.name] for step in ladder.steps)]
+    head = ["object", "grasps", *(TITLES[step.name] for step in steps.steps)]
     rows = []
     for name, (_, grasps) in whole.items():
         cells: list[Child] = [grasps]
-        for step, counts in zip(ladder.steps, by_step, strict=True):
+        for step, counts in zip(steps.steps, by_step, strict=True):
             good, all = counts.get(name, (0, 0))
             share = f"{good} of {all}" if all else "-"
             cells.append(share if step.name == "placed" else good)
@@ -89,7 +89,7 @@ def change_section(change: Change) -> Html:
     parts: list[Child] = []
     if whole:
         low, high = change.share_lost
-        share = f"{lost} of {whole} successes are lost ({percent(lost / whole)})"
+        share = f"{lost} of {whole} successes are lost ({format_percent(lost / whole)})"
         mark = interval_mark(lost / whole, low, high)
         parts.append(element("p", f"{share} ", mark))
     if change.failed:
@@ -166,11 +166,11 @@ def _listed(move: OutcomeChange) -> Html:
     )
 
 
-def push_section(ladder: GapSteps) -> Html | None:
+def push_section(steps: GapSteps) -> Html | None:
     """By how much the hand pushes objects before it closes."""
-    arm = next((step.runs[0] for step in ladder.steps if step.name == "arm"), None)
-    told = None if arm is None else pushes(arm.results)
-    if arm is None or told is None:
+    arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
+    sentence = None if arm is None else pushes(arm.results)
+    if arm is None or sentence is None:
         return None
     columns = arm.results
     went = np.isfinite(columns["pushed"])
@@ -203,7 +203,7 @@ def push_section(ladder: GapSteps) -> Html | None:
     head += ["held if pushed", "held if not"]
     return section(
         "Pushed before the hand closes",
-        f"{told} The table is about the object to be grasped.",
+        f"{sentence} The table is about the object to be grasped.",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 
@@ -236,4 +236,6 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
 def _estimate(found: Estimate) -> Child:
     if found.value is None or found.low is None or found.high is None:
         return "-"
-    return join(interval_mark(found.value, found.low, found.high), f" {percent(found.value)}")
+    return join(
+        interval_mark(found.value, found.low, found.high), f" {format_percent(found.value)}"
+    )

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from burg_drake.core.grasps import Outcome
-from burg_drake.core.terminal import percent
+from burg_drake.core.terminal import format_percent
 from burg_drake.experiment.gap.changes import Change
 from burg_drake.experiment.gap.steps import GapDocument, GapSteps, StepName
 from burg_drake.experiment.trials import Success, succeeded
@@ -20,14 +20,14 @@ TITLES: dict[StepName, str] = {
 VERBS: dict[Success, str] = {"lifted": "lifts", "held": "holds"}
 
 
-def step_sentences(ladder: GapSteps, changes: Sequence[Change], success: Success) -> list[str]:
+def step_sentences(steps: GapSteps, changes: Sequence[Change], success: Success) -> list[str]:
     """One sentence or two a step."""
-    hand = ladder.first
+    hand = steps.first
     outcomes = [verdict.outcome for verdict in hand.verdicts.values()]
     good = sum(succeeded(outcome, success) for outcome in outcomes)
-    told = [f"Of {len(outcomes)} grasps the hand alone {VERBS[success]} {good}."]
-    told += [_sentence(change, ladder.document) for change in changes]
-    return told + [text for change in changes if (text := left_out(change))]
+    sentences = [f"Of {len(outcomes)} grasps the hand alone {VERBS[success]} {good}."]
+    sentences += [_sentence(change, steps.document) for change in changes]
+    return sentences + [text for change in changes if (text := left_out(change))]
 
 
 def left_out(change: Change) -> str:
@@ -44,7 +44,7 @@ def _sentence(change: Change, document: GapDocument) -> str:
     if change.successes == 0:
         return f"{TITLES[change.step].capitalize()}: there is no success left to lose."
     lost, whole = len(change.lost), change.successes
-    share = f" ({percent(lost / whole)})"
+    share = f" ({format_percent(lost / whole)})"
     left = whole - lost + len(change.won)
     won = f", {len(change.won)} {_are(len(change.won))} won" if change.won else ""
     if change.step == "reach":
@@ -60,7 +60,7 @@ def _sentence(change: Change, document: GapDocument) -> str:
     low, high = change.share_lost
     return (
         f"When objects stand {_noise(document)} from where they should be (standard deviations),"
-        f" {percent(lost / whole)} of the {whole} trials of these grasps in"
+        f" {format_percent(lost / whole)} of the {whole} trials of these grasps in"
         f" {document.samples} displaced scenes fail{_why(change)}; the 95 % interval is"
         f" {100 * low:.0f} to {100 * high:.0f} %."
     )

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from burg_drake.core.documents import plain_data
-from burg_drake.core.terminal import TextTable, percent
+from burg_drake.core.terminal import TextTable, format_percent
 from burg_drake.evaluation.results import pushes
 from burg_drake.experiment.comparison import interval, plain
 from burg_drake.experiment.gap.changes import Change, successes_by_object
@@ -21,9 +21,9 @@ from burg_drake.experiment.trials import Success
 FIGURES = ("precision", "recall", "accuracy")
 
 
-def steps_view(ladder: GapSteps, found: Sequence[Change]) -> TextTable:
+def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
     """What each step keeps and loses."""
-    table = TextTable("Where grasps are lost", caption=_caption(ladder))
+    table = TextTable("Where grasps are lost", caption=_caption(steps))
     table.names("step").numbers(
         "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
     )
@@ -35,7 +35,7 @@ def steps_view(ladder: GapSteps, found: Sequence[Change]) -> TextTable:
         table.row(
             TITLES[change.step],
             *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
-            percent(lost / whole) if whole else "-",
+            format_percent(lost / whole) if whole else "-",
             f"{100 * low:.0f}-{100 * high:.0f} %" if whole else "-",
             str(change.failed),
             ", ".join(f"{name} {count}" for name, count in into.most_common()),
@@ -43,8 +43,8 @@ def steps_view(ladder: GapSteps, found: Sequence[Change]) -> TextTable:
     return table
 
 
-def _caption(ladder: GapSteps) -> str:
-    document = ladder.document
+def _caption(steps: GapSteps) -> str:
+    document = steps.document
     if not document.samples:
         return ""
     return (
@@ -73,18 +73,18 @@ def _share(found: Estimate) -> str:
 
 
 def gap_json(
-    ladder: GapSteps,
+    steps: GapSteps,
     found: Sequence[Change],
     agreement: Sequence[StepAgreement],
     success: Success,
 ) -> dict[str, Any]:
     """All figures, and the grasps that change."""
-    told = {"arm": next((s.runs[0].results for s in ladder.steps if s.name == "arm"), None)}
-    pushed = None if told["arm"] is None else pushes(told["arm"])
+    results = {"arm": next((s.runs[0].results for s in steps.steps if s.name == "arm"), None)}
+    pushed = None if results["arm"] is None else pushes(results["arm"])
     return {
         "success": success,
-        "asked": plain_data(ladder.document),
-        "story": step_sentences(ladder, found, success),
+        "asked": plain_data(steps.document),
+        "story": step_sentences(steps, found, success),
         "steps": [
             {
                 "name": step.name,
@@ -97,7 +97,7 @@ def gap_json(
                     for name, (good, all) in successes_by_object(step, success).items()
                 },
             }
-            for step in ladder.steps
+            for step in steps.steps
         ],
         "changes": [_change_json(change) for change in found],
         "pushed": None if pushed is None else asdict(pushed),

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from burg_drake.core import Arrays, kept
-from burg_drake.scene.document import Scene, require_sound
+from burg_drake.core import Arrays, cached
+from burg_drake.scene.document import Scene, require_no_errors
 from burg_drake.station.document import Station, world_content
 
 
-def require_sound_scene(scene: Scene, station: Station) -> None:
+def require_valid_scene(scene: Scene, station: Station) -> None:
     """Refuses a scene whose grasps would be judged in a world other than the document's.
 
     Raises:
@@ -17,7 +17,7 @@ def require_sound_scene(scene: Scene, station: Station) -> None:
     def check() -> Arrays:
         from burg_drake.station.checks.scene_issues import check_scene  # imports Drake
 
-        require_sound(scene, check_scene(scene, station))
+        require_no_errors(scene, check_scene(scene, station))
         return {}
 
-    kept("sound-scene", world_content(scene, station), check)
+    cached("sound-scene", world_content(scene, station), check)
