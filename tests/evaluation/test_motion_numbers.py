@@ -39,9 +39,9 @@ def station_with(motion: GraspMotion) -> Station:
 def test_options_ask_for_the_motion_wherever_a_station_has_another(motion, usual) -> None:
     words = motion_options(motion, usual)
     found = chosen_motion(asked(words), station_with(usual))
-    assert replace(found, least_lift=found.shortest) == replace(motion, least_lift=motion.least)
+    assert replace(found, least_lift=found.shortest) == replace(motion, least_lift=motion.shortest)
     assert bool(words) == (
-        replace(usual, least_lift=usual.least) != replace(motion, least_lift=motion.least)
+        replace(usual, least_lift=usual.shortest) != replace(motion, least_lift=motion.shortest)
     )
 
 
