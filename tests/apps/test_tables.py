@@ -218,6 +218,6 @@ def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture
         "note: mug: none of 3 grasps is clear: the open hand hits the table in 2, the open hand"
         " hits the object itself in 1; sample grasps at which the hand is clear, which is the"
         " default",
-        "note: can: none of 1 grasp is reachable: lift line in 1; a shorter lift (--least-lift-mm)"
+        "note: can: none of 1 grasp is reachable: lift line in 1; a shorter lift (least_lift)"
         " may help",
     ]

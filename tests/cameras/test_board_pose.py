@@ -207,8 +207,8 @@ def test_the_size_of_the_print_by_depth_and_by_a_known_place() -> None:
         estimate = estimate_board(image, SMALL, LITTLE, **known)
         assert estimate.scale == pytest.approx(0.97, abs=0.001)
         assert estimate.reason == (
-            "the board is printed at 0.97 of its size: print it at 100 %, or give what its rulers"
-            " measure with --measured-mm"
+            "the board is printed at 0.97 of its size: print it at 100 %, or say what its rulers"
+            " measure"
         )
         # The pose is 3 % of the distance off, though the residuals are small.
         assert not estimate.valid and np.isnan(estimate.X_SC).all()
@@ -224,8 +224,8 @@ def test_a_print_that_is_longer_along_one_axis() -> None:
     estimate = estimate_board(image, SMALL, LITTLE)
     assert estimate.valid
     assert estimate.reason == (
-        "the board is printed 1.012 times as long along y as along x: measure it and print with"
-        " --measured-mm, or check the intrinsics"
+        "the board is printed 1.012 times as long along y as along x: measure its rulers and print"
+        " it anew with what they measure, or check the intrinsics"
     )
     measured = BoardPose(LITTLE, SMALL, (1.0, 1.012)).estimate(image)
     assert measured.reason == ""

@@ -19,8 +19,8 @@ SIZE = np.array([0.1, 0.06, 0.04])
 VOLUME = float(SIZE.prod())
 BALL = 4.0 / 3.0 * np.pi * 0.05**3
 
-WALL = "; wall_thickness (--wall-thickness) sets it, openings='close' (--openings close) caps it"
-CAPS = "; openings='wall' (--openings wall) makes a wall of the surface instead"
+WALL = "; wall_thickness sets it, openings='close' caps it"
+CAPS = "; openings='wall' makes a wall of the surface instead"
 
 
 DEFAULT = Preparation()

@@ -38,7 +38,7 @@ def test_a_box_without_a_lid(inverted: bool, subdivisions: int) -> None:
     assert result.mesh.volume == pytest.approx(0.1 * 0.06 * 0.04, rel=1e-9)
     assert result.sentences[-1] == (
         "closed 1 openings with flat caps (largest opening 117 mm wide); openings='wall'"
-        " (--openings wall) makes a wall of the surface instead"
+        " makes a wall of the surface instead"
     )
 
 

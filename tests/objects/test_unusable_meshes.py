@@ -69,12 +69,12 @@ IN_MEMORY: dict[str, tuple[Callable[[], trimesh.Trimesh], str]] = {
     "on a line": (
         lambda: _raw(_box(0).vertices * [1, 0, 0], _box(0).faces),
         "the mesh is flat (0 x 0 x 0 mm); an object needs a volume: wall_thickness"
-        " (--wall-thickness) makes a wall of it",
+        " makes a wall of it",
     ),
     "perfectly flat": (
         lambda: _raw([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0]], [[0, 1, 2]]),
         "the mesh is flat (200 x 100 x 0 mm); an object needs a volume: wall_thickness"
-        " (--wall-thickness) makes a wall of it",
+        " makes a wall of it",
     ),
     "closed sheet without thickness": (
         _doubled,
@@ -83,12 +83,12 @@ IN_MEMORY: dict[str, tuple[Callable[[], trimesh.Trimesh], str]] = {
     ),
     "millimetres": (
         lambda: _raw(1e3 * _box().vertices, _box().faces),
-        "largest extent is 100 m, but lengths are in metres; try --unit mm (scale=0.001 makes it"
-        " 100 mm) or --unit cm (scale=0.01 makes it 1000 mm)",
+        "largest extent is 100 m, but lengths are in metres; try unit mm (scale=0.001 makes it"
+        " 100 mm) or unit cm (scale=0.01 makes it 1000 mm)",
     ),
     "kilometres": (
         lambda: _raw(1e-3 * _box().vertices, _box().faces),
-        "largest extent is 0.1 mm, but lengths are in metres; try scale=1000 (--scale 1000)",
+        "largest extent is 0.1 mm, but lengths are in metres; try scale=1000",
     ),
 }
 

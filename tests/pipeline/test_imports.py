@@ -86,7 +86,7 @@ def test_values_for_objects_that_are_not_there() -> None:
         "a mass is given for 'tabel'; did you mean 'table'? Known: mug_10f6, table"
     )
     assert message_of(UnknownNameError, burg(MUG, TABLE), skip=["wall"]) == (
-        "--skip is given for 'wall'; known: mug_10f6, table"
+        "skip is given for 'wall'; known: mug_10f6, table"
     )
     assert message_of(InvalidInputError, burg(TABLE), {"table": 0.0}) == (
         "table: mass is 0 kg; it must be above 0 (leave it out to use a density)"
