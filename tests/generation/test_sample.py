@@ -74,7 +74,7 @@ def test_what_was_made_with_other_things_is_refused(
     assert str(caught.value) == (
         "scene_0000.yaml was made with other things (the library has content 000000000000 there,"
         f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']} here), and"
-        " may come out another way; --force tries"
+        " may come out another way; it has to be forced"
     )
     assert sample_again(other, force=True).scene is not None
     with pytest.raises(InvalidInputError, match="has no `origin`: it was not sampled"):

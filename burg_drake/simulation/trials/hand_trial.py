@@ -162,8 +162,8 @@ class HandTrial(GraspTrial):
         height = self.motion.lift_height if lift is None else lift
         if not 0.0 <= height < math.inf or self.motion.retreat + height <= 0.0:
             raise InvalidInputError(
-                f"lift is {height:g} m and retreat {self.motion.retreat:g} m, with which the hand"
-                " would not move; give more than 0"
+                f"lift is {height:g} m; with a retreat of {self.motion.retreat:g} m it must be"
+                " finite, from 0 on, and move the hand"
             )
         paths = (
             LiftPath(-X_WG[:3, 2], self.motion.retreat),
