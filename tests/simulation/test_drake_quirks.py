@@ -461,6 +461,7 @@ WRONG_STUBS = {
 }
 
 
+@pytest.mark.skipif(changed_in(1, 52), reason="mypy reads the stubs of the oldest Drake")
 @pytest.mark.parametrize("stub", WRONG_STUBS)
 def test_stubs_are_wrong(stub: str) -> None:
     """Then mypy may follow this one, too: take it out of the overrides in pyproject.toml."""
