@@ -13,6 +13,7 @@ in simulation finds (`simulation.trials.TrialResult`), `Findings` those of any s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -31,7 +32,10 @@ from burg_drake.core.grasps.verdict_field import (
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """Continuous slack behind an outcome, SI units; NaN where it was not measured."""
+    """Continuous slack behind an outcome, SI units; NaN where it was not measured.
+
+    Margins are equal if they have the same numbers and leave the same ones unmeasured.
+    """
 
     overlap: float = margin(
         "m",
@@ -95,6 +99,18 @@ class Margins:
         mode="arm",
         less_is_better=True,
     )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Margins):
+            return NotImplemented
+        return self._measured() == other._measured()
+
+    def __hash__(self) -> int:
+        return hash(self._measured())
+
+    def _measured(self) -> tuple[float | None, ...]:
+        values = (getattr(self, f.name) for f in fields(self))
+        return tuple(None if math.isnan(value) else value for value in values)
 
     def of_trial(self) -> dict[str, float]:
         """Those that a trial measures, by name; NaN where it ended before."""
