@@ -24,6 +24,8 @@ TAGS = frozenset({"!", *(f"tag:yaml.org,2002:{kind}" for kind in _KINDS)})
 """Tags that say no more than the values themselves."""
 DIRECTIVES = 8
 """Of tags, at most: LibYAML compares each to all before it."""
+TOO_DEEP = "exceeded maximum nesting depth"
+"""What LibYAML says from 0.2.6 on where it reads ahead into more than its own 1,000 levels."""
 
 
 def checked_events(
@@ -45,7 +47,7 @@ def checked_events(
     anchors: dict[str, tuple[int, int]] = {}  # values behind it, and how deep they are
     opened: list[tuple[str | None, int]] = []  # anchor, and values before
     reached: list[int] = []  # depth within each that is open
-    for event in _parsed(text, name):
+    for event in _parsed(text, name, limits):
         kind = type(event)
         if kind is yaml.ScalarEvent:
             values += 1
@@ -74,7 +76,7 @@ def checked_events(
             if reached:
                 reached[-1] = max(reached[-1], len(opened) + depth)
         if reached and reached[-1] > limits.depth:
-            raise _failure(name, event, f"nested more than {limits.depth} levels deep")
+            raise _failure(name, event, _too_deep(limits))
         if values > limits.values:
             what = f"more than {limits.values:,} values, each alias counted as what it stands for"
             raise _failure(name, event, what)
@@ -83,7 +85,7 @@ def checked_events(
         yield event
 
 
-def _parsed(text: str, name: str) -> Iterator[Event]:
+def _parsed(text: str, name: str, limits: Limits) -> Iterator[Event]:
     if text.count("%TAG") > DIRECTIVES:
         raise DocumentError(f"{name}: more than {DIRECTIVES} %TAG directives; leave them out")
     try:
@@ -92,7 +94,13 @@ def _parsed(text: str, name: str) -> Iterator[Event]:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        if problem == TOO_DEEP:
+            raise DocumentError(f"{name}{line}: {_too_deep(limits)}") from error
         raise DocumentError(f"{name}{line}: not valid YAML: {problem}") from error
+
+
+def _too_deep(limits: Limits) -> str:
+    return f"nested more than {limits.depth} levels deep"
 
 
 def _failure(name: str, event: Event, what: str) -> DocumentError:
