@@ -1,1 +1,9 @@
-from . import (evaluate as evaluate, merge as merge, reach as reach, replay as replay, report as report, robustness as robustness, status as status,)
+from . import (
+    evaluate as evaluate,
+    merge as merge,
+    reach as reach,
+    replay as replay,
+    report as report,
+    robustness as robustness,
+    status as status,
+)

@@ -8,18 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.options import chosen_motion, how_to_retry, read_given, require_standoff_of_arm
 from burg_drake.apps.runs.settings import asked_settings
-from burg_drake.apps.options import read_given
-from burg_drake.apps.options import chosen_motion, require_standoff_of_arm
-from burg_drake.apps.options import how_to_retry
 from burg_drake.core import InvalidInputError, listing
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.results import Summary
+    from burg_drake.evaluation.run import Given
     from burg_drake.evaluation.store import Campaign
     from burg_drake.evaluation.workers import Executor
-    from burg_drake.evaluation.run import Given
-    from burg_drake.evaluation.results import Summary
     from burg_drake.scene.document import Scene
     from burg_drake.station.document import Station
 
@@ -38,10 +36,9 @@ def evaluate_many(
         executor: judges in place of processes of this machine.
     """
     from burg_drake.evaluation import evaluate
-    from burg_drake.evaluation.stages import mode_for
     from burg_drake.evaluation.records import motion_text
-    from burg_drake.station.document import GraspMotion
-    from burg_drake.station.document import load_station
+    from burg_drake.evaluation.stages import mode_for
+    from burg_drake.station.document import GraspMotion, load_station
 
     if arguments.output is None:
         raise InvalidInputError(f"{len(references)} scenes are given; say where to with -o RUN")
@@ -49,7 +46,17 @@ def evaluate_many(
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
     motion = chosen_motion(arguments, station)
-    campaign = evaluate(list(references), station, arguments.output, settings=asked_settings(arguments, mode, motion), grasps=_given(arguments, station), executor=executor, workers=arguments.workers, retry_failed=arguments.retry_failed, progress=not arguments.quiet,)
+    campaign = evaluate(
+        list(references),
+        station,
+        arguments.output,
+        settings=asked_settings(arguments, mode, motion),
+        grasps=_given(arguments, station),
+        executor=executor,
+        workers=arguments.workers,
+        retry_failed=arguments.retry_failed,
+        progress=not arguments.quiet,
+    )
     print_campaign(campaign)
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
@@ -60,10 +67,8 @@ def print_campaign(campaign: Campaign) -> None:
     """Prints the tables of a run over many scenes, and where what is."""
     from rich.console import Console
 
-    from burg_drake.evaluation.store import PARTS_FOLDER
-    from burg_drake.evaluation.store import REPORT_FILE
-    from burg_drake.evaluation.results import summarize
-    from burg_drake.evaluation.results import summary_view
+    from burg_drake.evaluation.results import summarize, summary_view
+    from burg_drake.evaluation.store import PARTS_FOLDER, REPORT_FILE
 
     summary = summarize(campaign)
     Console().print(summary_view(summary))
@@ -98,8 +103,7 @@ def how_it_ended(campaign: Campaign) -> int:
 
 def _scene_table(summary: Summary) -> Any:
     """The scenes in which the smallest share of the executed grasps was lifted."""
-    from burg_drake.core.terminal import format_count, format_percent
-    from burg_drake.core.terminal import TextTable
+    from burg_drake.core.terminal import TextTable, format_count, format_percent
 
     def share(group: Any) -> float:
         return group.lifted / group.executed if group.executed else -1.0
@@ -111,7 +115,9 @@ def _scene_table(summary: Summary) -> Any:
     table.numbers(*summary.steps, "success")
     for group in groups:
         success = format_percent(share(group)) if group.executed else "-"
-        table.row(group.name, *(format_count(group.funnel[name]) for name in summary.steps), success)
+        table.row(
+            group.name, *(format_count(group.funnel[name]) for name in summary.steps), success
+        )
     if more:
         table.caption = f"{more:,} more scenes are in the columns of the store"
     return table

@@ -10,19 +10,26 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.options import (
     SCENE_NAMES,
     Parser,
+    add_cluster,
+    add_given,
+    add_motion,
     add_options,
     add_quiet,
+    add_retry_failed,
+    add_sampling,
     add_station,
     add_verb,
+    chosen_cluster,
+    chosen_motion,
+    how_to_retry,
+    read_given,
+    require_file,
+    require_sampled,
+    require_standoff_of_arm,
     workers,
 )
-from burg_drake.apps.options import add_cluster, chosen_cluster
 from burg_drake.apps.runs.campaign import evaluate_many
 from burg_drake.apps.runs.settings import asked_settings
-from burg_drake.apps.options import add_given, read_given, require_file
-from burg_drake.apps.options import add_motion, chosen_motion, require_standoff_of_arm
-from burg_drake.apps.options import add_retry_failed, how_to_retry
-from burg_drake.apps.options import add_sampling, require_sampled
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.store import Run
@@ -99,14 +106,12 @@ def _add_options(parser: Parser) -> None:
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
     from burg_drake.evaluation import evaluate
-    from burg_drake.evaluation.stages import mode_for
     from burg_drake.evaluation.records import motion_text
+    from burg_drake.evaluation.stages import mode_for
     from burg_drake.motion.workspace import require_usable_arm
-    from burg_drake.scene.document import load_scene
-    from burg_drake.scene.document import scene_references
-    from burg_drake.station.document import GraspMotion
+    from burg_drake.scene.document import load_scene, scene_references
     from burg_drake.station.checks import require_valid_scene
-    from burg_drake.station.document import load_station
+    from burg_drake.station.document import GraspMotion, load_station
 
     require_file(arguments)
     require_sampled(arguments)
@@ -127,7 +132,17 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
     with chosen_cluster(arguments) as executor:
-        run = evaluate(scene, station, arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}", settings=asked_settings(arguments, mode, motion), grasps=given.by_instance if given else None, executor=executor, workers=arguments.workers, retry_failed=arguments.retry_failed, progress=not arguments.quiet,)
+        run = evaluate(
+            scene,
+            station,
+            arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
+            settings=asked_settings(arguments, mode, motion),
+            grasps=given.by_instance if given else None,
+            executor=executor,
+            workers=arguments.workers,
+            retry_failed=arguments.retry_failed,
+            progress=not arguments.quiet,
+        )
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; burg-drake merge unites all of them")
@@ -150,7 +165,6 @@ def print_summary(run: Run) -> None:
     """Prints the tables of a run."""
     from rich.console import Console
 
-    from burg_drake.evaluation.results import summarize
-    from burg_drake.evaluation.results import summary_view
+    from burg_drake.evaluation.results import summarize, summary_view
 
     Console().print(summary_view(summarize(run)))

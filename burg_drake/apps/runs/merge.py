@@ -25,10 +25,10 @@ def add_to(verbs: Any) -> None:
 
 def run_merge(arguments: argparse.Namespace) -> int:
     """Unites runs and prints what is in them; 1 if grasps could not be simulated."""
-    from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.apps.runs.campaign import how_it_ended, print_campaign
-    from burg_drake.evaluation.store import Campaign
+    from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.evaluation.merge import unite
+    from burg_drake.evaluation.store import Campaign
 
     merged = unite(arguments.runs, arguments.output)
     result = merged.result

@@ -9,24 +9,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Output,
     Parser,
+    add_format,
+    add_given,
+    add_motion,
     add_quiet,
+    add_retry_failed,
+    add_sampling,
     add_scene,
     add_station,
     add_verb,
+    chosen_motion,
+    grasps_per_object,
+    how_to_retry,
+    output_of,
+    print_shortfalls,
+    read_given,
+    require_file,
+    require_sampled,
     workers,
 )
-from burg_drake.apps.options import add_given, read_given, require_file
-from burg_drake.apps.options import Output, add_format, output_of
-from burg_drake.apps.options import add_motion, chosen_motion
 from burg_drake.apps.runs.reach_tables import print_tables
-from burg_drake.apps.options import add_retry_failed, how_to_retry
-from burg_drake.apps.options import (
-    add_sampling,
-    grasps_per_object,
-    print_shortfalls,
-    require_sampled,
-)
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import require_writable
 
@@ -44,7 +48,7 @@ TABLES = (".csv", ".parquet")
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "reach",
         run_reach,
@@ -113,13 +117,11 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation import reach
     from burg_drake.evaluation.candidates import chosen_instances
     from burg_drake.evaluation.records import motion_text
-    from burg_drake.evaluation.results import ungiven_note
-    from burg_drake.evaluation.results import short_lifts
+    from burg_drake.evaluation.results import short_lifts, ungiven_note
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
-    from burg_drake.station.document import GraspMotion
     from burg_drake.station.checks import require_valid_scene
-    from burg_drake.station.document import load_station
+    from burg_drake.station.document import GraspMotion, load_station
 
     require_file(arguments)
     require_sampled(arguments)
@@ -205,10 +207,8 @@ def sampled_grasps(
     arguments: argparse.Namespace, scene: Scene, station: Station
 ) -> dict[str, GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
-    from burg_drake.core.terminal import ProgressMeter, Progress, Reporter
-    from burg_drake.evaluation.candidates import sample_scene
-    from burg_drake.evaluation.candidates import chosen_instances
-    from burg_drake.evaluation.candidates import SamplingSettings
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
+    from burg_drake.evaluation.candidates import SamplingSettings, chosen_instances, sample_scene
 
     settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
     count, seed = grasps_per_object(arguments), arguments.seed

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from burg_drake.core.terminal import TextTable
 
 if TYPE_CHECKING:
-    from burg_drake.core.grasps import GraspSet
-    from burg_drake.core.grasps import Outcome
+    from burg_drake.core.grasps import GraspSet, Outcome
     from burg_drake.station.document import GraspMotion
 
 BLOCKERS = 3
@@ -26,8 +25,8 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
         asked: objects that it was asked about, of which some may have no grasp.
         motion: of the hand.
     """
-    from burg_drake.core.terminal import format_number
     from burg_drake.core.grasps import Outcome, Stage
+    from burg_drake.core.terminal import format_number
     from burg_drake.evaluation.results import unclear_notes, unmoved_notes
 
     outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
@@ -50,8 +49,8 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
 
 def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
     """How many grasps of each object the arm can execute."""
-    from burg_drake.core.terminal import format_count, format_percent
     from burg_drake.core.grasps import Outcome, Stage
+    from burg_drake.core.terminal import format_count, format_percent
 
     table = TextTable("Grasps that the arm can execute").names("object")
     table.numbers("grasps", "clear", "reachable", "of clear")
@@ -62,7 +61,9 @@ def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcom
         clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
         good = counts[Outcome.REACHABLE]
         share = format_percent(good / clear) if clear else "-"
-        table.row(name, format_count(counts.total()), format_count(clear), format_count(good), share)
+        table.row(
+            name, format_count(counts.total()), format_count(clear), format_count(good), share
+        )
     return table
 
 
@@ -72,8 +73,8 @@ def outcome_table(
     """Outcomes by object where they fit, with what was mostly in the way."""
     from rich.console import Console
 
-    from burg_drake.core.terminal import format_count, format_percent
     from burg_drake.core.grasps import Outcome
+    from burg_drake.core.terminal import format_count, format_percent
 
     room = Console().width - 70
     names = [name for name in by_object if len(by_object) > 1]

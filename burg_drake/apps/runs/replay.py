@@ -12,11 +12,9 @@ from burg_drake.apps.options import add_only, add_verb, add_view, positive_int
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
+    from burg_drake.core.grasps import Verdict
+    from burg_drake.evaluation.records import Columns, RecordedTrial, TrialOrigin
     from burg_drake.evaluation.store import Inputs
-    from burg_drake.core.grasps import (Verdict)
-    from burg_drake.evaluation.records import TrialOrigin
-    from burg_drake.evaluation.records import Columns
-    from burg_drake.evaluation.records import RecordedTrial
     from burg_drake.simulation.trials import TrialResult
 
 
@@ -118,10 +116,9 @@ def _execute(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, 
     An engine that ends trials early is run twice: as recorded, and to the end for the picture. So
     is a trial of the arm, which is shown from its home posture on.
     """
-    from burg_drake.evaluation.stages import trial_verdict
     from burg_drake.evaluation import decisive_mode, rerun
-    from burg_drake.visualization.scenes import record_arm_trial
-    from burg_drake.visualization.scenes import record_trial
+    from burg_drake.evaluation.stages import trial_verdict
+    from burg_drake.visualization.scenes import record_arm_trial, record_trial
 
     trial, origin = source.trial, source.origin
     scene, station = source.inputs.scene, source.inputs.station
@@ -143,9 +140,8 @@ def _execute(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, 
 
 
 def _from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
-    from burg_drake.evaluation.store import Inputs, find_inputs
     from burg_drake.evaluation.records import origin_of
-    from burg_drake.evaluation.store import RUN_FILE, load_run
+    from burg_drake.evaluation.store import RUN_FILE, Inputs, find_inputs, load_run
 
     run = load_run(path)
     if arguments.grasp is not None:
@@ -161,11 +157,8 @@ def _from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
 
 
 def _from_table(path: Path, arguments: argparse.Namespace) -> ReplaySource:
+    from burg_drake.evaluation.records import read_origin, read_table, read_trial, table_row
     from burg_drake.evaluation.store import find_inputs
-    from burg_drake.evaluation.records import read_origin
-    from burg_drake.evaluation.records import table_row
-    from burg_drake.evaluation.records import read_table
-    from burg_drake.evaluation.records import read_trial
 
     columns = read_table(path)
     if "id" not in columns:

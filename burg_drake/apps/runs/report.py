@@ -28,11 +28,10 @@ def add_to(verbs: Any) -> None:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Prints the tables of a run, of one scene or of many, and writes its report."""
-    from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.apps.runs.campaign import how_it_ended, print_campaign
-    from burg_drake.evaluation.store import Campaign
+    from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.evaluation.report import write_campaign_report, write_report
-    from burg_drake.evaluation.store import open_results
+    from burg_drake.evaluation.store import Campaign, open_results
 
     run = open_results(arguments.run_folder)
     if isinstance(run, Campaign):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +11,18 @@ from burg_drake.apps.options import (
     add_only,
     add_options,
     add_quiet,
+    add_retry_failed,
     add_verb,
-    not_negative,
+    how_to_retry,
     positive_int,
     seed,
     settings_from,
     workers,
 )
-from burg_drake.apps.options import add_retry_failed, how_to_retry
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.robustness import RobustnessSettings
-
 
 
 def add_to(verbs: Any) -> None:
@@ -101,8 +99,7 @@ def run_robustness(arguments: argparse.Namespace) -> int:
 
     if arguments.output is not None:
         require_table(Path(arguments.output))
-    from burg_drake.evaluation.robustness import assess_robustness
-    from burg_drake.evaluation.robustness import robustness_view
+    from burg_drake.evaluation.robustness import assess_robustness, robustness_view
     from burg_drake.evaluation.store import load_run
 
     if arguments.only and arguments.grasp:

@@ -77,8 +77,8 @@ def _show(status: Status, as_json: bool, *, again: bool = False) -> None:
 def status_lines(status: Status) -> list[str]:
     """The status for people; always as many lines for the same run, but for its failures."""
     from burg_drake.core import listing
-    from burg_drake.core.terminal import format_number, format_percent
     from burg_drake.core.grasps import Outcome
+    from burg_drake.core.terminal import format_number, format_percent
 
     share = f" ({format_percent(status.judged / status.total)})" if status.total else ""
     about = "about " if status.kind == "campaign" and not status.complete else ""
