@@ -29,6 +29,7 @@ from burg_drake.experiment.pairing.pairs import NAMES
 from burg_drake.experiment.pairing.result_table import ResultTable
 from burg_drake.experiment.pairing.text_codes import Factor, Ids, text_keys
 from burg_drake.experiment.planning.plan import plan_trials
+from burg_drake.experiment.planning.settings import SelectionSettings
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
@@ -289,7 +290,11 @@ def test_a_table_of_robustness_of_another_run_is_refused(tmp_path: Path) -> None
         with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
             compare(first, second, robustness=tmp_path / f"{refused}.csv")
         with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
-            plan_trials(first, balance="probability", robustness=tmp_path / f"{refused}.csv")
+            plan_trials(
+                first,
+                settings=SelectionSettings(balance="probability"),
+                robustness=tmp_path / f"{refused}.csv",
+            )
 
 
 def test_texts_as_numbers() -> None:
