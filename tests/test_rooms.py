@@ -228,8 +228,8 @@ def test_a_crowded_folder_is_found(tmp_path: Path) -> None:
 
 def test_long_lists_of_parameters_are_found(tmp_path: Path) -> None:
     nine = ", ".join(f"x{k}" for k in range(9))
-    text = f"def f({nine}): ...\nclass A:\n    def g(self, {nine}): ...\n    def h(self, {nine}, *, y): ..."
-    house = built(tmp_path, a_in_low=text)
+    methods = f"    def g(self, {nine}): ...\n    def h(self, {nine}, *, y): ..."
+    house = built(tmp_path, a_in_low=f"def f({nine}): ...\nclass A:\n{methods}")
     assert many_parameters(house) == ["house.low.a:4 h has 10 parameters"]
 
 
