@@ -210,7 +210,7 @@ def test_a_sheet_is_not_written_over_once_it_has_entries(hand: Run, tmp_path: Pa
     assert load_trials(path).selection.per_object == 3
     text = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
-    with pytest.raises(InvalidInputError, match=r"has entries for 1 trial; choose another -o"):
+    with pytest.raises(InvalidInputError, match=r"has entries for 1 trial; choose another file"):
         planned(hand, out=path)
     path.write_text(text)  # by an editor with an old buffer
     with pytest.raises(InvalidInputError, match="has entries for 1 trial"):

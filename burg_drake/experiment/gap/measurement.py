@@ -171,8 +171,8 @@ def _require_same(path: Path, there: GapDocument, document: GapDocument) -> None
         if old != new:
             raise InvalidInputError(
                 f"{path} has steps of something else ({name} is {_short(old)} there,"
-                f" {_short(new)} here); choose another -o, or delete it"
-            )
+                f" {_short(new)} here); choose another folder, or delete it"
+            ).about("out")
 
 
 def _short(value: object) -> str:

@@ -110,8 +110,8 @@ def require_unused(path: str | Path) -> None:
         count = max(filled, len({entry.number for entry in recorded}))
         raise InvalidInputError(
             f"{path} has entries for {count} {'trial' if count == 1 else 'trials'};"
-            " choose another -o, or move it and its journal away"
-        )
+            " choose another file, or move it and its journal away"
+        ).about("out")
 
 
 def _ordered(chosen: Chosen, selection: Selection) -> list[tuple[int, EligibleGrasps, int, str]]:
