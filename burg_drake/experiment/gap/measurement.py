@@ -115,17 +115,7 @@ def measure_gap(
     mode_for(station, last)
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     path = Path(out)
-    document = GapDocument(
-        source="" if run is None else run.document.hash,
-        scene=scene.content,
-        station=station.content,
-        last=last,
-        place_mm=1e3 * noise.place,
-        turn_deg=float(np.rad2deg(noise.turn)),
-        seed=noise.seed,
-        samples=samples,
-        versions=software_versions(),
-    )
+    document = _asked(run, scene, station, last, settings)
     _begin(path, document)
     options = {"executor": executor, "progress": progress}
     begin = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
@@ -149,6 +139,24 @@ def measure_gap(
         )
     save_document(document, path / DOCUMENT_FILE, HEADER)  # with what was drawn, too
     return GapSteps(path, document, tuple(steps), extra)
+
+
+def _asked(
+    run: Run | None, scene: Scene, station: Station, last: Mode, settings: GapSettings
+) -> GapDocument:
+    """What a call asks for, with the versions that are installed."""
+    noise = settings.noise
+    return GapDocument(
+        source="" if run is None else run.document.hash,
+        scene=scene.content,
+        station=station.content,
+        last=last,
+        place_mm=1e3 * noise.place,
+        turn_deg=float(np.rad2deg(noise.turn)),
+        seed=noise.seed,
+        samples=settings.samples,
+        versions=software_versions(),
+    )
 
 
 def _begin(path: Path, document: GapDocument) -> None:
