@@ -48,7 +48,7 @@ class Cluster:
     def __init__(self) -> None:
         self.nodes = LocalNodes(2)
         self.client = distributed.Client(self.nodes.address, set_as_default=False, timeout=30)
-        self.executor = DaskExecutor(self.client, LIMITS, self.nodes.mend)
+        self.executor = DaskExecutor(self.client, LIMITS, self.nodes.restart_workers)
 
     @property
     def workers(self) -> dict[str, int]:

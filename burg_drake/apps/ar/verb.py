@@ -19,7 +19,7 @@ from burg_drake.apps.options import (
     positive_int,
     print_scale,
 )
-from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
+from burg_drake.apps.terminal import interrupts_ignored, open_in_browser, terminated_as_interrupted
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
         except KeyboardInterrupt:
             interrupted = True
             print(file=sys.stderr)
-        with deaf_to_interrupts():
+        with interrupts_ignored():
             closing.close()
         actions.wait_for_check()  # OpenCV must not be at work when Python ends
     if scripted or arguments.check or arguments.snapshot:

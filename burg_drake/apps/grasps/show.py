@@ -173,8 +173,8 @@ def _content(arguments: argparse.Namespace) -> Content:
         )
     if source.scene is not None:
         given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
-        told = imported.grasps.provenance
-        grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=told)
+        provenance = imported.grasps.provenance
+        grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)
     return Content(grasps, source, station, ranked_set(grasps), title=path.name)
 
 

@@ -74,8 +74,8 @@ def run_stats(arguments: argparse.Namespace) -> int:
         require_writable(arguments.json)
     tolerance, column = settings_from(arguments, Tolerance), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
-    told = arguments.hand or arguments.gripper_link
-    gripper = gripper_for(arguments) if told else None
+    given = arguments.hand or arguments.gripper_link
+    gripper = gripper_for(arguments) if given else None
     sets = [read_input(path, arguments.source, gripper) for path in paths]
     sets = _renamed(sets, dict(arguments.rename))
     _check_frames(paths, sets)

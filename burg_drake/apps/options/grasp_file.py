@@ -114,11 +114,11 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
 
     if arguments.station is not None:
         return load_station(arguments.station)
-    told = station_reference(path)
-    if told is not None and not is_resolved(told, "stations"):
-        raise UnknownNameError(f"{path} names a station: {told} is not there; give --station")
+    reference = station_reference(path)
+    if reference is not None and not is_resolved(reference, "stations"):
+        raise UnknownNameError(f"{path} names a station: {reference} is not there; give --station")
     try:
-        return load_station(told or DEFAULT_STATION)
+        return load_station(reference or DEFAULT_STATION)
     except UnknownNameError as error:
         raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
 

@@ -24,7 +24,9 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
     """
     from burg_drake.evaluation.run import EvaluationSettings
 
-    add_options(which or parser, EvaluationSettings, "grasps_per_object", unset=True, told=default)
+    add_options(
+        which or parser, EvaluationSettings, "grasps_per_object", unset=True, shown_default=default
+    )
     parser.set_defaults(default_grasps=default)
     add_options(parser, EvaluationSettings, "blind")
     add_only(parser, "grasps")

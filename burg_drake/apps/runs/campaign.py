@@ -60,7 +60,7 @@ def evaluate_many(
     print_campaign(campaign)
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
-    return how_it_ended(campaign)
+    return campaign_exit_code(campaign)
 
 
 def print_campaign(campaign: Campaign) -> None:
@@ -85,7 +85,7 @@ def print_campaign(campaign: Campaign) -> None:
         print(f"report  {campaign.report_path}")
 
 
-def how_it_ended(campaign: Campaign) -> int:
+def campaign_exit_code(campaign: Campaign) -> int:
     """Says what could not be judged; the exit code."""
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)

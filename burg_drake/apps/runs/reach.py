@@ -118,7 +118,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation import reach
     from burg_drake.evaluation.candidates import chosen_instances
     from burg_drake.evaluation.records import motion_text
-    from burg_drake.evaluation.results import short_lifts, ungiven_note
+    from burg_drake.evaluation.results import missing_grasps_note, short_lifts
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.checks import require_valid_scene
@@ -157,7 +157,9 @@ def run_reach(arguments: argparse.Namespace) -> int:
     answered = judged.column("outcome") != ""
     names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
     print_tables(judged.select(answered), names, motion)
-    if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
+    if arguments.grasps is not None and (
+        note := missing_grasps_note(names, judged.object.tolist())
+    ):
         print(f"note: {note}")
     if motion != GraspMotion():
         print(f"motion: {motion_text(motion)}")

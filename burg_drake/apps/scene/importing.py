@@ -93,12 +93,12 @@ def _propose_station(scene: Scene, output: str | None) -> None:
         except InvalidInputError as error:
             print(f"no station fits: {error}")
             return
-        _tell_fits(fitting.name if fitting else "", misfits)
+        _print_fits(fitting.name if fitting else "", misfits)
         if fitting is None:
             print("no built-in station fits; --station-out FILE lays one out around the scene")
         return
     proposal = propose_station(scene, Path(output))
-    _tell_fits(proposal.source, proposal.misfits)
+    _print_fits(proposal.source, proposal.misfits)
     save_document(proposal.document, output)
     arm = proposal.document.arm
     where = (
@@ -112,7 +112,7 @@ def _propose_station(scene: Scene, output: str | None) -> None:
         print(f"burg-drake: warning: {output}: {warning}", file=sys.stderr)
 
 
-def _tell_fits(fitting: str, misfits: dict[str, str]) -> None:
+def _print_fits(fitting: str, misfits: dict[str, str]) -> None:
     for name, reason in misfits.items():
         print(f"station {name} does not fit: {reason}")
     if fitting:

@@ -95,6 +95,6 @@ def _print_hindered(rows: list[ExportedMotion]) -> None:
     for row in hindered:
         table.row(str(row.number), row.grasp, f"{row.answer} {row.blocker}".strip())
     counts = Counter(row.answer for row in hindered)
-    told = ", ".join(f"{count} {answer}" for answer, count in counts.most_common())
-    table.caption = f"{told}; record them as such, or plan with --among reachable or executed"
+    text = ", ".join(f"{count} {answer}" for answer, count in counts.most_common())
+    table.caption = f"{text}; record them as such, or plan with --among reachable or executed"
     table.show()

@@ -98,7 +98,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
             port=arguments.port,
             secret=_kept_secret(lab.plan),
         )
-        server.on_admitted = lambda peer: _tell(
+        server.on_admitted = lambda peer: _print_line(
             f"{peer} came in; for another browser: {server.url}"
         )
         closing.callback(shelf.close)
@@ -113,7 +113,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     print(f"burg-drake: {line}", file=sys.stderr, flush=True)
 
 

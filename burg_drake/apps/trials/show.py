@@ -101,12 +101,12 @@ def _print_lacking(path: str, lacking: Sequence[MissingValues]) -> None:
     """What the journal has and the file has not."""
     for found in lacking:
         if found.values:
-            told = ", ".join(
+            text = ", ".join(
                 f"{name} {value}" if isinstance(value, str) else name
                 for name, value in found.values.items()
             )
             print(
-                f"burg-drake: trial {found.number} lacks what was recorded: {told}", file=sys.stderr
+                f"burg-drake: trial {found.number} lacks what was recorded: {text}", file=sys.stderr
             )
         if found.edited:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")

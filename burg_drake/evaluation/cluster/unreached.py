@@ -9,7 +9,7 @@ TRY = 2.0
 """Time to try whether anybody listens [s]."""
 
 
-def why_unreached(where: object, error: BaseException) -> str:
+def unreached_reason(where: object, error: BaseException) -> str:
     """A reason in one line.
 
     Args:

@@ -69,7 +69,7 @@ class RoutineSolutions:
         polished, met = solve_ik(
             self._arm.unlimited(), X_AH[pose], q, iterations=ITERATIONS, tolerance=TOLERANCE
         )
-        q = self._arm.turned_near(polished, 0.5 * (self._lower + self._upper))
+        q = self._arm.wrapped_near(polished, 0.5 * (self._lower + self._upper))
         if self._limited:
             met &= ((self._lower <= q) & (q <= self._upper)).all(axis=1)
         return pose[met], q[met]
