@@ -12,8 +12,8 @@ from typing import Any
 from burg_drake.core import ClusterError, MissingDependencyError
 from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.connection_failure import unreached_reason
 from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
-from burg_drake.evaluation.cluster.unreached import unreached_reason
 from burg_drake.evaluation.workers import Job, OnFailure, WorkerLimits
 
 REACH = 5.0

@@ -12,7 +12,7 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.merge.finishing import MissingFromMerge
 from burg_drake.evaluation.merge.journals import choose
-from burg_drake.evaluation.merge.united import (
+from burg_drake.evaluation.merge.united_run import (
     all_sessions,
     common_shard,
     copy_documents,

@@ -26,7 +26,7 @@ from burg_drake.evaluation.merge.finishing import (
     note_unfinished,
     unfinished,
 )
-from burg_drake.evaluation.merge.united import missing_shards, write_united
+from burg_drake.evaluation.merge.united_run import missing_shards, write_united
 from burg_drake.evaluation.records import unchanged
 from burg_drake.evaluation.store import Campaign, Run, is_campaign, open_results
 
