@@ -50,8 +50,8 @@ def add_to(verbs: Any) -> None:
         verbs,
         "gap",
         run_gap,
-        "judge the same grasps by the hand alone, with the arm, by the whole arm, and with objects"
-        " displaced: what each step loses",
+        "judge the same grasps with the hand alone, with the arm's reach, with the whole arm,"
+        " and with displaced objects: how many each step loses",
         "burg-drake gap tabletop_six -o gap",
         "burg-drake gap runs/first -o gap",
         "burg-drake gap tabletop_six -n 50 --placement-sd-mm 5 --samples 10 -o gap",
@@ -220,8 +220,8 @@ def _require_own(arguments: argparse.Namespace, run: Run) -> None:
     options = [f"--{name.replace('_', '-')}" for name in given]
     for option in (*options, *map(motion_option, given_motion(arguments))):
         raise InvalidInputError(
-            f"{option} is about a scene; {run.path} is a run, which has grasps, station, engine and"
-            " motion of its own: leave it out"
+            f"{option} is for scenes; {run.path} is a run, which has its own grasps, station,"
+            " engine and motion: leave it out"
         )
 
 

@@ -31,7 +31,7 @@ def add_gripper_link(parser: Any) -> None:
     parser.add_argument(
         "--gripper-link",
         metavar="NAME",
-        help="what isaac_grasp files call the body of the hand (default: as its model does)",
+        help="name of the hand's body in isaac_grasp files (default: that in its model)",
     )
 
 
@@ -53,8 +53,8 @@ def add_camera_options(group: Any) -> None:
         metavar="FILE",
         nargs="+",
         default=[],
-        help="where the scene frame has the file's camera (or world): 4x4 .npy, FILE:INDEX for one"
-        " of several, or YAML; several are multiplied",
+        help="pose of the file's camera (or world) in the scene frame: 4x4 .npy, FILE:INDEX for"
+        " one of several, or YAML; several are multiplied",
     )
     group.add_argument(
         "--object-ids",
@@ -63,7 +63,7 @@ def add_camera_options(group: Any) -> None:
         default={},
         help="instances by object id; without, grasps go to what is between their fingers",
     )
-    group.add_argument("--scene-id", metavar="ID", help="which one of a file of several scenes")
+    group.add_argument("--scene-id", metavar="ID", help="scene to read from a file of several")
 
 
 def numbering(text: str) -> dict[int, str]:

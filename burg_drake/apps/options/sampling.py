@@ -48,7 +48,7 @@ def require_sampled(arguments: argparse.Namespace) -> None:
     for name in ("blind", "approach_angle"):
         if getattr(arguments, name) and arguments.grasps is not None:
             raise InvalidInputError(
-                f"--{name.replace('_', '-')} is about sampled grasps; leave it or --grasps away"
+                f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
             )
 
 

@@ -19,7 +19,7 @@ def add_to(group: Any) -> None:
         group,
         "import-burg",
         run_import_burg,
-        "make a scene of one of BURG-Toolkit",
+        "import a scene of BURG-Toolkit",
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml"
@@ -36,7 +36,7 @@ def add_to(group: Any) -> None:
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
     )
-    parser.add_argument("--name", metavar="NAME", help="of the scene (default: that of FILE)")
+    parser.add_argument("--name", metavar="NAME", help="name of the scene (default: that of FILE)")
     parser.add_argument(
         "--station-out",
         metavar="FILE",

@@ -32,7 +32,7 @@ def add_to(group: Any) -> None:
         " -o scene.yaml",
         "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
         "",
-        "Each scene is drawn until it fulfils all that is asked, and settled in simulation.",
+        "Each scene is drawn again until it meets all conditions, and settled in simulation.",
         "Interrupt it whenever you like: the same command goes on, and a larger --count adds",
         "scenes. Exit code 1 if not all scenes were accepted; scenes.csv says why.",
         options=_add_options,
@@ -54,12 +54,12 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--again",
         metavar="SCENE",
-        help="make a sampled scene again, from what its file says of its origin",
+        help="make a sampled scene again from the origin recorded in its file",
     )
     parser.add_argument(
         "--force",
         action="store_true",
-        help="with --again: even though library, station or versions are not the same",
+        help="with --again: even if library, station or versions differ",
     )
     add_quiet(parser)
 

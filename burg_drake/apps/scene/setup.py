@@ -54,7 +54,7 @@ def _add_options(parser: Parser) -> None:
     )
     add_station(parser)
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
     )
     parser.add_argument(
         "--host",
@@ -131,8 +131,8 @@ def _print_unsaved(session: ComposeSession) -> None:
     view = session.view
     if not view.saved and (view.undo_label or view.redo_label):
         print(
-            f"burg-drake: changes of {view.document.name} are not saved; they are there when the"
-            " same is opened again",
+            f"burg-drake: changes of {view.document.name} are not saved; opening the same scene"
+            " again restores them",
             file=sys.stderr,
         )
 

@@ -25,7 +25,10 @@ def add_to(group: Any) -> None:
         "burg-drake trials export trials.yaml -o plans/",
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
-        "Files begin with the number of the trial; index.csv lists all trials, with what hinders",
+        (
+            "File names begin with the number of the trial; index.csv lists all trials, with"
+            " what stops"
+        ),
         "the arm where there is no file. The same command goes on where an interrupted one",
         "stopped. Exit code 1 if a trial could not be judged.",
     )
@@ -45,7 +48,7 @@ def add_to(group: Any) -> None:
         " (default: %(default)s)",
     )
     parser.add_argument(
-        "--station", metavar="STATION", help="with the arm (default: that of each run)"
+        "--station", metavar="STATION", help="station with the arm (default: that of each run)"
     )
     add_moved(parser)
     parser.add_argument(
