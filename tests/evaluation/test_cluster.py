@@ -249,7 +249,7 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
     start = time.monotonic()
     reached = (
-        r"^no scheduler of Dask is reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
+        r"^no Dask scheduler was reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
     )
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass

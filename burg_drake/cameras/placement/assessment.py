@@ -120,11 +120,11 @@ def _doubt(shape: TargetShape, found: Located, deviation: Array, rough: float) -
         return "another place fits almost as well"
     if alignment.turnable:
         turn = np.rad2deg(max(alignment.turnable, key=abs))
-        return f"turned by another {turn:+.0f} deg it fits as well"
+        return f"rotated by another {turn:+.0f} deg it fits as well"
     if found.seen < WELL:
         return f"only {100 * found.seen:.0f} % of it can be seen"
     if deviation[:2].max() > LOOSE:
         return f"its place is known to {1e3 * deviation[:2].max():.1f} mm only"
     if not shape.symmetric and deviation[2] > VAGUE:
-        return f"its turn is known to {np.rad2deg(deviation[2]):.0f} deg only"
+        return f"its rotation is known to {np.rad2deg(deviation[2]):.0f} deg only"
     return ""

@@ -142,7 +142,7 @@ def _client(distributed: Any, where: Any, security: Any) -> Any:
         found = TimeoutError("no answer")
     if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
-            f"no scheduler of Dask is reached at {where} within {REACH:.0f} s:"
+            f"no Dask scheduler was reached at {where} within {REACH:.0f} s:"
             f" {unreached_reason(where, found)}"
         ) from found
     if isinstance(found, BaseException):

@@ -46,4 +46,4 @@ def deliver_bundle(client: Any, job: SentJob, addresses: Sequence[str]) -> None:
 
 
 def _delivery_error(job: SentJob, address: str, why: str) -> ClusterError:
-    return ClusterError(f"worker {address} does not get the scene {job.job.key!r}: {why}")
+    return ClusterError(f"worker {address} did not receive the scene {job.job.key!r}: {why}")

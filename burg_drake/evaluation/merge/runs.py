@@ -53,7 +53,7 @@ class Merged:
         notes = []
         shard = self.result.document.shard
         if shard:
-            notes.append(f"all that was given is shard {shard}, and so is the united run")
+            notes.append(f"only shard {shard} was given, so the united run is only that shard")
         if not (self.missing or self.scenes):
             return tuple(notes)
         if self.missing:

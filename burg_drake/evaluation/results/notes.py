@@ -18,7 +18,9 @@ from burg_drake.station.document import GraspMotion
 CAUSES = 3
 """So many outcomes are named."""
 HIT = {Outcome.COLLISION_TARGET: SELF, Outcome.COLLISION_TABLE: TABLE}
-REMEDY_OF_ARM = "another station or place on the board may help; mode `hand` leaves the arm out"
+REMEDY_OF_ARM = (
+    "another station, or another place on the board, may help; mode `hand` leaves the arm out"
+)
 REMEDIES = {
     Stage.CLEAR: "sample grasps at which the hand is clear, which is the default",
     Stage.REACHABLE: REMEDY_OF_ARM,

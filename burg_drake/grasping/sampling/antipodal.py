@@ -282,7 +282,7 @@ def _accepted(grasps: _Grasps, accept: Accept) -> _Grasps:
     passed = np.asarray(accept(grasps.X_OG), dtype=bool)
     if passed.shape != (len(grasps.X_OG),):
         raise InvalidInputError(
-            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has to"
-            " tell for each grasp whether to keep it"
+            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has"
+            " to say for each grasp whether to keep it"
         )
     return _Grasps(grasps.X_OG[passed], grasps.width[passed], grasps.score[passed])

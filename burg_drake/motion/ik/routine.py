@@ -97,6 +97,6 @@ class RoutineSolutions:
             k = int(np.argmax(np.maximum(off, turned)))
             raise InvalidInputError(
                 f"the IK routine's positions {q[k].round(4).tolist()} bring the hand"
-                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees beside the pose that was"
-                " asked for; poses are of the hand body in the frame of the arm's base"
+                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees away from the"
+                " requested pose; poses are of the hand body in the frame of the arm's base"
             )

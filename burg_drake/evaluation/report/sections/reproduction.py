@@ -59,7 +59,10 @@ def provenance(run: Run) -> Html:
         f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
         f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
     )
-    text = "Everything that decides about the results, who judged when, and what is in the folder."
+    text = (
+        "All inputs of the results, the sessions in which they were judged, and the files of the"
+        " folder."
+    )
     return folded("All settings and versions", text, _list([*facts, ("files", files)]))
 
 
@@ -92,7 +95,9 @@ def campaign_facts(campaign: Campaign) -> Html:
         *_settings(document),
         *_sessions(document),
     ]
-    text = "Everything that decides about the results but the scenes, and who judged when."
+    text = (
+        "All inputs of the results except the scenes, and the sessions in which they were judged."
+    )
     return folded("All settings and versions", text, _list(facts))
 
 
