@@ -91,7 +91,7 @@ def _add_options(parser: Parser) -> None:
         "--plans",
         metavar="DIR",
         help="folder for the timed motion of each grasp that the arm can execute, about 1.5 MB"
-        " each; the same command goes on where an interrupted one stopped",
+        " each; the same command continues where an interrupted one stopped",
     )
     parser.add_argument(
         "--plan-format",

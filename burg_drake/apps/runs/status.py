@@ -114,4 +114,4 @@ def _process(status: Status) -> str:
         return f"at work{last}"
     if status.complete:
         return f"none, and nothing is left to do{last}"
-    return f"none; the same command goes on{last}"
+    return f"none; the same command continues{last}"
