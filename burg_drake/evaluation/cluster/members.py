@@ -57,19 +57,19 @@ class ClusterWorkers:
     """Workers by address.
 
     Attributes:
-        hands: the workers.
+        workers: the workers.
     """
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self.hands: dict[str, ClusterWorker] = {}
+        self.workers: dict[str, ClusterWorker] = {}
 
     @property
     def threads(self) -> int:
         """Number of chunks that they work on at a time."""
-        return sum(hand.threads for hand in self.hands.values())
+        return sum(worker.threads for worker in self.workers.values())
 
-    def look(self) -> list[ClusterWorker]:
+    def update(self) -> list[ClusterWorker]:
         """Takes on new workers whose versions are ours and whose addresses are safe.
 
         Returns:
@@ -79,14 +79,14 @@ class ClusterWorkers:
             ClusterError: the scheduler is lost, or a worker has other versions or is not safe.
         """
         there = threads_by_address(self._client)
-        lost = [hand for address, hand in self.hands.items() if address not in there]
-        for hand in lost:
-            del self.hands[hand.address]
-        new = [address for address in there if address not in self.hands]
+        lost = [worker for address, worker in self.workers.items() if address not in there]
+        for worker in lost:
+            del self.workers[worker.address]
+        new = [address for address in there if address not in self.workers]
         for address in new:
             require_safe(address, "worker ")
         for address in admitted(self._client, new):
-            self.hands[address] = ClusterWorker(address, there[address])
+            self.workers[address] = ClusterWorker(address, there[address])
         return lost
 
 
