@@ -30,7 +30,7 @@ def add_to(group: Any) -> None:
         "burg-drake camera calibrate --camera 0 --size 1280x720 -o K.yaml",
         "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
         "",
-        "Exit code 1, and no file without --keep, if the photos hardly tell the camera.",
+        "Exit code 1, and no file without --keep, if the photos determine the camera poorly.",
     )
     calibrate.add_argument(
         "images", metavar="IMAGE", nargs="*", help="photos of the target, folders, or a video"
@@ -101,7 +101,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
         print(f"report  {arguments.report}")
     if useless and not arguments.keep:
         print(
-            "burg-drake: this tells too little of the camera; no file without --keep",
+            "burg-drake: the photos determine the camera poorly; no file without --keep",
             file=sys.stderr,
         )
     else:

@@ -35,7 +35,7 @@ def add_given(parser: Parser, which: Any) -> None:
     )
     group = parser.add_argument_group(
         "with --grasps",
-        "A file tells by its content what it is; see `burg-drake grasps convert --help`.",
+        "Files are recognised by their content; see `burg-drake grasps convert --help`.",
     )
     group.add_argument("--grasps-format", metavar="NAME", help="format of the file, if it must be")
     add_gripper_link(group)

@@ -63,6 +63,6 @@ def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:
     """
     if mode == "hand" and arguments.standoff_mm is not None:
         raise InvalidInputError(
-            "--standoff-mm is about the arm's way to the grasp; in mode 'hand' the hand begins at"
+            "--standoff-mm is about the arm's path to the grasp; in mode 'hand' the hand begins at"
             " the grasp: leave it out, or give --mode reach or arm"
         )

@@ -58,7 +58,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
         "",
-        "The same command goes on where an interrupted one stopped.",
+        "The same command continues where an interrupted one stopped.",
         options=_add_options,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")

@@ -62,7 +62,7 @@ def add_to(verbs: Any) -> None:
         "",
         "A grasp is reachable if the open hand is clear, also on the straight approach, and with",
         "the object in it on the straight retreat and lift, the arm can follow them, and it finds",
-        "a way from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
+        "a path from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
         "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
         "does that.",
         options=_add_options,
@@ -91,7 +91,7 @@ def _add_options(parser: Parser) -> None:
         "--plans",
         metavar="DIR",
         help="folder for the timed motion of each grasp that the arm can execute, about 1.5 MB"
-        " each; the same command goes on where an interrupted one stopped",
+        " each; the same command continues where an interrupted one stopped",
     )
     parser.add_argument(
         "--plan-format",

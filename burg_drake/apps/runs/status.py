@@ -25,7 +25,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "status",
         run_status,
-        "tell how far a run is: grasps, rate, time left, outcomes, scenes that failed",
+        "show how far a run is: grasps, rate, time left, outcomes, scenes that failed",
         "burg-drake status runs/many",
         "burg-drake status runs/many --follow",
         "burg-drake status runs/many --json",
@@ -114,4 +114,4 @@ def _process(status: Status) -> str:
         return f"at work{last}"
     if status.complete:
         return f"none, and nothing is left to do{last}"
-    return f"none; the same command goes on{last}"
+    return f"none; the same command continues{last}"

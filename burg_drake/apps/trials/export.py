@@ -26,8 +26,8 @@ def add_to(group: Any) -> None:
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
         "Files begin with the number of the trial; index.csv lists all trials, with what hinders",
-        "the arm where there is no file. The same command goes on where an interrupted one",
-        "stopped. Exit code 1 if a trial could not be judged.",
+        "the arm where there is no file. The same command continues where an interrupted",
+        "one stopped. Exit code 1 if a trial could not be judged.",
     )
     add_sheet(parser)
     parser.add_argument(

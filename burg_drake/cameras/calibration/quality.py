@@ -52,7 +52,7 @@ def advice(calibration: Calibration) -> list[str]:
     if tilted < TILTED_VIEWS:
         lines.append(
             f"{tilted} views are tilted by more than {math.degrees(TILTED):.0f} degrees: tilt the"
-            " target by 20 to 45 degrees to all sides, which tells focal length from distance"
+            " target by 20 to 45 degrees to all sides, which separates focal length from distance"
         )
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     empty = uncovered(coverage(views, size))

@@ -126,5 +126,5 @@ def _doubt(shape: TargetShape, found: Located, deviation: Array, rough: float) -
     if deviation[:2].max() > LOOSE:
         return f"its place is known to {1e3 * deviation[:2].max():.1f} mm only"
     if not shape.symmetric and deviation[2] > VAGUE:
-        return f"its turn is known to {np.rad2deg(deviation[2]):.0f} deg only"
+        return f"its rotation is known to {np.rad2deg(deviation[2]):.0f} deg only"
     return ""

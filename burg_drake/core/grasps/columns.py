@@ -59,7 +59,7 @@ _MARGINS = {
 
 _ORIGIN = {
     "seed": Column(PLAIN, "of the sampling, in robustness tables of the perturbations"),
-    "engine": Column(TEXT, "preset by which time was stepped; marked if it is none"),
+    "engine": Column(TEXT, "preset of the time stepping; marked if its values were changed"),
     "run": Column(TEXT, "short hash of all that decides about results; hash in run.yaml"),
     "scene": Column(TEXT, "where the scene was, or the name of a built-in one"),
     "scene_content": Column(TEXT, "content hash of the scene with its objects"),
@@ -86,7 +86,9 @@ _QUALITY = {
     "force_closure": Column(PLAIN, "1 if the contacts' line lies within both friction cones"),
     "friction_needed": Column(PLAIN, "coefficient from which on it would"),
     "antipodal_angle": Column("rad", "largest angle of closing direction and inward normal"),
-    "slide": Column("m", "way that the object slides in the hand until held; inf if never"),
+    "slide": Column(
+        "m", "distance that the object slides in the hand until it is held; inf if never"
+    ),
     "epsilon": Column(PLAIN, "radius of the largest ball within the wrench space"),
     "volume": Column(PLAIN, "of the wrench space"),
     "load_margin": Column(

@@ -44,17 +44,19 @@ class Margins:
     )
     clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
     slip: float = margin(
-        "m", "way of the target in the hand since the grip, at the origin of G", less_is_better=True
+        "m",
+        "displacement of the target in the hand since the grip, at the origin of G",
+        less_is_better=True,
     )
     tilt: float = margin(
-        "rad", "turn of the target in the hand since the grip", less_is_better=True
+        "rad", "rotation of the target in the hand since the grip", less_is_better=True
     )
     pad_force: float = margin("N", "normal force of the weaker pad along the closing direction")
     patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
     lift: float = margin(
         "m",
-        "how far the target's centre of mass rose, or went along the straight ways of another"
-        " motion; of a trial decided on the way with the rest of it, which is free by geometry",
+        "how far the target's centre of mass rose, or went along the path of another motion; of a"
+        " trial that was decided early with the rest of the lift, which is free by geometry",
     )
     lift_height: float = margin(
         "m",
@@ -71,7 +73,8 @@ class Margins:
     )
     arm_clearance: float = margin(
         "m",
-        "least distance that the robot keeps on its way, or signed distance of what is in it",
+        "smallest distance between the robot and anything else along its path, or signed distance"
+        " of the blocker",
         mode="reach",
         by_trial=False,
     )

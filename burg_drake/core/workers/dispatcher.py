@@ -287,7 +287,7 @@ def _progress(task: PendingTask, message: Any) -> None:
         try:
             task.task.on_progress(message)
         except Exception:
-            _log.exception("who was told of the progress of a task failed")
+            _log.exception("the callback for the progress of a task failed")
 
 
 def _finish(task: PendingTask, message: Done) -> None:

@@ -127,7 +127,7 @@ def lost_scheduler(client: Any) -> ClusterError:
     address = client.scheduler.address if client.scheduler is not None else "the given address"
     return ClusterError(
         f"the scheduler at {address} does not answer any more; what was judged is kept, and the"
-        " same command goes on when there is a scheduler again"
+        " same command continues when there is a scheduler again"
     )
 
 

@@ -119,7 +119,7 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
         judged, expected = format_count(summary.total.judged), format_count(campaign.expected)
         parts.append(
             f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
-            " goes on with it."
+            " continues it."
         )
     return element("p", " ".join(parts), class_="notice") if parts else None
 

@@ -116,6 +116,6 @@ def _notice(run: Run) -> Html | None:
     if judged < mine:
         parts.append(
             f"This run is not complete: {judged} of {mine} grasps are judged. The command under"
-            " “How to repeat it” goes on with it."
+            " “How to repeat it” continues it."
         )
     return element("p", " ".join(parts), class_="notice") if parts else None

@@ -44,7 +44,7 @@ class PlacementNoise:
     )
     turn: float = _deviation(
         math.radians(2.0),
-        "standard deviation of its turn about the vertical",
+        "standard deviation of its rotation about the vertical",
         unit=DEGREES,
         name="placement_sd_deg",
     )

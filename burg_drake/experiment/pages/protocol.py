@@ -29,7 +29,7 @@ HOW = (
     " behind “other”.",
     "Look at the picture before the trial: the hand is where the robot will close it, and the"
     " object to be gripped has an orange rim. Do not correct the scene or the robot for it.",
-    "A trial that was spoiled, by a person or an object that fell before, is “not attempted”; go"
+    "A trial that was disturbed, by a person or an object that fell before, is “not attempted”; go"
     " on, and repeat it at the end if there is time.",
 )
 

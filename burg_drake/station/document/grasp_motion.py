@@ -41,7 +41,7 @@ class GraspMotion:
 
     Attributes:
         standoff: from pregrasp to grasp [m].
-        retreat: way back along the approach with the object, before the lift [m].
+        retreat: path back along the approach with the object, before the lift [m].
         lift_height: length of the lift [m].
         least_lift: what has to be free of it [m]: the hand rises as high as there is room, but no
             less than this; None if the whole lift has to be free.
@@ -51,10 +51,10 @@ class GraspMotion:
     standoff: float = _length(
         0.10,
         "standoff",
-        "straight way in along the approach, from the pregrasp to the grasp",
+        "straight path in along the approach, from the pregrasp to the grasp",
     )
     retreat: float = _length(
-        0.0, "retreat", "way back along the approach with the object, before the lift"
+        0.0, "retreat", "path back along the approach with the object, before the lift"
     )
     lift_height: float = _length(0.30, "lift_height", "length of the lift", "lift_mm")
     least_lift: float | None = _length(

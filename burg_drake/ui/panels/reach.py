@@ -102,7 +102,7 @@ class ReachPanel:
         width, depth = self._actions.session.view.document.board.size
         pixels = reach_image(layer, pixels=PIXELS)
         self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), OPACITY))
-        share = f"Some turn of the hand reaches {layer.covered:.0%} of the board."
+        share = f"Some rotation of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = all_of(box(reachability_key(), quiet(share)))
 
     def _show_line(self, line: str) -> None:

@@ -46,7 +46,7 @@ GROUPS = (
     ),
     OutcomeGroup("reachable, not tried", (0.60, 0.87, 0.62, 1.0), (Outcome.REACHABLE,)),
     OutcomeGroup(
-        "arm has no way",
+        "arm has no path",
         (0.10, 0.20, 0.45, 0.6),
         (Outcome.APPROACH_LINE, Outcome.RETREAT_LINE, Outcome.LIFT_LINE, Outcome.NO_PATH),
     ),
@@ -56,7 +56,7 @@ GROUPS = (
         (Outcome.NO_IK, Outcome.JOINT_LIMIT, Outcome.ARM_COLLISION),
     ),
     OutcomeGroup(
-        "hand collides on its way",
+        "hand collides on its path",
         (0.55, 0.32, 0.15, 0.5),
         (
             Outcome.HAND_COLLISION_APPROACH,

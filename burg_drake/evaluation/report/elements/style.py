@@ -7,7 +7,7 @@ from burg_drake.visualization.style import GROUPS, contrast, page_style
 STYLES = {group.name: f"g{i}" for i, group in enumerate(GROUPS)}
 THEMED = {
     "hand collides": ("#9aa2a9", "#6b747b"),
-    "arm has no way": ("#1a3373", "#8fa6e8"),
+    "arm has no path": ("#1a3373", "#8fa6e8"),
     "simulation failed": ("#1d2328", "#f4f6f7"),
 }
 """Greys, black and dark blue need one tone on a light page and another on a dark one."""

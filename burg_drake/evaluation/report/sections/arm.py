@@ -45,8 +45,9 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute {planned}{share}:"
-        " along a collision-free way from home to the pregrasp, straight to the grasp, and straight"
-        " up with the object, or as the motion says. The others end at the first thing that fails."
+        " along a collision-free path from home to the pregrasp, straight to the grasp, and"
+        " straight up with the object, or as the motion says. The others end at the first thing"
+        " that fails."
     )
     head = ["outcome", "grasps", "of clear", "what it means", "mostly in the way"]
     return folded("What hindered the arm", text, table(head, rows, numbers=(1, 2)) if rows else "")

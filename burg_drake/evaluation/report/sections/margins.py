@@ -56,9 +56,9 @@ CHOSEN = (
 FURTHER = (
     Margin("pad_force", "normal force of the weaker pad", "N", 1.0),
     Margin("patch_area", "contact patch of the weaker pad", "mm²", 1e6),
-    Margin("arm_clearance", "room around the robot on its way", "mm", 1e3),
+    Margin("arm_clearance", "room around the robot along its path", "mm", 1e3),
     Margin("pushed", "push before the hand closed", "mm", 1e3),
-    Margin("tracking_distance", "error of the hand's way", "mm", 1e3),
+    Margin("tracking_distance", "error of the hand's path", "mm", 1e3),
 )
 
 

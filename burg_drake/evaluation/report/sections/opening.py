@@ -93,7 +93,7 @@ def _losses(summary: Summary) -> str:
     words = {
         "clear": "the open hand collides",
         "reachable": "hand or arm cannot be there",
-        "planned": "the arm has no way",
+        "planned": "the arm has no path",
         "executed": "the simulation failed",
     }
     counts = [
@@ -128,7 +128,7 @@ def _spread(groups: Sequence[OutcomeCounts], what: str) -> str:
 
 def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
     total = summary.total
-    screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a way"
+    screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a path"
     disturbed = total.held - total.lifted
     extra = f"; {format_count(disturbed)} more disturbed others" if disturbed else ""
     scenes = f" in {format_count(len(summary.scenes))} scenes" if summary.scenes else ""

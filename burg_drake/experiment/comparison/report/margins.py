@@ -15,7 +15,7 @@ MOST_PLOTS = 4
 
 
 def margin_section(judged: Judgement) -> Html | None:
-    """What margins tell about success; nothing where there are none."""
+    """What margins say about success; nothing where there are none."""
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_informative, reverse=True)
     if not found:
@@ -28,12 +28,12 @@ def margin_section(judged: Judgement) -> Html | None:
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
         "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
-        " margin (↑ the larger, ↓ the smaller); one half tells nothing. Dots: share of successes"
+        " margin (↑ the larger, ↓ the smaller); one half says nothing. Dots: share of successes"
         f" among {trials} in bins of about equally many trials, with Wilson's intervals; line: the"
         " monotone curve that fits best; dashes: all of them."
     )
     return section(
-        "Do margins tell what will succeed?",
+        "Do margins predict success?",
         text,
         element("div", *plots, class_="charts plots"),
         table(head, rows, numbers=range(1, len(head)), style="figures"),

@@ -121,7 +121,7 @@ def _reproduction(steps: GapSteps, command_line: str) -> Html:
     return section(
         "How to repeat",
         "Every step is an ordinary run that burg-drake report, replay and robustness open. The same"
-        " command goes on where it was interrupted.",
+        " command continues where it was interrupted.",
         command(command_line),
         element("dl", *listed, class_="facts"),
     )

@@ -147,7 +147,7 @@ def _listing(change: Change) -> Html:
     first = shlex.join(replay_command(moves[0].run, moves[0].grasp))
     more = f", the first {ROWS} of {len(moves)}" if len(moves) > ROWS else ""
     inside = join(
-        element("p", "Any of them can be watched; replay tells again what was in the way:"),
+        element("p", "Any of them can be watched; replay shows again what was in the way:"),
         command(first),
         table(["grasp", "before", "after", "in the way", "command"], rows),
     )
