@@ -115,7 +115,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         return _end(f"error: {_missing_library(error)}", INPUT_ERROR)
     except BrokenPipeError:
-        if not _reader_is_gone():
+        if not _drop_unread_output():
             raise
         return 0
 
@@ -147,7 +147,7 @@ def _options(error: BurgError, arguments: argparse.Namespace) -> str:
 
 def _end(message: str, code: int) -> int:
     """Says in one line of printable text how it ended."""
-    _reader_is_gone()
+    _drop_unread_output()
     sys.stdout.flush()
     words = " ".join(shown(word, LONGEST_WORD) for word in message.split())
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
@@ -155,7 +155,7 @@ def _end(message: str, code: int) -> int:
     return code
 
 
-def _reader_is_gone() -> bool:
+def _drop_unread_output() -> bool:
     """Whether nobody reads our output any more, as of `burg-drake ... | head`; it is then dropped.
 
     What is left of it would otherwise raise an error when Python ends.

@@ -16,7 +16,7 @@ def add_to(verbs: Any) -> None:
         group,
         "check",
         run_check,
-        "hold a hand document against its model (exit code 2 if they do not fit)",
+        "check a hand document against its model (exit code 2 if they do not agree)",
         "burg-drake hand check wsg_50",
         "burg-drake hand check my_hand.yaml",
     )
@@ -51,7 +51,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     low, high = (round(1e3 * width, 1) + 0.0 for width in figures.opening)
     thickness, *face = (1e3 * extent for extent in figures.pad_size)
     x, y, z = hand.X_HG.translation
-    print(f"{hand.name}: the document fits {model}")
+    print(f"{hand.name}: the document agrees with {model}")
     print(f"  opening        {low:.1f} to {high:.1f} mm, measured between the pads")
     print(f"  pads           {face[0]:.1f} x {face[1]:.1f} mm, {thickness:.1f} mm thick")
     print(f"  grasp frame    at ({1e3 * x:g}, {1e3 * y:g}, {1e3 * z:g}) mm of {hand.body}")

@@ -59,8 +59,8 @@ def _add_options(parser: Parser) -> None:
         "--tf-parent",
         choices=[parent.value for parent in Parent],
         default=Names.parent.value,
-        help="which of camera's and board's frame is the other's parent on tf, or none to leave tf"
-        " alone (default: %(default)s)",
+        help="parent frame on tf: the camera's or the board's; none publishes nothing on tf"
+        " (default: %(default)s)",
     )
     parser.add_argument(
         "--name",

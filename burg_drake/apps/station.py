@@ -33,7 +33,7 @@ def add_to(verbs: Any) -> None:
         group,
         "show",
         run_show,
-        "show a station in Meshcat: cameras, and what the arm reaches of the board",
+        "show a station in Meshcat: cameras, and the part of the board that the arm reaches",
         "burg-drake station show panda_shelf",
         "burg-drake station show panda_tabletop --scene tabletop_six --html station.html",
         "burg-drake station show my_station.yaml --camera board",

@@ -118,9 +118,7 @@ def _read(path: Path, made_by: str) -> Arrays | None:
 @functools.cache
 def _log_other_version(folder: Path) -> None:
     """One line a process, as after an update that is so of all entries."""
-    _log.warning(
-        "cache: what %s has was made by another version; what is needed is computed anew", folder
-    )
+    _log.warning("cache: %s was made by another version; what is needed is computed anew", folder)
 
 
 def _arrays(archive: NpzFile) -> Arrays:

@@ -99,5 +99,5 @@ def address_in_use_error(host: str, ports: range, *, any_of_them: bool) -> str:
         any_of_them: the user left the choice to us.
     """
     if any_of_them:
-        return f"all ports from {ports[0]} to {ports[-1]} of {host} are taken; give another one"
-    return f"port {ports[0]} of {host} is taken; give another, or none for the first that is free"
+        return f"all ports from {ports[0]} to {ports[-1]} of {host} are in use; give another one"
+    return f"port {ports[0]} of {host} is in use; give another one, or none for the first free one"

@@ -185,9 +185,9 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
     pace = ProgressMeter(
         reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging"
     )
-    stretches = run.document.stretches
-    stretch = begun_now(executor.workers, len(run.verdicts))
-    save_run(replace(run, document=replace(run.document, stretches=(*stretches, stretch))))
+    sessions = run.document.stretches
+    session = begun_now(executor.workers, len(run.verdicts))
+    save_run(replace(run, document=replace(run.document, stretches=(*sessions, session))))
     begun = time.monotonic()
     judged = 0
     try:
@@ -198,7 +198,7 @@ def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: R
                 pace.step(outcome=verdict.outcome)
     finally:
         seconds = round(time.monotonic() - begun, 3)
-        stretch = replace(stretch, judged=judged, seconds=seconds)
-        document = replace(run.document, stretches=(*stretches, stretch))
+        session = replace(session, judged=judged, seconds=seconds)
+        document = replace(run.document, stretches=(*sessions, session))
         run = save_run(Run(run.path, document))
     return run

@@ -209,7 +209,7 @@ def _require_readable(path: Path) -> None:
     try:
         load_document(path, SceneDocument)
     except DocumentError as error:
-        raise DocumentError(f"{error}; mend it, or delete it and it is made again") from error
+        raise DocumentError(f"{error}; fix it, or delete it and it is made again") from error
 
 
 def read_table(path: Path) -> list[SceneRow]:

@@ -128,14 +128,14 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
         arrows=draw_arrows(scene) if settings.height_map else [],
         marks=alignment_marks(layout, tiling),
     )
-    homeless: list[str] = []
+    unplaced: list[str] = []
     if settings.names:
-        sheet, homeless = place_names(sheet, tiling)
+        sheet, unplaced = place_names(sheet, tiling)
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
     warnings += _lost_warnings(sheet, tiling)
     warnings += _spread(size, layout, drawings, settings, tiling)
     warnings += _without_white(size, layout)
-    warnings += [f"there is no room for the words {words!r}" for words in homeless]
+    warnings += [f"there is no room for the words {words!r}" for words in unplaced]
     pdf = _document(scene, sheet, tiling, settings)
     return Printout(pdf, tiling, settings, tuple(warnings))
 

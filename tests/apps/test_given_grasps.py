@@ -110,7 +110,7 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
     arguments = parser.parse_args(["evaluate", scene.name, "--grasps", str(path)])
     with pytest.raises(InvalidInputError) as error:
         campaign._FileOfScenes(arguments, station)(scene)
-    assert "and does not say of which; evaluate that scene alone" in str(error.value)
+    assert "without saying which; evaluate that scene alone" in str(error.value)
     arguments.grasps = str(tmp_path / "no scene ids.npz")  # another error is not taken for it
     with pytest.raises(InvalidInputError, match=r"no scene ids\.npz does not exist"):
         campaign._FileOfScenes(arguments, station)(scene)
@@ -119,12 +119,12 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--camera-pose", "a.npy"], "--camera-pose is about a file; add --grasps FILE"),
-        (["--grasps-object", "mug"], "--grasps-object is about a file; add --grasps FILE"),
-        (["--object-ids", "5=mug"], "--object-ids is about a file; add --grasps FILE"),
-        (["--scene-id", "a"], "--scene-id is about a file; add --grasps FILE"),
-        (["--grasps", "a.npy", "--blind"], "--blind is about sampled grasps; leave it or"),
-        (["--grasps", "a.npy", "--approach-angle", "30"], "--approach-angle is about sampled"),
+        (["--camera-pose", "a.npy"], "--camera-pose is for grasp files; add --grasps FILE"),
+        (["--grasps-object", "mug"], "--grasps-object is for grasp files; add --grasps FILE"),
+        (["--object-ids", "5=mug"], "--object-ids is for grasp files; add --grasps FILE"),
+        (["--scene-id", "a"], "--scene-id is for grasp files; add --grasps FILE"),
+        (["--grasps", "a.npy", "--blind"], "--blind is for sampled grasps; leave out either it or"),
+        (["--grasps", "a.npy", "--approach-angle", "30"], "--approach-angle is for sampled"),
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),

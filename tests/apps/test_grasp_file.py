@@ -79,4 +79,4 @@ def test_stats_of_another_hand(tmp_path: Path, capsys: Capture) -> None:
 
 def test_an_option_about_the_link_needs_a_file(capsys: Capture) -> None:
     assert main(["evaluate", "tabletop_six", "--gripper-link", "fr3_hand"]) == 2
-    assert "--gripper-link is about a file; add --grasps FILE" in capsys.readouterr().err
+    assert "--gripper-link is for grasp files; add --grasps FILE" in capsys.readouterr().err

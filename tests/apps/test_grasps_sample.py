@@ -209,7 +209,7 @@ def test_an_object_without_grasps_is_said(
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read no.npy"),
         (
             ["household", "--margin-mm", "3", "--blind", "-o", "x.h5"],
-            "margin and conservative are about the hand, which blind sampling does not know",
+            "margin and conservative are for the hand, which blind sampling ignores",
         ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],

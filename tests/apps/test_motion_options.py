@@ -33,12 +33,12 @@ def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -
             "reach --lift-mm 10 --least-lift-mm 20",
             "--lift-mm, --least-lift-mm: least_lift is 0.02 m",
         ),
-        ("reach --lift-mm 0", "--lift-mm: retreat and lift together may be as short as 0 mm"),
+        ("reach --lift-mm 0", "--lift-mm: retreat and lift together may be only 0 mm"),
         ("reach --lift-direction 0 0 0", "--lift-direction: lift_direction [0.0, 0.0, 0.0] has no"),
         ("evaluate --retreat-mm -1", "--retreat-mm: -1 is not a length from 0 to 1000 mm"),
         ("evaluate --lift-mm 9000", "--lift-mm: 9000 is not a length from 0 to 2000 mm"),
         ("evaluate --lift-direction 0 0", "--lift-direction: expected 3 arguments"),
-        ("evaluate --mode hand --standoff-mm 50", "--standoff-mm is about the arm's way to the"),
+        ("evaluate --mode hand --standoff-mm 50", "--standoff-mm is the length of the approach;"),
     ],
 )
 def test_what_no_hand_can_do_is_one_line(words: str, message: str, capsys) -> None:

@@ -121,8 +121,8 @@ def test_a_board_out_of_reach_is_one_line(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--only-reachable"], "--only-reachable is about what is written; add -o OUT"),
-        (["--retry-failed"], "--retry-failed is about a folder of plans; add --plans DIR"),
+        (["--only-reachable"], "--only-reachable is for the output file; add -o OUT"),
+        (["--retry-failed"], "--retry-failed is for plan files; add --plans DIR"),
         (["--station", "wsg_tabletop"], "station 'wsg_tabletop' has no arm"),
         (["-o", "/dev/null/reach.csv"], "/dev/null"),
         (["-o", "reach.xyz"], "(--to)"),

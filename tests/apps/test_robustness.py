@@ -10,7 +10,7 @@ import pytest
 
 from burg_drake.apps.cli import main
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.records.journal import Journal, read_journal

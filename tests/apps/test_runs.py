@@ -168,7 +168,7 @@ def test_replay_live(run: Run, capsys: Capture) -> None:
     assert main(["replay", str(run.path), "--grasp", collides, "--no-wait"]) == 0
     captured = capsys.readouterr()
     assert re.match(r"collision target \(box, \d+\.\d mm deep\)\nas recorded\n", captured.out)
-    assert captured.err == "nothing moves: the trial ended at its start\n"
+    assert captured.err == "nothing moves: the trial ended before its first step\n"
 
 
 def altered(run: Run, folder: Path, verdict: Verdict, **versions: str) -> Path:

@@ -76,7 +76,7 @@ def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
     assert main(["station", "check", str(path), "--scene", "tabletop_six"]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert (
-        f"burg-drake: warning: {path}: 'bowl' is out of every reach: it is 1.02 m from the arm's"
+        f"burg-drake: warning: {path}: 'bowl' is out of reach: it is 1.02 m from the arm's"
         " shoulder, and the arm reaches 0.95 m at most"
     ) in lines
     assert main(["station", "check", str(path)]) == 0

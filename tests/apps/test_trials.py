@@ -83,7 +83,7 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
         (("2", "--outcome", "liftet"), "no outcome 'liftet'; did you mean 'lifted'?"),
         (("2",), "nothing to record"),
         (("7", "--outcome", "lifted"), "there is no trial 7; they have 1 to 4"),
-        (("2", "--outcome", "lifted", "--intrinsics", "K"), "--intrinsics is about a photo"),
+        (("2", "--outcome", "lifted", "--intrinsics", "K"), "--intrinsics is for photos"),
         (("abc", "--outcome", "lifted"), "'abc': give the number of a trial, 1 to 4, or next"),
         (("2", "--note", "  "), "nothing to record"),
         (("2", "--outcome", "xyzzy"), "known: lifted, lifted_disturbed, slipped, dropped, closed"),

@@ -92,7 +92,7 @@ def test_an_entry_of_another_version_is_told_and_replaced(
     for kind in kinds:
         assert_same(cached(kind, KEY, compute))
     assert caplog.messages == [
-        f"cache: what {folder} has was made by another version; what is needed is computed anew"
+        f"cache: {folder} was made by another version; what is needed is computed anew"
     ]
     for kind in kinds:
         assert_same(cached(kind, KEY, never))

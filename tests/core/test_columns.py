@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.columns import FAMILIES, GROUPS, describe
+from burg_drake.core.grasps.column_meanings import FAMILIES, GROUPS, describe
 from burg_drake.core.grasps.grasp_set import GraspSet
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "results.md"

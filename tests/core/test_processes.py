@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.workers.processes import (
-    cause_of_death,
     default_workers,
+    exit_cause,
     start_worker,
     was_ended_from_outside,
 )
@@ -44,8 +44,8 @@ def test_a_worker_hears_and_answers(echo: str) -> None:
     assert connection.recv() == ("hello", "1", "echo_worker")
     assert process.pid != os.getpid()
     connection.send("end")
-    assert cause_of_death(process) == "the worker process ended: exit code 3"
-    assert cause_of_death(process, "so be it") == "the worker process ended: so be it"
+    assert exit_cause(process) == "the worker process ended: exit code 3"
+    assert exit_cause(process, "so be it") == "the worker process ended: so be it"
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_what_ends_a_worker_from_outside(echo: str, number: str, outside: bool) 
     process.send_signal(signal.Signals[number])
     assert was_ended_from_outside(process) is outside
     where = " from outside" if outside else ""
-    assert cause_of_death(process) == f"the worker process was ended{where} by {number}"
+    assert exit_cause(process) == f"the worker process was ended{where} by {number}"
 
 
 def test_there_is_a_processor() -> None:

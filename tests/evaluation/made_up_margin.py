@@ -31,7 +31,7 @@ def declare() -> None:
 def look_for_it(folder: Path) -> None:
     """Fails where the margin is missing."""
     from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
-    from burg_drake.core.grasps.columns import GROUPS, describe
+    from burg_drake.core.grasps.column_meanings import GROUPS, describe
     from burg_drake.evaluation.records import journal, table, table_file, trial
     from burg_drake.evaluation.records.origin import TrialOrigin
     from burg_drake.evaluation.replay import as_result, differences

@@ -106,7 +106,7 @@ def test_what_the_hand_decides_is_rerun_without_the_arm(run: Run) -> None:
 def test_the_report_tells_how_the_arm_did(run: Run) -> None:
     page = run.report_path.read_text()
     for text in (
-        "What hindered the arm",
+        "What stopped the arm",
         "Of 1 grasps at which the open hand is clear, the arm can execute 1 (100 %)",
         "Execution by the arm",
         "by the whole arm",

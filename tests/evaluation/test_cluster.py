@@ -48,7 +48,7 @@ class Cluster:
     def __init__(self) -> None:
         self.nodes = LocalNodes(2)
         self.client = distributed.Client(self.nodes.address, set_as_default=False, timeout=30)
-        self.executor = DaskExecutor(self.client, LIMITS, self.nodes.mend)
+        self.executor = DaskExecutor(self.client, LIMITS, self.nodes.restart_workers)
 
     @property
     def workers(self) -> dict[str, int]:
@@ -249,7 +249,7 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
     start = time.monotonic()
     reached = (
-        r"^no scheduler of Dask is reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
+        r"^no Dask scheduler was reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
     )
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass

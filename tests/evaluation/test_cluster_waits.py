@@ -169,7 +169,7 @@ def test_a_scene_that_does_not_arrive_is_told_of(
     monkeypatch.setattr("burg_drake.evaluation.cluster.remote.unpack", unpack_nothing)
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
     with cluster(1) as (_, client):
-        told = rf"^worker inproc://\S+ does not get the scene 'job': {why}$"
+        told = rf"^worker inproc://\S+ did not receive the scene 'job': {why}$"
         with pytest.raises(ClusterError, match=told):
             list(DaskExecutor(client).judge([Job("job", factory, grasps(3))]))
     assert len(attempts) == (1 if error else 3)

@@ -18,7 +18,7 @@ from known_judge import refuse
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
 from burg_drake.core.frames import Array, grasp_from_axes, make_pose
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.terminal.progress import Progress

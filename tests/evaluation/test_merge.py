@@ -103,7 +103,7 @@ def test_shards_of_many_scenes(
     assert nothing.judged == 0 and same(whole.results, again.results)
     part = unite(folders[1:], tmp_path / "part")
     if count == 2:
-        alone = ("all that was given is shard 2/2, and so is the united run",)
+        alone = ("only shard 2/2 was given, so the united run is only that shard",)
         assert part.notes == alone and part.result.complete
         return
     assert f"shards that were not given: 1/{count}" in part.notes

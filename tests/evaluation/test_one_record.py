@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.grasps.verdict import Margins, Verdict
 from burg_drake.core.grasps.verdict_columns import MARGINS, VERDICT_FIELDS

@@ -80,7 +80,7 @@ def test_the_first_sentence_and_the_tiles_have_the_figures_of_the_run(run: Run, 
     )
     assert f"{100 * lifted / executed:.1f} %, interval {wilson(lifted, executed)}" in lead
     assert f"the open hand collides in {found[Outcome.COLLISION_TABLE]}" in lead
-    assert f"hand or arm cannot be there in {found[Outcome.NO_IK]}" in lead
+    assert f"hand or arm cannot reach it in {found[Outcome.NO_IK]}" in lead
     tiles = {
         d.find("dt")[0].text: d.find("dd")[0].text for d in page.find(style="tiles")[0].find("div")
     }

@@ -89,7 +89,7 @@ def test_damaged_files(whole: Path, household: ObjectLibrary, tabletop: Station)
     scene = min(whole.glob("scene_*.yaml"))
     text = scene.read_bytes()
     scene.write_bytes(b"")
-    with pytest.raises(DocumentError, match=f"{scene.name}: .*empty.*; mend it, or delete it"):
+    with pytest.raises(DocumentError, match=f"{scene.name}: .*empty.*; fix it, or delete it"):
         sample_scenes(RECIPE, household, tabletop, whole, 12)
     scene.write_bytes(text)
 

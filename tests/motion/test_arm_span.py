@@ -69,7 +69,7 @@ def test_objects_out_of_reach() -> None:
     scene, station = load_scene("tabletop_six"), moved(load_station("panda_tabletop"), -0.7)
     found = unreachable_objects(ArmSpan.of(kinematics(station), station), scene, station)
     assert set(found) >= {"bowl", "banana"}
-    assert found["bowl"].startswith("'bowl' is out of every reach: it is 1.")
+    assert found["bowl"].startswith("'bowl' is out of reach: it is 1.")
     assert found["bowl"].endswith(" m from the arm's shoulder, and the arm reaches 0.95 m at most")
     here = load_station("panda_tabletop")
     assert unreachable_objects(ArmSpan.of(kinematics(here), here), scene, here) == {}

@@ -17,8 +17,8 @@ from burg_drake.motion.collision.edge_checker import EdgeChecker
 from burg_drake.motion.ik.numeric import ArmKinematics
 from burg_drake.motion.ik.panda import PandaIk
 from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.motion.transit.focus import postures_over_objects
 from burg_drake.motion.transit.home_tree import HomeTree
+from burg_drake.motion.transit.object_postures import postures_over_objects
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Obstacle, Station, load_station

@@ -168,7 +168,7 @@ def test_joints_without_limits_turn_once_either_way(tmp_path: Path) -> None:
     arm = ArmKinematics.of(build_station_diagram(load_scene("tabletop_six"), station))
     assert arm.upper[5] == -arm.lower[5] == 2 * np.pi
     home = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    lower, upper = arm.turn_around(home, 0.01)
+    lower, upper = arm.one_revolution_around(home, 0.01)
     assert upper[5] - 1.0 == 1.0 - lower[5] == pytest.approx(np.pi + 0.5)
     assert upper[2] == -lower[2] == pytest.approx(np.pi - 0.01)
 
@@ -186,5 +186,5 @@ def test_whole_turns_towards_a_posture() -> None:
     q = np.array([[3.0, 2.0, 0.4], [-3.0, -2.0, 0.3], [5.0, 2.8, 0.2], [-6.0, 2.0 - 2 * np.pi, 0]])
     expected = [[3.0, 2.0, 0.4], [2 * np.pi - 3.0, -2.0, 0.3], [5.0, 2.8, 0.2]]
     expected.append([2 * np.pi - 6.0, 2.0, 0.0])
-    near = arm.turned_near(q, np.array([2.0, -0.5, 0.0]))
+    near = arm.wrapped_near(q, np.array([2.0, -0.5, 0.0]))
     np.testing.assert_allclose(near, expected, atol=1e-12)

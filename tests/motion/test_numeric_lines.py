@@ -303,7 +303,9 @@ def test_routines_that_do_not_fit_are_named(ur5e: Arm) -> None:
         return RoutineSolutions(ur5e.kinematics, routine, 0.01).solve(X_AH, 0)[1]
 
     assert len(solve(ur_routine(ur5e))) == 8
-    with pytest.raises(InvalidInputError, match=r"0\.0100 m and 0\.00 degrees beside the pose"):
+    with pytest.raises(
+        InvalidInputError, match=r"0\.0100 m and 0\.00 degrees away from the requested pose"
+    ):
         solve(lambda X: [ur_ik.solve(one) for one in X])  # for the flange, not for the hand
     with pytest.raises(InvalidInputError, match=r"expected 1 arrays \(S, 6\), one a pose"):
         solve(lambda X: [np.zeros((3, 7))])

@@ -218,7 +218,7 @@ REPAIRABLE = {
     ),
     "bodies that touch along an edge": Repairable(
         lambda: _glued(_both(_box(), _moved(_box(), SIZE[0], SIZE[1]))),
-        ("parted bodies that touch along edges",),
+        ("separated bodies that touch along edges",),
         2.0 * VOLUME,
     ),
     "finer than contact needs": Repairable(

@@ -102,4 +102,4 @@ def test_bodies_that_touch_along_an_edge_are_closed() -> None:
     close_openings(result, "wall", None)
     assert is_closed(result.mesh)
     assert result.mesh.volume == pytest.approx(2e-3)
-    assert result.sentences[-1] == "parted bodies that touch along edges"
+    assert result.sentences[-1] == "separated bodies that touch along edges"

@@ -41,7 +41,7 @@ def test_the_joint_goes_along_any_direction_and_begins_where_the_hand_is(make_sc
     hand.lift.set_translation(context, 0.05)
     before = hand.X_WG(context)
     np.testing.assert_allclose(before[:3, 3] - X_WG[:3, 3], (0.03, 0.0, 0.04), atol=1e-12)
-    hand.turn_lift(context, direction)
+    hand.set_lift_direction(context, direction)
     np.testing.assert_allclose(hand.X_WG(context), before, atol=1e-12)
     hand.lift.set_translation(context, 0.2)
     after = hand.X_WG(context)

@@ -193,7 +193,7 @@ def test_a_token_opens_the_page_in_one_browser(open_to_all: ServedPage, page, br
     assert page.evaluate("document.cookie") == ""  # no script sees it
     assert page.context.cookies()[0]["sameSite"] == "Strict"
     code, _, text = answer(door, f"/?token={token}")
-    assert code == 403 and "opens by the address with a token" in text
+    assert code == 403 and "by the address with a token" in text
     code, headers, _ = answer(door, door.url[door.url.index("/?") :])  # the next browser's
     assert code == 200 and len(admitted) == 2
     assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]

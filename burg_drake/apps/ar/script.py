@@ -30,8 +30,8 @@ def finish(live: LiveSession, actions: ViewActions, *, check: bool, snapshot: st
     if estimate.valid:
         x, y, z = 1e3 * estimate.X_SC[:3, 3]
         print(
-            f"camera at x {x:.2f}, y {y:.2f}, z {z:.2f} mm of the board,"
-            f" reprojection error {estimate.reprojection_error:.3f} px"
+            f"camera at x {x:.2f}, y {y:.2f}, z {z:.2f} mm from the board's origin, reprojection"
+            f" error {estimate.reprojection_error:.3f} px"
         )
     placement = None
     if check and estimate.valid:
@@ -46,7 +46,7 @@ def placement_exit_code(live: LiveSession) -> int:
     """The exit code of a script; says why if no frame gave a pose."""
     if live.counts.valid:
         return 0
-    reason = live.counts.reason or live.reader.fault or "no picture came"
+    reason = live.counts.reason or live.reader.fault or "no image arrived"
     print(f"burg-drake: no frame gave a pose: {reason}", file=sys.stderr)
     return 1
 
@@ -68,7 +68,7 @@ def _words(row: dict[str, Any]) -> str:
     x, y = row["xy_mm"]
     words = f"{row['mm']:5.2f} mm off (x {x:+.2f}, y {y:+.2f})"
     if row["deg"] is not None:
-        words += f", turned {row['deg']:+.2f} deg"
+        words += f", rotated by {row['deg']:+.2f} deg"
     if row["status"] != "measured":
         return f"{words}; {row['status']}: {row['reason']}"
-    return f"{words}; {'placed' if row['within'] else 'not in its place'}"
+    return f"{words}; {'placed' if row['within'] else 'off its target'}"

@@ -19,7 +19,7 @@ from burg_drake.apps.options import (
     positive_int,
     print_scale,
 )
-from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
+from burg_drake.apps.terminal import interrupts_ignored, open_in_browser, terminated_as_interrupted
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -62,10 +62,12 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--intrinsics",
         metavar="FILE",
-        help="of the camera, ours or a camera_info file of ROS; see burg-drake camera calibrate."
-        " Simulated cameras know theirs",
+        help="intrinsics of the camera, our document or a camera_info file of ROS; see"
+        " burg-drake camera calibrate. Simulated cameras need none",
     )
-    parser.add_argument("--fps", type=positive, metavar="N", help="images a second of the camera")
+    parser.add_argument(
+        "--fps", type=positive, metavar="N", help=("frame rate of the camera, in images per second")
+    )
     add_measured_board(parser)
     _add_view(parser)
     _add_results(parser)
@@ -74,36 +76,45 @@ def _add_options(parser: Parser) -> None:
 def _add_view(parser: Any) -> None:
     view = parser.add_argument_group("view")
     view.add_argument(
-        "--opacity", type=share, metavar="X", help="of the objects, 0 (outlines) to 1"
+        "--opacity",
+        type=share,
+        metavar="X",
+        help=("opacity of the objects, from 0 (outlines only) to 1"),
     )
     view.add_argument(
-        "--tolerance-mm", type=positive, metavar="X", help="objects placed within it are green"
+        "--tolerance-mm",
+        type=positive,
+        metavar="X",
+        help=("objects within this distance of their target are green"),
     )
     view.add_argument(
-        "--tolerance-deg", type=positive, metavar="X", help="the same for how they are turned"
+        "--tolerance-deg", type=positive, metavar="X", help="the same for their rotation"
     )
     view.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
     )
     view.add_argument(
         "--host",
         metavar="ADDRESS",
         default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 all of"
-        " the network can see and use it, such as a tablet beside the board",
+        help="address to serve it on. The default is for this computer alone; with 0.0.0.0"
+        " everybody on the network can see and use it, for example on a tablet next to the"
+        " board",
     )
     view.add_argument("--open", action="store_true", help="open the page in the browser")
     view.add_argument(
         "--no-browser",
         action="store_true",
-        help="serve no page: look at all frames, print what was found, and end",
+        help="serve no page: process all frames, print the result, and end",
     )
 
 
 def _add_results(parser: Any) -> None:
     results = parser.add_argument_group("results")
     results.add_argument(
-        "--record", metavar="FILE", help="video (.mp4, .avi) of all frames, poses beside it"
+        "--record",
+        metavar="FILE",
+        help=("video (.mp4, .avi) of all frames, with a table of poses next to it"),
     )
     results.add_argument(
         "--plain", action="store_true", help="recordings also get a video without overlay"
@@ -114,7 +125,9 @@ def _add_results(parser: Any) -> None:
         help="at the end, save the last frame that had a pose: picture, overlay, pose",
     )
     results.add_argument(
-        "--check", action="store_true", help="at the end, measure how far objects are off in it"
+        "--check",
+        action="store_true",
+        help=("at the end, measure how far objects are from their targets"),
     )
     results.add_argument("--frames", type=positive_int, metavar="N", help="end after N frames")
     results.add_argument("--seconds", type=positive, metavar="N", help="end after N seconds")
@@ -123,7 +136,7 @@ def _add_results(parser: Any) -> None:
         "--output",
         metavar="FOLDER",
         default=".",
-        help="where the page's buttons put snapshots and recordings (default: here)",
+        help="folder for snapshots and recordings made on the page (default: here)",
     )
 
 
@@ -162,7 +175,7 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
         except KeyboardInterrupt:
             interrupted = True
             print(file=sys.stderr)
-        with deaf_to_interrupts():
+        with interrupts_ignored():
             closing.close()
         actions.wait_for_check()  # OpenCV must not be at work when Python ends
     if scripted or arguments.check or arguments.snapshot:

@@ -30,7 +30,7 @@ def add_to(group: Any) -> None:
         "burg-drake camera calibrate --camera 0 --size 1280x720 -o K.yaml",
         "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
         "",
-        "Exit code 1, and no file without --keep, if the photos determine the camera poorly.",
+        "Exit code 1, and no file without --keep, if the photos do not determine the camera well.",
     )
     calibrate.add_argument(
         "images", metavar="IMAGE", nargs="*", help="photos of the target, folders, or a video"
@@ -41,7 +41,7 @@ def add_to(group: Any) -> None:
         help="take views live from a camera: 0, /dev/video0, rtsp://...",
     )
     calibrate.add_argument(
-        "--size", metavar="WxH", type=two_numbers, help="image size that the camera shall have"
+        "--size", metavar="WxH", type=two_numbers, help="image size to request from the camera"
     )
     calibrate.add_argument(
         "--views",
@@ -61,12 +61,13 @@ def add_to(group: Any) -> None:
         "--model",
         choices=MODELS,
         default="auto",
-        help="of the lens: k1 k2 p1 p2 (radial4), and k3 (radial), and k4 k5 k6 (rational, for wide"
-        " lenses), none (pinhole); auto chooses by the residuals (default: %(default)s)",
+        help="lens model: k1 k2 p1 p2 (radial4), and k3 (radial), and k4 k5 k6 (rational, for"
+        " wide lenses), none (pinhole); auto chooses by the residuals (default:"
+        " %(default)s)",
     )
     calibrate.add_argument("--name", default="", help="name of the camera, for the file")
     calibrate.add_argument(
-        "--keep", action="store_true", help="write the file however uncertain the result is"
+        "--keep", action="store_true", help="write the file even if the result is uncertain"
     )
     add_board(calibrate)
 
@@ -101,7 +102,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
         print(f"report  {arguments.report}")
     if useless and not arguments.keep:
         print(
-            "burg-drake: the photos determine the camera poorly; no file without --keep",
+            "burg-drake: the views do not determine the camera well enough; no file without --keep",
             file=sys.stderr,
         )
     else:

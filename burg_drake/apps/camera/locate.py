@@ -35,8 +35,8 @@ def _add_options(parser: Parser) -> None:
         "photos",
         metavar="PHOTO",
         nargs="+",
-        help="image of the board, or a folder or pattern of such; the mean of several of the same"
-        " place is better than one",
+        help="image of the board, or a folder or pattern of images; the mean of several from the"
+        " same place is better than one",
     )
     parser.add_argument(
         "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"

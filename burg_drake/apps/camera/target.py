@@ -50,7 +50,9 @@ def add_board(parser: Any) -> None:
         "--marker-mm", type=positive, default=14.0, help="side of a marker (default: %(default)g)"
     )
     board.add_argument(
-        "--dictionary", default="5X5_100", help="of the markers (default: %(default)s)"
+        "--dictionary",
+        default="5X5_100",
+        help=("ArUco dictionary of the markers (default: %(default)s)"),
     )
     board.add_argument(
         "--legacy",

@@ -56,7 +56,10 @@ def _add_convert(group: Any) -> None:
     )
     _add_intrinsics(convert)
     convert.add_argument(
-        "--to", choices=("burg", "ros"), default="burg", help="what to write (default: %(default)s)"
+        "--to",
+        choices=("burg", "ros"),
+        default="burg",
+        help=("format to write (default: %(default)s)"),
     )
     convert.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write")
 

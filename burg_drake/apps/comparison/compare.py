@@ -36,8 +36,11 @@ def add_to(verbs: Any) -> None:
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",
         "",
-        "Of two runs the second is what the first is measured by. With trials both are measured by",
-        "them, and McNemar's test tells whether one is right more often.",
+        (
+            "Of two runs, the second is the reference for the first. With trials, both are"
+            " compared with"
+        ),
+        "them, and McNemar's test says whether one is right more often.",
         options=_add_options,
     )
 
@@ -55,15 +58,18 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--success",
         choices=SUCCESSES,
-        help="what counts: lifted, or held, also where another object was disturbed (default: what"
-        " the trials were planned with, or lifted)",
+        help="what counts as success: lifted, or held even if another object was disturbed"
+        " (default: what the trials were planned with, or lifted)",
     )
     parser.add_argument(
         "--placement-limit-mm",
         metavar="MM",
         type=not_negative,
         default=LIMIT_MM,
-        help="how far off every object may be in trials with good placement (default: %(default)g)",
+        help=(
+            "largest distance of any object from its target in trials with good placement"
+            " (default: %(default)g)"
+        ),
     )
     parser.add_argument(
         "--robustness",
@@ -72,7 +78,11 @@ def _add_options(parser: Parser) -> None:
         " robustness.csv in RUN, if it is there)",
     )
     parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of the intervals (default: %(default)s)"
+        "--seed",
+        metavar="N",
+        type=seed,
+        default=0,
+        help=("seed of the intervals (default: %(default)s)"),
     )
     parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")

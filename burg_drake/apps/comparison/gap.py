@@ -50,8 +50,8 @@ def add_to(verbs: Any) -> None:
         verbs,
         "gap",
         run_gap,
-        "judge the same grasps by the hand alone, with the arm, by the whole arm, and with objects"
-        " displaced: what each step loses",
+        "judge the same grasps with the hand alone, with the arm's reach, with the whole arm,"
+        " and with displaced objects: how many each step loses",
         "burg-drake gap tabletop_six -o gap",
         "burg-drake gap runs/first -o gap",
         "burg-drake gap tabletop_six -n 50 --placement-sd-mm 5 --samples 10 -o gap",
@@ -90,7 +90,7 @@ def _add_options(parser: Parser) -> None:
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
-    add_options(parser, EvaluationSettings, "engine", unset=True, told=DEFAULT_ENGINE)
+    add_options(parser, EvaluationSettings, "engine", unset=True, shown_default=DEFAULT_ENGINE)
     who = parser.add_mutually_exclusive_group()
     who.add_argument(
         "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
@@ -138,28 +138,28 @@ def run_gap(arguments: argparse.Namespace) -> int:
     if sheet is not None and run is not None:
         tried_grasps(sheet, arguments.trials, run)  # refuses other grasps before any work
     with chosen_cluster(arguments) as cluster:
-        ladder = _measure(arguments, run, sheet, cluster)
+        measured = _measure(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
-    tried = [] if sheet is None else tried_grasps(sheet, arguments.trials, ladder.first)
-    agreement = agreement_by_step(ladder, tried, success) if tried else ()
-    found = gap_changes(ladder, success)
+    tried = [] if sheet is None else tried_grasps(sheet, arguments.trials, measured.first)
+    agreement = agreement_by_step(measured, tried, success) if tried else ()
+    found = gap_changes(measured, success)
     line = shlex.join(["burg-drake", *sys.argv[1:]])
-    write_gap_report(ladder, success, agreement, line)
-    text = json.dumps(gap_json(ladder, found, agreement, success), indent=1) + "\n"
-    atomic_write(ladder.path / "gap.json", text)
+    write_gap_report(measured, success, agreement, line)
+    text = json.dumps(gap_json(measured, found, agreement, success), indent=1) + "\n"
+    atomic_write(measured.path / "gap.json", text)
     if arguments.json:
         sys.stdout.write(text)
     else:
-        for sentence in step_sentences(ladder, found, success):
+        for sentence in step_sentences(measured, found, success):
             print(sentence)
         print()
-        steps_view(ladder, found).show()
+        steps_view(measured, found).show()
         if agreement:
             reality_view(agreement).show()
         elif sheet is not None:
             print(f"{arguments.trials} has no trials of these grasps in this scene")
-        print(f"report  {ladder.path / REPORT_FILE}")
-    return _failures(ladder)
+        print(f"report  {measured.path / REPORT_FILE}")
+    return _failures(measured)
 
 
 def _measure(
@@ -220,13 +220,13 @@ def _require_own(arguments: argparse.Namespace, run: Run) -> None:
     options = [f"--{name.replace('_', '-')}" for name in given]
     for option in (*options, *map(motion_option, given_motion(arguments))):
         raise InvalidInputError(
-            f"{option} is about a scene; {run.path} is a run, which has grasps, station, engine and"
-            " motion of its own: leave it out"
+            f"{option} is for scenes; {run.path} is a run, which has its own grasps, station,"
+            " engine and motion: leave it out"
         )
 
 
-def _failures(ladder: GapSteps) -> int:
-    runs = [run for step in ladder.steps for run in step.runs] + list(ladder.tried)
+def _failures(measured: GapSteps) -> int:
+    runs = [run for step in measured.steps for run in step.runs] + list(measured.tried)
     failed = [(run, id) for run in runs for id in run.failures]
     if not failed:
         return 0

@@ -21,10 +21,10 @@ def add_rejudge(parser: Parser) -> None:
         metavar="FOLDER",
         nargs="?",
         const="",
-        help="judge each trial again with the objects where they were measured before it, so that"
-        " placement and physics are told apart; answers are kept in FOLDER, and the same command"
-        " goes on from there (default: the name of the trials file and of the run, beside that"
-        " file)",
+        help="judge each trial again with the objects where they were measured before it, to"
+        " separate placement from physics; verdicts are kept in FOLDER, where the same"
+        " command continues (default: the name of the trials file and of the run, beside"
+        " that file)",
     )
     who = group.add_mutually_exclusive_group()
     who.add_argument(

@@ -67,14 +67,22 @@ def _add_selection(parser: Parser) -> None:
 def _add_placement(parser: Parser) -> None:
     """Options about frames."""
     group = parser.add_argument_group(
-        "frames", "For grasps that IN or OUT measure in a scene or a camera instead of an object."
+        "frames",
+        (
+            "For grasps whose poses in IN or OUT are given in the frame of a scene or a camera"
+            " instead of an object."
+        ),
     )
     group.add_argument("--scene", metavar="SCENE", help="scene in which the objects stand")
     add_camera_options(group)
     group.add_argument(
-        "--frame", choices=tuple(FRAMES), help="what IN measures in, if not what its format says"
+        "--frame",
+        choices=tuple(FRAMES),
+        help=("frame of the poses in IN, if not the one of its format"),
     )
-    group.add_argument("--out-frame", choices=tuple(FRAMES), help="what OUT measures in, likewise")
+    group.add_argument(
+        "--out-frame", choices=tuple(FRAMES), help=("frame of the poses in OUT, likewise")
+    )
 
 
 def run_convert(arguments: argparse.Namespace) -> int:

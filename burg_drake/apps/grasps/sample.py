@@ -46,7 +46,7 @@ def add_to(group: Any) -> None:
         "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
         "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
         "",
-        "The grasps of an object follow from --seed, the object and what stands around it;",
+        "The grasps of an object follow from --seed, the object and its surroundings;",
         "`evaluate` and `reach` sample the same ones with the same settings.",
         options=_add_options,
     )
@@ -80,7 +80,10 @@ def _add_settings(parser: Parser) -> None:
         type=number,
         nargs="+",
         default=[0.0],
-        help="give every grasp with the hand this far back, or, below 0, further on (default: 0)",
+        help=(
+            "shift of each grasp back along the approach; negative values shift it forward"
+            " (default: 0)"
+        ),
     )
     parser.add_argument(
         "--weights",

@@ -26,7 +26,7 @@ def add_to(group: Any) -> None:
         group,
         "score",
         run_score,
-        "measure grasps analytically: force closure, epsilon, what weight they bear",
+        "score grasps analytically: force closure, epsilon, the weight they can hold",
         "burg-drake grasps score grasps.h5 -o scored.h5",
         "burg-drake grasps score grasps.h5 --scene tabletop_six --by gravity_margin -o scored.h5",
         "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",

@@ -58,16 +58,16 @@ def add_to(group: Any) -> None:
     show.add_argument(
         "--color",
         metavar="COLUMN",
-        help="what colours stand for: a column of the file, or of the results of a run"
-        " (default: outcome, else score, if there is any)",
+        help="column shown by colours, of the file or of the results of a run (default: outcome,"
+        " else score, if there is any)",
     )
     show.add_argument(
         "--range",
         metavar=("LO", "HI"),
         nargs=2,
         type=number,
-        help="numbers that the colours begin and end with (default: those of the grasps shown,"
-        " without outliers)",
+        help="smallest and largest number on the colour scale (default: those of the grasps"
+        " shown, without outliers)",
     )
     add_view(show)
 
@@ -173,8 +173,8 @@ def _content(arguments: argparse.Namespace) -> Content:
         )
     if source.scene is not None:
         given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
-        told = imported.grasps.provenance
-        grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=told)
+        provenance = imported.grasps.provenance
+        grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)
     return Content(grasps, source, station, ranked_set(grasps), title=path.name)
 
 

@@ -97,8 +97,8 @@ def source_of(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> Gra
             f"{path} does not say where its objects are; give --scene or --library"
         )
     try:
-        told = reference not in (arguments.scene, arguments.library)
-        if told and not is_resolved(str(reference), "scenes", "models"):
+        from_file = reference not in (arguments.scene, arguments.library)
+        if from_file and not is_resolved(str(reference), "scenes", "models"):
             raise UnknownNameError(str(reference))
         source = open_source(str(reference))
     except UnknownNameError as error:

@@ -31,13 +31,13 @@ def add_to(group: Any) -> None:
         group,
         "stats",
         run_stats,
-        "print what grasps there are, and how far one set covers another",
+        "print statistics of a set of grasps, and how well it covers another one",
         "burg-drake grasps stats grasps.h5",
         "burg-drake grasps stats reference.h5 mine.h5 --translation-mm 10 --angle-deg 20",
         "burg-drake grasps stats reference.h5 mine.h5 --distance-mm 15 --angle-deg 180",
         "burg-drake grasps stats runs/first --ap outcome --json stats.json",
         "",
-        "Distances do not tell the two fingers apart, and join grasps of the same object only (and",
+        "Distances treat the two fingers as equal, and pair grasps of the same object only (and",
         "of the same instance, where both sets name instances).",
         options=_add_options,
     )
@@ -74,8 +74,8 @@ def run_stats(arguments: argparse.Namespace) -> int:
         require_writable(arguments.json)
     tolerance, column = settings_from(arguments, Tolerance), arguments.ap
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
-    told = arguments.hand or arguments.gripper_link
-    gripper = gripper_for(arguments) if told else None
+    given = arguments.hand or arguments.gripper_link
+    gripper = gripper_for(arguments) if given else None
     sets = [read_input(path, arguments.source, gripper) for path in paths]
     sets = _renamed(sets, dict(arguments.rename))
     _check_frames(paths, sets)

@@ -161,7 +161,7 @@ def _add_views(group: Any) -> None:
         group,
         "check",
         run_check,
-        "say what is missing, stale or implausible (exit code 1 if something has to be mended)",
+        "report what is missing, stale or implausible (exit code 1 if something has to be fixed)",
         "burg-drake library check my_library",
     )
     show = add_verb(
@@ -236,7 +236,9 @@ def _add_common_values(parser: Parser) -> None:
         "--wall-thickness",
         metavar="M",
         type=positive,
-        help="closed surfaces are hollow, with such a wall; open ones become such a wall",
+        help=(
+            "closed surfaces are hollow with a wall of this thickness; open ones become such a wall"
+        ),
     )
     parser.add_argument(
         "--openings",
@@ -246,7 +248,7 @@ def _add_common_values(parser: Parser) -> None:
     parser.add_argument(
         "--contact",
         choices=CONTACT_KINDS,
-        help="what touches others in simulation (default: by the object's shape)",
+        help="collision geometry in simulation (default: chosen by the object's shape)",
     )
     _add_effort(parser)
 

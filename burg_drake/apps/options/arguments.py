@@ -193,7 +193,7 @@ def add_renaming(parser: Parser) -> None:
         type=renaming,
         action="append",
         default=[],
-        help="call an object of the file otherwise; OURS alone is for all its grasps",
+        help="rename an object of the file; OURS alone renames all",
     )
 
 
@@ -208,7 +208,7 @@ def add_view(parser: Parser) -> None:
         "--html", metavar="FILE", help="write one self-contained page instead of a live view"
     )
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the live view listens (default: first free)"
+        "--port", type=port, metavar="N", help="port of the live view (default: the first free one)"
     )
     parser.add_argument(
         "--no-wait", action="store_true", help="do not keep the live view open until Ctrl-C"

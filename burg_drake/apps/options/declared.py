@@ -24,7 +24,7 @@ def destination(settings: type, name: str) -> str:
 
 
 def add_options(
-    parser: Any, settings: type, *names: str, unset: bool = False, told: Any = None
+    parser: Any, settings: type, *names: str, unset: bool = False, shown_default: Any = None
 ) -> None:
     """Adds an option for each of some fields.
 
@@ -34,14 +34,14 @@ def add_options(
         names: of the fields; all that are declared if there are none.
         unset: leave the value None unless one is given, as where it then comes from elsewhere; the
             help does not tell a default.
-        told: the default that the help tells all the same.
+        shown_default: the default that the help tells all the same.
     """
     known = declared(settings)
     options_of = {name: declaration.option(name) for name, (_, declaration) in known.items()}
     for name in names or tuple(known):
         field, declaration = known[name]
         options: dict[str, Any] = {"help": declaration.help.format(**options_of)}
-        default = told if unset else shown_value(field, declaration)
+        default = shown_default if unset else shown_value(field, declaration)
         if field.type == "bool":
             options["action"] = "store_true"
         else:

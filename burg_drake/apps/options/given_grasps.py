@@ -30,14 +30,16 @@ def add_given(parser: Parser, which: Any) -> None:
     which.add_argument(
         "--grasps",
         metavar="FILE|RUN",
-        help="judge the grasps of this file, ours or of another project, or those of the run in"
-        " this folder; sample none",
+        help="judge the grasps of this file, in any known format, or those of a run's folder,"
+        " instead of sampling",
     )
     group = parser.add_argument_group(
         "with --grasps",
-        "Files are recognised by their content; see `burg-drake grasps convert --help`.",
+        "The format is recognised by the file's content; see `burg-drake grasps convert --help`.",
     )
-    group.add_argument("--grasps-format", metavar="NAME", help="format of the file, if it must be")
+    group.add_argument(
+        "--grasps-format", metavar="NAME", help=("format of the file (default: by its content)")
+    )
     add_gripper_link(group)
     group.add_argument(
         "--grasps-object",
@@ -50,7 +52,7 @@ def add_given(parser: Parser, which: Any) -> None:
     group.add_argument(
         "--grasps-frame",
         choices=tuple(FRAMES),
-        help="what poses are measured in, where that is not what the format says",
+        help="frame of the poses, if not the one of the format",
     )
     add_camera_options(group)
 
@@ -65,7 +67,7 @@ def require_file(arguments: argparse.Namespace) -> None:
     for name in (*names, "scene_id", "gripper_link"):
         if getattr(arguments, name) and arguments.grasps is None:
             raise InvalidInputError(
-                f"--{name.replace('_', '-')} is about a file; add --grasps FILE"
+                f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
             )
 
 

@@ -31,7 +31,7 @@ def add_gripper_link(parser: Any) -> None:
     parser.add_argument(
         "--gripper-link",
         metavar="NAME",
-        help="what isaac_grasp files call the body of the hand (default: as its model does)",
+        help="name of the hand's body in isaac_grasp files (default: that in its model)",
     )
 
 
@@ -53,8 +53,8 @@ def add_camera_options(group: Any) -> None:
         metavar="FILE",
         nargs="+",
         default=[],
-        help="where the scene frame has the file's camera (or world): 4x4 .npy, FILE:INDEX for one"
-        " of several, or YAML; several are multiplied",
+        help="pose of the file's camera (or world) in the scene frame: 4x4 .npy, FILE:INDEX for"
+        " one of several, or YAML; several are multiplied",
     )
     group.add_argument(
         "--object-ids",
@@ -63,7 +63,7 @@ def add_camera_options(group: Any) -> None:
         default={},
         help="instances by object id; without, grasps go to what is between their fingers",
     )
-    group.add_argument("--scene-id", metavar="ID", help="which one of a file of several scenes")
+    group.add_argument("--scene-id", metavar="ID", help="scene to read from a file of several")
 
 
 def numbering(text: str) -> dict[int, str]:
@@ -114,11 +114,11 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
 
     if arguments.station is not None:
         return load_station(arguments.station)
-    told = station_reference(path)
-    if told is not None and not is_resolved(told, "stations"):
-        raise UnknownNameError(f"{path} names a station: {told} is not there; give --station")
+    reference = station_reference(path)
+    if reference is not None and not is_resolved(reference, "stations"):
+        raise UnknownNameError(f"{path} names a station: {reference} is not there; give --station")
     try:
-        return load_station(told or DEFAULT_STATION)
+        return load_station(reference or DEFAULT_STATION)
     except UnknownNameError as error:
         raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
 

@@ -20,8 +20,8 @@ def add_motion(parser: Parser) -> None:
 
     group = parser.add_argument_group(
         "motion of the hand",
-        "What is left out is as the station's document says, or else as usual:\n"
-        "100 mm straight in, and 300 mm straight up.",
+        "Defaults are those of the station's document, or else:\n100 mm straight in, and 300 mm"
+        " straight up.",
     )
     add_options(group, GraspMotion, unset=True)
 
@@ -63,6 +63,6 @@ def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:
     """
     if mode == "hand" and arguments.standoff_mm is not None:
         raise InvalidInputError(
-            "--standoff-mm is about the arm's path to the grasp; in mode 'hand' the hand begins at"
-            " the grasp: leave it out, or give --mode reach or arm"
+            "--standoff-mm is the length of the approach; in mode 'hand' the trial begins at the"
+            " grasp: leave it out, or give --mode reach or arm"
         )

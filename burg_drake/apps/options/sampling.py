@@ -24,7 +24,9 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
     """
     from burg_drake.evaluation.run import EvaluationSettings
 
-    add_options(which or parser, EvaluationSettings, "grasps_per_object", unset=True, told=default)
+    add_options(
+        which or parser, EvaluationSettings, "grasps_per_object", unset=True, shown_default=default
+    )
     parser.set_defaults(default_grasps=default)
     add_options(parser, EvaluationSettings, "blind")
     add_only(parser, "grasps")
@@ -46,7 +48,7 @@ def require_sampled(arguments: argparse.Namespace) -> None:
     for name in ("blind", "approach_angle"):
         if getattr(arguments, name) and arguments.grasps is not None:
             raise InvalidInputError(
-                f"--{name.replace('_', '-')} is about sampled grasps; leave it or --grasps away"
+                f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
             )
 
 

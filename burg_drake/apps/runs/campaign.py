@@ -41,7 +41,9 @@ def evaluate_many(
     from burg_drake.station.document import GraspMotion, load_station
 
     if arguments.output is None:
-        raise InvalidInputError(f"{len(references)} scenes are given; say where to with -o RUN")
+        raise InvalidInputError(
+            f"{len(references)} scenes are given; name a folder for the run with -o RUN"
+        )
     station = load_station(arguments.station)
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
@@ -60,7 +62,7 @@ def evaluate_many(
     print_campaign(campaign)
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
-    return how_it_ended(campaign)
+    return campaign_exit_code(campaign)
 
 
 def print_campaign(campaign: Campaign) -> None:
@@ -85,7 +87,7 @@ def print_campaign(campaign: Campaign) -> None:
         print(f"report  {campaign.report_path}")
 
 
-def how_it_ended(campaign: Campaign) -> int:
+def campaign_exit_code(campaign: Campaign) -> int:
     """Says what could not be judged; the exit code."""
     states = campaign.states.values()
     failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
@@ -167,6 +169,6 @@ class _FileOfScenes:
             return {}
         except NoSceneIdsError as error:
             raise InvalidInputError(
-                f"{self.arguments.grasps} has grasps that are measured in the frame of one scene or"
-                " camera, and does not say of which; evaluate that scene alone"
+                f"{self.arguments.grasps} has grasps in the frame of a scene or camera, without"
+                " saying which; evaluate that scene alone"
             ) from error

@@ -79,8 +79,8 @@ def _add_options(parser: Parser) -> None:
         "-o",
         "--output",
         metavar="RUN",
-        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE; for several scenes"
-        " it has to be given)",
+        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE; required for"
+        " several scenes)",
     )
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
@@ -97,8 +97,8 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--scene-reports",
         action=argparse.BooleanOptionalAction,
-        help="write a report for each of several scenes, too; if not said, where there are at most"
-        " a hundred. burg-drake report RUN/scenes/NAME makes one later",
+        help="write a report for each of several scenes, too (default: for up to a hundred"
+        " scenes). burg-drake report RUN/scenes/NAME makes one later",
     )
     add_quiet(parser)
 

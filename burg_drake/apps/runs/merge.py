@@ -25,7 +25,7 @@ def add_to(verbs: Any) -> None:
 
 def run_merge(arguments: argparse.Namespace) -> int:
     """Unites runs and prints what is in them; 1 if grasps could not be simulated."""
-    from burg_drake.apps.runs.campaign import how_it_ended, print_campaign
+    from burg_drake.apps.runs.campaign import campaign_exit_code, print_campaign
     from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.evaluation.merge import unite
     from burg_drake.evaluation.store import Campaign
@@ -34,7 +34,7 @@ def run_merge(arguments: argparse.Namespace) -> int:
     result = merged.result
     if isinstance(result, Campaign):
         print_campaign(result)
-        code = how_it_ended(result)
+        code = campaign_exit_code(result)
     else:
         print_summary(result)
         print(f"table   {result.table_path}")

@@ -53,7 +53,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "reach",
         run_reach,
-        "ask which grasps the arm can execute, and what hinders it at the others",
+        "find which grasps the arm can execute, and what prevents the others",
         "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
         "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
         "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
@@ -62,7 +62,7 @@ def add_to(verbs: Any) -> None:
         "",
         "A grasp is reachable if the open hand is clear, also on the straight approach, and with",
         "the object in it on the straight retreat and lift, the arm can follow them, and it finds",
-        "a path from home to where they begin. Each yes is checked by Drake's CollisionChecker;",
+        "a path from home to the pregrasp. Each yes is checked by Drake's CollisionChecker;",
         "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
         "does that.",
         options=_add_options,
@@ -96,8 +96,8 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--plan-format",
         choices=("json", "csv"),
-        help="of these: JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python"
-        " reads both (default: json)",
+        help="format of the plans: JSON laid out as ROS's JointTrajectory, or CSV tables;"
+        " load_plan in Python reads both (default: json)",
     )
     parser.add_argument(
         "--screening",
@@ -118,7 +118,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation import reach
     from burg_drake.evaluation.candidates import chosen_instances
     from burg_drake.evaluation.records import motion_text
-    from burg_drake.evaluation.results import short_lifts, ungiven_note
+    from burg_drake.evaluation.results import missing_grasps_note, short_lifts
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.checks import require_valid_scene
@@ -127,11 +127,11 @@ def run_reach(arguments: argparse.Namespace) -> int:
     require_file(arguments)
     require_sampled(arguments)
     if arguments.plan_format and not arguments.plans:
-        raise InvalidInputError("--plan-format is of the files of --plans; give --plans DIR, too")
+        raise InvalidInputError("--plan-format is for plan files; add --plans DIR")
     if arguments.retry_failed and not arguments.plans:
-        raise InvalidInputError("--retry-failed is about a folder of plans; add --plans DIR")
+        raise InvalidInputError("--retry-failed is for plan files; add --plans DIR")
     if arguments.only_reachable and arguments.output is None:
-        raise InvalidInputError("--only-reachable is about what is written; add -o OUT")
+        raise InvalidInputError("--only-reachable is for the output file; add -o OUT")
     if arguments.plans:
         require_writable(Path(arguments.plans) / "plan")
         arguments.after_interrupt = "; run the same command to continue"
@@ -157,7 +157,9 @@ def run_reach(arguments: argparse.Namespace) -> int:
     answered = judged.column("outcome") != ""
     names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
     print_tables(judged.select(answered), names, motion)
-    if arguments.grasps is not None and (note := ungiven_note(names, judged.object.tolist())):
+    if arguments.grasps is not None and (
+        note := missing_grasps_note(names, judged.object.tolist())
+    ):
         print(f"note: {note}")
     if motion != GraspMotion():
         print(f"motion: {motion_text(motion)}")

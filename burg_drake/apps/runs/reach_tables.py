@@ -79,7 +79,7 @@ def outcome_table(
     room = Console().width - 70
     names = [name for name in by_object if len(by_object) > 1]
     names = names if sum(len(name) + 2 for name in names) <= room else []
-    table = TextTable("What became of them").texts("outcome")
+    table = TextTable("Outcomes").texts("outcome")
     table.numbers(*names, "all", "share").texts("mostly in the way")
     order = [Outcome.REACHABLE, *Outcome]
     for outcome in sorted(total, key=order.index):

@@ -55,13 +55,15 @@ def add_to(verbs: Any) -> None:
     which.add_argument(
         "--best",
         action="store_true",
-        help="the lifted grasp with the most room around the open hand, which most likely lifts"
-        " again when things are not quite where they should be; of equal ones (to 0.5 mm) that"
-        " which slipped, tilted and pushed others least",
+        help="the lifted grasp with the most room around the open hand, the most likely one to"
+        " succeed again with displaced objects; among equal ones (to 0.5 mm) the one that"
+        " slipped, tilted and pushed others least",
     )
     add_only(parser, "with --best, the best grasp")
-    parser.add_argument("--scene", metavar="FILE", help="where the scene of the trial is now")
-    parser.add_argument("--station", metavar="FILE", help="where its station is now")
+    parser.add_argument(
+        "--scene", metavar="FILE", help=("file of the trial's scene, if it has moved")
+    )
+    parser.add_argument("--station", metavar="FILE", help="file of its station, if it has moved")
     parser.add_argument(
         "--force",
         action="store_true",
@@ -83,7 +85,7 @@ def run_replay(arguments: argparse.Namespace) -> int:
     from burg_drake.visualization.scenes import describe
 
     if arguments.only and not arguments.best:
-        raise InvalidInputError("--only is about the best grasp; add --best")
+        raise InvalidInputError("--only is for --best; add it")
     path = Path(arguments.results)
     is_table = path.suffix in (".csv", ".parquet") and not path.is_dir()
     if path.is_file() and not is_table:
@@ -105,7 +107,7 @@ def run_replay(arguments: argparse.Namespace) -> int:
     for line in lines:
         print(line)
     if arguments.html is None and shown.margins.end_time == 0.0:
-        print("nothing moves: the trial ended at its start", file=sys.stderr)
+        print("nothing moves: the trial ended before its first step", file=sys.stderr)
     title = f"{source.inputs.scene.name}: {source.trial.id}"
     present(meshcat, arguments, title=title, caption=lines)
     return 0 if all(difference.rounding for difference in found) else 1

@@ -28,7 +28,7 @@ def add_to(verbs: Any) -> None:
 
 def run_report(arguments: argparse.Namespace) -> int:
     """Prints the tables of a run, of one scene or of many, and writes its report."""
-    from burg_drake.apps.runs.campaign import how_it_ended, print_campaign
+    from burg_drake.apps.runs.campaign import campaign_exit_code, print_campaign
     from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.evaluation.report import write_campaign_report, write_report
     from burg_drake.evaluation.store import Campaign, open_results
@@ -37,7 +37,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     if isinstance(run, Campaign):
         write_campaign_report(run)
         print_campaign(run)
-        return how_it_ended(run)
+        return campaign_exit_code(run)
     write_report(run)
     print_summary(run)
     if not run.complete:

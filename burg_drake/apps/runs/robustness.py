@@ -36,8 +36,8 @@ def add_to(verbs: Any) -> None:
         "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
         "",
-        "The same command continues where an interrupted one stopped. The table keeps what earlier",
-        "commands found about the same grasps with the same settings.",
+        "The same command goes on where an interrupted one stopped. The table keeps what earlier",
+        "commands found for the same grasps with the same settings.",
         options=_add_options,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")
@@ -103,7 +103,7 @@ def run_robustness(arguments: argparse.Namespace) -> int:
     from burg_drake.evaluation.store import load_run
 
     if arguments.only and arguments.grasp:
-        raise InvalidInputError("--only is about the best grasps; leave it or --grasp away")
+        raise InvalidInputError("--only is for the best grasps; leave out either it or --grasp")
     run = load_run(arguments.run_folder)
     settings = _settings(arguments, run.document.seed)
     found = assess_robustness(

@@ -25,7 +25,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "status",
         run_status,
-        "show how far a run is: grasps, rate, time left, outcomes, scenes that failed",
+        "print the progress of a run: grasps, rate, time left, outcomes, scenes that failed",
         "burg-drake status runs/many",
         "burg-drake status runs/many --follow",
         "burg-drake status runs/many --json",
@@ -34,9 +34,9 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--follow",
         action="store_true",
-        help="go on until it is complete, or until Ctrl-C; the run does not notice",
+        help="repeat until the run is complete, or until Ctrl-C; the run is not disturbed",
     )
-    parser.add_argument("--json", action="store_true", help="print JSON, a line each time")
+    parser.add_argument("--json", action="store_true", help="print JSON, one line per update")
 
 
 def run_status(arguments: argparse.Namespace) -> int:

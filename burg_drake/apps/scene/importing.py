@@ -19,7 +19,7 @@ def add_to(group: Any) -> None:
         group,
         "import-burg",
         run_import_burg,
-        "make a scene of one of BURG-Toolkit",
+        "import a scene of BURG-Toolkit",
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml",
         "burg-drake scene import-burg scene.yaml --library my_library -o my_scene.yaml"
@@ -36,7 +36,7 @@ def add_to(group: Any) -> None:
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
     )
-    parser.add_argument("--name", metavar="NAME", help="of the scene (default: that of FILE)")
+    parser.add_argument("--name", metavar="NAME", help="name of the scene (default: that of FILE)")
     parser.add_argument(
         "--station-out",
         metavar="FILE",
@@ -93,12 +93,12 @@ def _propose_station(scene: Scene, output: str | None) -> None:
         except InvalidInputError as error:
             print(f"no station fits: {error}")
             return
-        _tell_fits(fitting.name if fitting else "", misfits)
+        _print_fits(fitting.name if fitting else "", misfits)
         if fitting is None:
             print("no built-in station fits; --station-out FILE lays one out around the scene")
         return
     proposal = propose_station(scene, Path(output))
-    _tell_fits(proposal.source, proposal.misfits)
+    _print_fits(proposal.source, proposal.misfits)
     save_document(proposal.document, output)
     arm = proposal.document.arm
     where = (
@@ -112,7 +112,7 @@ def _propose_station(scene: Scene, output: str | None) -> None:
         print(f"burg-drake: warning: {output}: {warning}", file=sys.stderr)
 
 
-def _tell_fits(fitting: str, misfits: dict[str, str]) -> None:
+def _print_fits(fitting: str, misfits: dict[str, str]) -> None:
     for name, reason in misfits.items():
         print(f"station {name} does not fit: {reason}")
     if fitting:

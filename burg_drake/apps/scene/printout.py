@@ -43,12 +43,12 @@ def _add_options(parser: Parser) -> None:
         metavar="MM",
         type=not_negative,
         default=5.0,
-        help="what the printer leaves white on all sides (default: %(default)g)",
+        help="margin that the printer leaves white on all sides (default: %(default)g)",
     )
     add_measured_board(
         parser,
-        "length of the printed rulers of 100 mm along x and y of the page; all is drawn larger by"
-        " what is missing",
+        "measured length of the printed 100 mm rulers, along x and y of the page; the print is"
+        " scaled to compensate",
     )
     parser.add_argument("--no-height-map", action="store_true", help="print the markers alone")
     parser.add_argument(

@@ -81,9 +81,9 @@ def _add_layout(parser: Any) -> None:
         "--size",
         metavar="SIZE",
         default="A2",
-        help="of the board: A4 to A0, or WxH in mm (default: %(default)s)",
+        help="size of the board: A4 to A0, or WxH in mm (default: %(default)s)",
     )
-    group.add_argument("--portrait", action="store_true", help="a board A4 to A0 upright")
+    group.add_argument("--portrait", action="store_true", help="turn a board A4 to A0 upright")
     how = group.add_mutually_exclusive_group()
     how.add_argument(
         "--spacing",
@@ -120,7 +120,7 @@ def _add_rules(parser: Any) -> None:
         metavar="K",
         type=positive_int,
         default=0,
-        help="every object has so many grasps at which the hand touches nothing else",
+        help="every object has at least N grasps at which the hand touches nothing else",
     )
     group.add_argument(
         "--visible-from",

@@ -32,8 +32,8 @@ def add_to(group: Any) -> None:
         " -o scene.yaml",
         "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
         "",
-        "Each scene is drawn until it fulfils all that is asked, and settled in simulation.",
-        "Interrupt it whenever you like: the same command continues, and a larger --count adds",
+        "Each scene is drawn again until it meets all conditions, and settled in simulation.",
+        "Interrupt it whenever you like: the same command goes on, and a larger --count adds",
         "scenes. Exit code 1 if not all scenes were accepted; scenes.csv says why.",
         options=_add_options,
     )
@@ -54,12 +54,12 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--again",
         metavar="SCENE",
-        help="make a sampled scene again, from what its file says of its origin",
+        help="make a sampled scene again from the origin recorded in its file",
     )
     parser.add_argument(
         "--force",
         action="store_true",
-        help="with --again: even though library, station or versions are not the same",
+        help="with --again: even if library, station or versions differ",
     )
     add_quiet(parser)
 
@@ -109,11 +109,11 @@ def _one(
         sampled = SceneSampler(recipe, library, station).sample(0, refused=pace.step)
     if sampled.accepted:
         save_scene(sampled.scene.document, arguments.output)
-    _tell_refused(Counter(sampled.refused))
+    _print_refused(Counter(sampled.refused))
     if not sampled.accepted:
-        print(f"burg-drake: no scene: {_why(sampled, recipe)}", file=sys.stderr)
+        print(f"burg-drake: no scene: {_refusal_text(sampled, recipe)}", file=sys.stderr)
         return 1
-    _tell_missing(sampled)
+    _print_missing(sampled)
     print(f"wrote {arguments.output}: {_objects(sampled.placed)}")
     return 0
 
@@ -142,14 +142,14 @@ def _many(
             known=begin,
             progress=lambda sampled: paces[0].step(),
         )
-    return _tell(found, arguments)
+    return _print_folder(found, arguments)
 
 
-def _tell(found: SampledFolder, arguments: argparse.Namespace) -> int:
+def _print_folder(found: SampledFolder, arguments: argparse.Namespace) -> int:
     refused: Counter[str] = Counter()
     for row in found.rows.values():
         refused.update(row.refused)
-    _tell_refused(refused)
+    _print_refused(refused)
     accepted = sum(row.accepted for row in found.rows.values())
     fewer = sum(bool(row.accepted and row.missing) for row in found.rows.values())
     new = f" ({len(found.new)} new)" if len(found.new) < len(found.rows) else ""
@@ -221,21 +221,21 @@ def _with_references(again: ReproducedScene, scene: Scene, folder: Path) -> Scen
     return replace(document, library=library, origin=replace(origin, recipe=recipe))
 
 
-def _tell_refused(refused: Counter[str]) -> None:
+def _print_refused(refused: Counter[str]) -> None:
     """Says on standard error how many attempts were refused, and why."""
     for reason, count in refused.most_common():
         print(f"burg-drake: {count} refused: {reason}", file=sys.stderr)
 
 
-def _why(sampled: SampledScene, recipe: SceneRecipe) -> str:
+def _refusal_text(sampled: SampledScene, recipe: SceneRecipe) -> str:
     """Why no attempt was accepted, and what helps."""
-    told = f"none of {sampled.attempts} attempts was accepted"
+    text = f"none of {sampled.attempts} attempts was accepted"
     if sampled.missing:
-        told += "; an object found no place (--fewer accepts scenes without it)"
-    return f"{told}; give a larger --size, a smaller -n, another --seed or more --attempts"
+        text += "; an object found no place (--fewer accepts scenes without it)"
+    return f"{text}; give a larger --size, a smaller -n, another --seed or more --attempts"
 
 
-def _tell_missing(sampled: SampledScene) -> None:
+def _print_missing(sampled: SampledScene) -> None:
     if sampled.missing:
         names = ", ".join(sampled.missing)
         print(f"burg-drake: no place was found for {names}", file=sys.stderr)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import Parser, add_station, add_verb, port, scene_names
 from burg_drake.apps.terminal import (
-    deaf_to_interrupts,
+    interrupts_ignored,
     open_in_browser,
     terminated_as_interrupted,
     wait_for_interrupt,
@@ -54,7 +54,7 @@ def _add_options(parser: Parser) -> None:
     )
     add_station(parser)
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
     )
     parser.add_argument(
         "--host",
@@ -76,16 +76,16 @@ def run_setup(arguments: argparse.Namespace) -> int:
         closing = contextlib.ExitStack()
         try:
             session = closing.enter_context(_open(arguments))
-            closing.callback(_say_what_is_left, session)
+            closing.callback(_print_unsaved, session)
             door = _serve(arguments, session, closing)
-            _tell(door, session)
+            _print_opened(door, session)
             if arguments.open:
                 open_in_browser(door.url)
             wait_for_interrupt()
         except KeyboardInterrupt:
             print(file=sys.stderr)
         finally:
-            with deaf_to_interrupts():
+            with interrupts_ignored():
                 closing.close()
     return 0
 
@@ -112,11 +112,11 @@ def _serve(
     door = closing.enter_context(serve(arguments.host, arguments.port, title="burg_drake: setup"))
     closing.callback(SetupPage(door.server, session).close)
     session.announce(door.address)
-    door.admission.on_admitted = lambda address: _tell_next(door, address)
+    door.admission.on_admitted = lambda address: _print_admitted(door, address)
     return door
 
 
-def _tell(door: ServedPage, session: ComposeSession) -> None:
+def _print_opened(door: ServedPage, session: ComposeSession) -> None:
     view = session.view
     count = len(view.instances)
     objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
@@ -127,15 +127,15 @@ def _tell(door: ServedPage, session: ComposeSession) -> None:
     print("Press Ctrl-C to end.", flush=True)
 
 
-def _say_what_is_left(session: ComposeSession) -> None:
+def _print_unsaved(session: ComposeSession) -> None:
     view = session.view
     if not view.saved and (view.undo_label or view.redo_label):
         print(
-            f"burg-drake: changes of {view.document.name} are not saved; they are there when the"
-            " same is opened again",
+            f"burg-drake: changes of {view.document.name} are not saved; opening the same scene"
+            " again restores them",
             file=sys.stderr,
         )
 
 
-def _tell_next(door: ServedPage, address: str) -> None:
+def _print_admitted(door: ServedPage, address: str) -> None:
     print(f"opened by {address}; another browser: open {door.url}", flush=True)

@@ -71,7 +71,7 @@ def _add_settle(group: Any) -> None:
         group,
         "settle",
         run_settle,
-        "let the objects of a scene fall and come to rest, and write the scene that this gives",
+        "let the objects of a scene fall and come to rest, and write the settled scene",
         "burg-drake scene settle heap.yaml -o settled.yaml",
         "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
         "",
@@ -100,13 +100,13 @@ def _add_settle_options(settle: Parser) -> None:
     settle.add_argument(
         "--keep",
         action="store_true",
-        help="write the scene all the same, without what fell off the table",
+        help="write the scene anyway, without objects that fell off the table",
     )
     settle.add_argument(
         "--engine",
         choices=tuple(ENGINES),
         default=SETTLING_ENGINE,
-        help="how time is stepped while objects fall (default: %(default)s)",
+        help="engine preset while objects fall (default: %(default)s)",
     )
     add_quiet(settle)
 
@@ -226,7 +226,7 @@ def _faults(settled: SettledScene, time_limit: float, *, kept: bool) -> list[str
             for name, v in settled.moving.items()
         )
         in_time = settled.duration < time_limit - 1e-9
-        advice = "place it otherwise" if in_time else "give a longer --time-limit"
+        advice = "place it differently" if in_time else "give a longer --time-limit"
         advice += "" if kept else ", or --keep"
         lines.append(f"after {settled.duration:g} s something still moves: {moving}; {advice}")
     if settled.fallen:

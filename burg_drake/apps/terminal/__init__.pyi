@@ -1,5 +1,5 @@
 from .interrupts import (
-    deaf_to_interrupts as deaf_to_interrupts,
+    interrupts_ignored as interrupts_ignored,
     terminated_as_interrupted as terminated_as_interrupted,
     wait_for_interrupt as wait_for_interrupt,
 )

@@ -40,8 +40,8 @@ def terminated_as_interrupted() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def deaf_to_interrupts() -> Iterator[None]:
-    """While the last things are done: who presses Ctrl-C again would lose them."""
+def interrupts_ignored() -> Iterator[None]:
+    """Ignores Ctrl-C while the last results are written: an interrupt would lose them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -105,4 +105,4 @@ def open_in_browser(url: str) -> None:
     import webbrowser
 
     if not webbrowser.open(url):
-        print("burg-drake: there is no browser to open it in", file=sys.stderr)
+        print("burg-drake: no browser was found to open it in", file=sys.stderr)

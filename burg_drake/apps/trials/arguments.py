@@ -22,7 +22,7 @@ def add_moved(parser: Parser) -> None:
         type=_moved,
         action="append",
         default=[],
-        help="folder of a run that is not where the trials file says",
+        help="folder of a run, if it has moved since the trials file was written",
     )
 
 

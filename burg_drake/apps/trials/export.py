@@ -25,9 +25,12 @@ def add_to(group: Any) -> None:
         "burg-drake trials export trials.yaml -o plans/",
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
-        "Files begin with the number of the trial; index.csv lists all trials, with what hinders",
-        "the arm where there is no file. The same command continues where an interrupted",
-        "one stopped. Exit code 1 if a trial could not be judged.",
+        (
+            "File names begin with the number of the trial; index.csv lists all trials, with"
+            " what stops"
+        ),
+        "the arm where there is no file. The same command goes on where an interrupted one",
+        "stopped. Exit code 1 if a trial could not be judged.",
     )
     add_sheet(parser)
     parser.add_argument(
@@ -45,7 +48,7 @@ def add_to(group: Any) -> None:
         " (default: %(default)s)",
     )
     parser.add_argument(
-        "--station", metavar="STATION", help="with the arm (default: that of each run)"
+        "--station", metavar="STATION", help="station with the arm (default: that of each run)"
     )
     add_moved(parser)
     parser.add_argument(
@@ -95,6 +98,6 @@ def _print_hindered(rows: list[ExportedMotion]) -> None:
     for row in hindered:
         table.row(str(row.number), row.grasp, f"{row.answer} {row.blocker}".strip())
     counts = Counter(row.answer for row in hindered)
-    told = ", ".join(f"{count} {answer}" for answer, count in counts.most_common())
-    table.caption = f"{told}; record them as such, or plan with --among reachable or executed"
+    text = ", ".join(f"{count} {answer}" for answer, count in counts.most_common())
+    table.caption = f"{text}; record them as such, or plan with --among reachable or executed"
     table.show()

@@ -34,7 +34,7 @@ def add_to(group: Any) -> None:
         group,
         "record",
         run_record,
-        "record what became of a trial on the robot",
+        "record the outcome of a trial on the robot",
         "burg-drake trials record trials.yaml 17 --outcome lifted",
         "burg-drake trials record trials.yaml next --outcome slipped --note 'wet fingers'",
         "burg-drake trials record trials.yaml 17 --photo photo.png --intrinsics K.yaml",
@@ -46,9 +46,9 @@ def add_to(group: Any) -> None:
         "entry is recorded then.",
     )
     add_sheet(parser)
-    parser.add_argument("number", metavar="NUMBER", help="of the trial, or next")
+    parser.add_argument("number", metavar="NUMBER", help="number of the trial, or next")
     parser.add_argument("--outcome", metavar="OUTCOME", help="such as lifted, slipped, no_ik")
-    for name, what in (("note", "what was noticed"), ("operator", "who did it")):
+    for name, what in (("note", "remarks"), ("operator", "name of the operator")):
         parser.add_argument(f"--{name}", metavar="TEXT", help=what)
     parser.add_argument(
         "--time",
@@ -57,27 +57,34 @@ def add_to(group: Any) -> None:
         help="when, ISO 8601; a day alone is kept as such (default: now)",
     )
     robot = parser.add_argument_group("what the robot reported at the end")
-    robot.add_argument("--width-mm", metavar="MM", type=not_negative, help="between the pads")
+    robot.add_argument(
+        "--width-mm", metavar="MM", type=not_negative, help=("distance between the pads")
+    )
     robot.add_argument("--effort-n", metavar="N", type=not_negative, help="gripping force")
-    _add_photo(parser.add_argument_group("the scene before the trial"))
+    _add_photo(parser.add_argument_group("photo of the scene before the trial"))
     add_moved(parser)
     how = parser.add_mutually_exclusive_group()
-    how.add_argument("--correct", action="store_true", help="replace what contradicts this")
+    how.add_argument("--correct", action="store_true", help="replace the existing entry")
     how.add_argument(
         "--again",
         action="store_true",
-        help="the trial was carried out once more: replace all that was entered",
+        help="the trial was repeated: replace all entries",
     )
 
 
 def _add_photo(group: Any) -> None:
-    group.add_argument("--photo", metavar="FILE", help="picture of it; is copied to photos/")
+    group.add_argument("--photo", metavar="FILE", help="photo of the scene; copied to photos/")
     group.add_argument(
-        "--intrinsics", metavar="FILE", help="of the camera, to measure where the objects are"
+        "--intrinsics",
+        metavar="FILE",
+        help=("intrinsics of the camera, to measure where the objects are"),
     )
     group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
     group.add_argument(
-        "--depth-unit", metavar="M", type=positive, help="unit of its numbers in metres"
+        "--depth-unit",
+        metavar="M",
+        type=positive,
+        help=("unit of the depth image's numbers, in metres"),
     )
     group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")
     add_measured_board(group)
@@ -170,11 +177,13 @@ def _require_sense(arguments: argparse.Namespace) -> None:
         for name in OF_PHOTO:
             if getattr(arguments, name) is not None:
                 option = name.replace("_", "-")
-                raise InvalidInputError(f"--{option} is about a photo; give --photo FILE, too")
+                raise InvalidInputError(f"--{option} is for photos; add --photo FILE")
     elif arguments.depth and not arguments.intrinsics:
         raise InvalidInputError("--depth needs --intrinsics FILE of its camera")
     if arguments.placement and arguments.intrinsics:
-        raise InvalidInputError("--placement is measured already; leave it or --intrinsics away")
+        raise InvalidInputError(
+            "--placement is already a measurement; leave out either it or --intrinsics"
+        )
     if not (_entry(arguments) or arguments.photo or arguments.placement):
         raise InvalidInputError("nothing to record; give --outcome, --note or --photo, for example")
 

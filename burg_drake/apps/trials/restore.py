@@ -15,12 +15,15 @@ def add_to(group: Any) -> None:
         group,
         "restore",
         run_restore,
-        "enter recorded entries again that the file has lost, as to an editor with an old buffer",
+        (
+            "restore recorded entries that the file has lost, for example when an editor saved"
+            " an old buffer"
+        ),
         "burg-drake trials restore trials.yaml",
         "burg-drake trials restore trials.yaml --number 17",
         "burg-drake trials restore trials.yaml --number 17 --keep",
         "",
-        "What was edited by hand to something that was never recorded stays as it is.",
+        "Values that were edited by hand and never recorded stay.",
     )
     add_sheet(parser)
     parser.add_argument(
@@ -28,10 +31,10 @@ def add_to(group: Any) -> None:
         metavar="N",
         type=positive_int,
         action="append",
-        help="of a trial (default: all); may be given several times",
+        help="number of a trial (default: all); may be given several times",
     )
     parser.add_argument(
-        "--keep", action="store_true", help="change nothing: the file is right, not the journal"
+        "--keep", action="store_true", help="keep the file as it is: it is right, not the journal"
     )
 
 

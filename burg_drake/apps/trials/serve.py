@@ -45,7 +45,7 @@ def add_to(verbs: Any) -> None:
     add_sheet(parser)
     add_moved(parser)
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
     )
     parser.add_argument(
         "--host",
@@ -58,7 +58,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help="show what was simulated; without, who carries out the trials does not know it",
+        help="show the simulated outcomes; hidden by default, so that operators are blind",
     )
     camera = parser.add_argument_group("camera")
     camera.add_argument(
@@ -71,9 +71,13 @@ def add_to(verbs: Any) -> None:
     camera.add_argument(
         "--intrinsics",
         metavar="FILE",
-        help="of the camera; see burg-drake camera calibrate. Simulated cameras know theirs",
+        help=(
+            "intrinsics of the camera; see burg-drake camera calibrate. Simulated cameras need none"
+        ),
     )
-    camera.add_argument("--fps", type=positive, metavar="N", help="images a second of the camera")
+    camera.add_argument(
+        "--fps", type=positive, metavar="N", help=("frame rate of the camera, in images per second")
+    )
     add_measured_board(camera)
 
 
@@ -98,14 +102,17 @@ def run_serve(arguments: argparse.Namespace) -> int:
             port=arguments.port,
             secret=_kept_secret(lab.plan),
         )
-        server.on_admitted = lambda peer: _tell(
-            f"{peer} came in; for another browser: {server.url}"
+        server.on_admitted = lambda peer: _print_line(
+            f"{peer} opened the page; for another browser: {server.url}"
         )
         closing.callback(shelf.close)
         server.start()
         closing.callback(server.close)
         print(f"{len(runs.sheet.trials)} trials: open {server.url} in a browser", flush=True)
-        print("Press Ctrl-C to end. What the page says is saved is in the file.", flush=True)
+        print(
+            ("Press Ctrl-C to end. Entries that the page shows as saved are in the file."),
+            flush=True,
+        )
         if arguments.open:
             open_in_browser(server.url)
         with contextlib.suppress(KeyboardInterrupt):
@@ -113,7 +120,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _tell(line: str) -> None:
+def _print_line(line: str) -> None:
     print(f"burg-drake: {line}", file=sys.stderr, flush=True)
 
 

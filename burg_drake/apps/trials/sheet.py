@@ -33,7 +33,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help="show what was simulated; without, who carries out the trials does not know it",
+        help="show the simulated outcomes; hidden by default, so that operators are blind",
     )
     parser.add_argument("--no-printouts", action="store_true", help="write no printed boards")
 

@@ -20,7 +20,7 @@ def add_to(group: Any) -> None:
         group,
         "show",
         run_show,
-        "print how far the trials are, and whether the file lacks recorded entries",
+        "print the progress of the trials, and whether the file lacks recorded entries",
         "burg-drake trials show trials.yaml",
         "burg-drake trials show trials.yaml --all",
         "",
@@ -28,12 +28,12 @@ def add_to(group: Any) -> None:
         "written it from an old buffer; `trials restore` enters them again.",
     )
     add_sheet(parser)
-    parser.add_argument("--all", action="store_true", help="a line a trial as well")
+    parser.add_argument("--all", action="store_true", help="print a line for each trial as well")
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help="with what was simulated, and until trials have begun with the notes of the choice;"
-        " without, who carries out the trials does not know it",
+        help="show the simulated outcomes and, until trials have begun, the notes on the"
+        " selection; hidden by default, so that operators are blind",
     )
 
 
@@ -101,12 +101,12 @@ def _print_lacking(path: str, lacking: Sequence[MissingValues]) -> None:
     """What the journal has and the file has not."""
     for found in lacking:
         if found.values:
-            told = ", ".join(
+            text = ", ".join(
                 f"{name} {value}" if isinstance(value, str) else name
                 for name, value in found.values.items()
             )
             print(
-                f"burg-drake: trial {found.number} lacks what was recorded: {told}", file=sys.stderr
+                f"burg-drake: trial {found.number} lacks what was recorded: {text}", file=sys.stderr
             )
         if found.edited:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")

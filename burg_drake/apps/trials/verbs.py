@@ -24,7 +24,7 @@ VERBS = (
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
     group = add_group(
-        verbs, "trials", "choose grasps for the robot, and record what became of them"
+        verbs, "trials", "choose grasps for trials on the robot, and record their outcomes"
     )
     for module in VERBS:
         module.add_to(group)

@@ -51,8 +51,9 @@ def advice(calibration: Calibration) -> list[str]:
     tilted = sum(used.tilt > TILTED for used in calibration.views)
     if tilted < TILTED_VIEWS:
         lines.append(
-            f"{tilted} views are tilted by more than {math.degrees(TILTED):.0f} degrees: tilt the"
-            " target by 20 to 45 degrees to all sides, which separates focal length from distance"
+            f"{tilted} views are tilted by more than {math.degrees(TILTED):.0f} degrees: tilt"
+            " the target by 20 to 45 degrees to all sides, which separates focal length from"
+            " distance"
         )
     size = (calibration.intrinsics.width, calibration.intrinsics.height)
     empty = uncovered(coverage(views, size))

@@ -116,7 +116,7 @@ class Overlay:
         """
         style = style or self.style
         drawn = self._copy(image)
-        camera, standing, stander = self._camera(style.shown)
+        camera, standing, standing_owner = self._camera(style.shown)
         shape = camera.shape
         if not shape.names:
             return drawn
@@ -128,7 +128,7 @@ class Overlay:
         fill(drawn, surface, colors, style.opacity)
         inks = [_outlines(state, _bright(colors), style.outline_width), *self._arrows(state)]
         if style.footprints:
-            inks.append(self._footprints(state, standing, stander, _bright(colors)))
+            inks.append(self._footprints(state, standing, standing_owner, _bright(colors)))
         stroke(drawn, inks)
         if style.names or marks:
             self._write(drawn, state, style.names)

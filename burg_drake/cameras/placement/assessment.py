@@ -120,7 +120,7 @@ def _doubt(shape: TargetShape, found: Located, deviation: Array, rough: float) -
         return "another place fits almost as well"
     if alignment.turnable:
         turn = np.rad2deg(max(alignment.turnable, key=abs))
-        return f"turned by another {turn:+.0f} deg it fits as well"
+        return f"rotated by another {turn:+.0f} deg it fits as well"
     if found.seen < WELL:
         return f"only {100 * found.seen:.0f} % of it can be seen"
     if deviation[:2].max() > LOOSE:

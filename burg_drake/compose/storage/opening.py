@@ -71,8 +71,7 @@ def open_scene_file(path: Path, address: str = "") -> Opened:
         if found and found.history and found.history.state.document != found.saved:
             if found.known != known:
                 notices += (
-                    f"{path} was changed since; what you see are the changes of the last session,"
-                    " which were not saved",
+                    f"{path} was changed since; shown are the unsaved changes of the last session",
                 )
             return _recovered(path, path, found, lock, notices)
         if found and found.history and found.known == known:

@@ -66,7 +66,7 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
     path = Path()
     try:
         for path, content in contents.items():
-            _refuse_what_is_no_file(path)
+            _require_regular_file(path)
             path.parent.mkdir(parents=True, exist_ok=True)
             temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
             with temporary.open("xb") as stream:  # with the permissions that the umask leaves
@@ -120,7 +120,7 @@ def require_writable(path: str | Path) -> None:
     """
     path = Path(path)
     try:
-        _refuse_what_is_no_file(path)
+        _require_regular_file(path)
         with tempfile.TemporaryFile(dir=next(p for p in path.absolute().parents if p.exists())):
             pass
     except OSError as error:
@@ -129,7 +129,7 @@ def require_writable(path: str | Path) -> None:
         ) from error
 
 
-def _refuse_what_is_no_file(path: Path) -> None:
+def _require_regular_file(path: Path) -> None:
     """Refuses what is there and is not a file: a folder, or a device that a file would replace."""
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")

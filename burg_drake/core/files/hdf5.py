@@ -106,7 +106,7 @@ class Hdf5File:
         def load() -> NDArray[Any]:
             if text is not None and text.length is None:
                 return self._free_texts(where, data)
-            _require_honest(where, data)
+            _require_declared_size(where, data)
             values = np.asarray(data[()])
             return values if text is None else np.char.decode(values, "utf-8")
 
@@ -197,7 +197,7 @@ def _chunks(where: str, data: Any, itemsize: int, above: int = 0) -> Iterator[by
         yield packed
 
 
-def _require_honest(where: str, data: Any) -> None:
+def _require_declared_size(where: str, data: Any) -> None:
     """Refuses a dataset that unpacks to more than its size."""
     if DEFLATE in _filters(where, data):
         for _ in _chunks(where, data, data.dtype.itemsize, above=HARMLESS // DEFLATE_RATIO):

@@ -3,7 +3,7 @@ from .column import (
     TEXT as TEXT,
     Column as Column,
 )
-from .columns import (
+from .column_meanings import (
     INPUT_PREFIX as INPUT_PREFIX,
     describe as describe,
 )

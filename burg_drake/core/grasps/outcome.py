@@ -59,7 +59,7 @@ class Outcome(StrEnum):
     SLIPPED = "slipped"
     """Both fingers held the target and lost it during the lift."""
     BLOCKED = "blocked"
-    """On its way up the hand met something fixed."""
+    """During its motion the hand or the arm met something fixed."""
     DROPPED = "dropped"
     """The target was lifted and lost while being held."""
     LIFTED = "lifted"

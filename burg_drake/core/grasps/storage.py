@@ -3,8 +3,8 @@
 Both hold the same: a header (format, version, provenance as JSON), the columns that every set has,
 and further columns. In HDF5 these are attributes of the root (`format`, `version`, `provenance`),
 datasets `X_OG`, `width`, `id`, `object`, `score`, and datasets of the group `columns`. A dataset's
-attributes say its `unit` and `description`, see `core.grasps.columns`. Paths in the provenance are
-told from where the file is, and are absolute again once it is read.
+attributes say its `unit` and `description`, see `core.grasps.column_meanings`. Paths in the
+provenance are relative to the file, and absolute again once it is read.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from burg_drake.core.files import (
     open_hdf5,
     open_npz,
 )
-from burg_drake.core.grasps.columns import describe
+from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.paths import with_resolved_references, with_shareable_references
 
 FORMAT = "burg_drake.grasps"

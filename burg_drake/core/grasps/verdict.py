@@ -45,7 +45,7 @@ class Margins:
     clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
     slip: float = margin(
         "m",
-        "displacement of the target in the hand since the grip, at the origin of G",
+        ("displacement of the target in the hand since the grip, at the origin of G"),
         less_is_better=True,
     )
     tilt: float = margin(
@@ -55,12 +55,13 @@ class Margins:
     patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
     lift: float = margin(
         "m",
-        "how far the target's centre of mass rose, or went along the path of another motion; of a"
-        " trial that was decided early with the rest of the lift, which is free by geometry",
+        "how far the target's centre of mass rose, or moved along the straight segments of"
+        " another motion; if the trial was decided early, including the rest of the path, which"
+        " is free by geometry",
     )
     lift_height: float = margin(
         "m",
-        "length of the lift: as asked, or as far as there is room where less is allowed",
+        "length of the lift: as requested, or as far as there is room where less is allowed",
         by_trial=False,
     )
     others_moved: float = margin(
@@ -68,37 +69,36 @@ class Margins:
     )
     end_time: float = margin(
         "s",
-        "simulated time at which the outcome was decided, which ends the trial, often before"
-        " the hand is all the way up",
+        "simulated time at which the outcome was decided, which ends the trial, often before the"
+        " hand is at the top of the lift",
     )
     arm_clearance: float = margin(
         "m",
-        "smallest distance between the robot and anything else along its path, or signed distance"
-        " of the blocker",
+        "smallest clearance of the robot along its path, or signed distance of what blocks it",
         mode="reach",
         by_trial=False,
     )
     joint_excess: float = margin(
         "rad",
-        "how far the closest configuration is beyond a joint limit",
+        "how far the nearest configuration is beyond a joint limit",
         mode="reach",
         by_trial=False,
         less_is_better=True,
     )
-    duration: float = margin("s", "of the planned motion", mode="arm", by_trial=False)
+    duration: float = margin("s", "duration of the planned motion", mode="arm", by_trial=False)
     tracking_error: float = margin(
         "rad", "largest deviation of a joint from its command", mode="arm", less_is_better=True
     )
     tracking_distance: float = margin(
         "m",
-        "largest deviation of the origin of G from where commanded",
+        "largest deviation of the origin of G from its commanded position",
         mode="arm",
         less_is_better=True,
     )
     pushed: float = margin(
         "m",
-        "largest displacement of any free object before the hand closed; of one that hovers, its"
-        " fall once it is touched",
+        "largest displacement of any free object before the hand closed; for one that hovers,"
+        " its fall once it is touched",
         mode="arm",
         less_is_better=True,
     )

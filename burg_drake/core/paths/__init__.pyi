@@ -1,7 +1,7 @@
 from .model_files import (
+    may_name_packages as may_name_packages,
     named_files as named_files,
     named_packages as named_packages,
-    names_elsewhere as names_elsewhere,
 )
 from .names import (
     LONGEST as LONGEST,

@@ -37,7 +37,7 @@ def named_packages(model: Path, packages: Packages) -> dict[str, Path]:
     Raises:
         UnknownNameError: one of them is nowhere; the message names the file and what was searched.
     """
-    if not names_elsewhere(model):
+    if not may_name_packages(model):
         return {}  # as most, of which some name many files
     found: dict[str, Path] = {}
     for file in (model, *(f for f in named_files(model, packages) if f.suffix in MODELS)):
@@ -52,7 +52,7 @@ def named_packages(model: Path, packages: Packages) -> dict[str, Path]:
     return found
 
 
-def names_elsewhere(model: Path) -> bool:
+def may_name_packages(model: Path) -> bool:
     """Whether a model may name files of packages, or other models."""
     text = read_bytes(model, DOCUMENT.size)
     return any(mark in text for mark in MARKS)

@@ -2,8 +2,8 @@ from .limits import TimeLimit as TimeLimit
 from .pool import WorkerPool as WorkerPool
 from .prefetch import Prefetcher as Prefetcher
 from .processes import (
-    cause_of_death as cause_of_death,
     default_workers as default_workers,
+    exit_cause as exit_cause,
     start_worker as start_worker,
 )
 from .tasks import (

@@ -49,7 +49,7 @@ class Dispatcher:
         self._lock = threading.Lock()
         self._asked: deque[Callable[[], None]] = deque()
         self._alarm, self._bell = Pipe(duplex=False)
-        self._rung = self._closed = self._killed = self._ended = False
+        self._signalled = self._closed = self._killed = self._ended = False
         self._thread = threading.Thread(target=self._run, name="worker-pool", daemon=True)
         self._thread.start()
 
@@ -96,9 +96,9 @@ class Dispatcher:
 
     def _ring(self) -> None:
         with self._lock:
-            if self._rung:
+            if self._signalled:
                 return
-            self._rung = True
+            self._signalled = True
             with suppress(OSError):  # the thread has ended
                 self._bell.send_bytes(b"!")
 
@@ -116,11 +116,11 @@ class Dispatcher:
         by_connection = {w.connection: w for w in self.workers if w.connection is not None}
         for ready in wait([self._alarm, *by_connection]):
             if ready is not self._alarm:
-                self._hear(by_connection[ready])  # type: ignore[index]
+                self._receive(by_connection[ready])  # type: ignore[index]
                 continue
             with self._lock:
                 self._alarm.recv_bytes()
-                self._rung = False
+                self._signalled = False
                 asked, self._asked = self._asked, deque()
             for request in asked:
                 request()
@@ -164,7 +164,7 @@ class Dispatcher:
             worker.kill()
             worker.own.appendleft(worker.forget())
 
-    def _hear(self, worker: Worker) -> None:
+    def _receive(self, worker: Worker) -> None:
         assert worker.connection is not None
         try:
             data = worker.connection.recv_bytes()
@@ -196,7 +196,7 @@ class Dispatcher:
             session.false_starts = 0
             worker.sessions[session.key] = None
             return
-        session.error = _caused_there(message.error, message.where)
+        session.error = _with_worker_traceback(message.error, message.where)
         tasks, worker.tasks = worker.tasks, deque()
         for task in tasks:
             task.future.set_exception(session.error)
@@ -205,7 +205,7 @@ class Dispatcher:
         """The task that a worker was at when it died is suspect, the rest of its work is kept."""
         if self._killed:  # it is cleaned up at the end
             return
-        (error, overdue), session = worker.death(), worker.opening
+        (error, overdue), session = worker.exit_error(), worker.opening
         tasks = worker.forget()
         cancelled = bool(tasks) and tasks[0].cancelled
         if session is not None and not cancelled:
@@ -294,9 +294,9 @@ def _finish(task: PendingTask, message: Done) -> None:
     if message.error is None:
         task.future.set_result(message.result)
     else:
-        task.future.set_exception(_caused_there(message.error, message.where))
+        task.future.set_exception(_with_worker_traceback(message.error, message.where))
 
 
-def _caused_there(error: BaseException, where: str) -> BaseException:
+def _with_worker_traceback(error: BaseException, where: str) -> BaseException:
     error.__cause__ = WorkerTraceback(f"in a worker process:\n{where}")
     return error

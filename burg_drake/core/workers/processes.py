@@ -80,7 +80,7 @@ def end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, name="parent-watch", daemon=True).start()
 
 
-def cause_of_death(process: subprocess.Popen[bytes], reason: str = "") -> str:
+def exit_cause(process: subprocess.Popen[bytes], reason: str = "") -> str:
     """Why a worker process ended, in half a sentence; waits for its end.
 
     Args:

@@ -78,8 +78,8 @@ class _WorkerLoop:
 
     def report(self, message: Any) -> None:
         while self._connection.poll():
-            told = self._connection.recv()
-            if isinstance(told, Interrupt) and told.number == self._number:
+            received = self._connection.recv()
+            if isinstance(received, Interrupt) and received.number == self._number:
                 raise TaskCancelled("this was cancelled")
         self._connection.send(ProgressMessage(self._number, message))
 

@@ -16,7 +16,7 @@ from typing import Any
 from burg_drake.core.errors import WorkerDied
 from burg_drake.core.workers.limits import TOO_LONG, TimeLimit
 from burg_drake.core.workers.messages import Call, Calls, OpenSession
-from burg_drake.core.workers.processes import cause_of_death, start_worker, was_ended_from_outside
+from burg_drake.core.workers.processes import exit_cause, start_worker, was_ended_from_outside
 from burg_drake.core.workers.tasks import Session, Task, WorkerFuture
 
 MODULE = "burg_drake.core.workers.worker"
@@ -154,11 +154,11 @@ class Worker:
                 os.killpg(self.process.pid, signal.SIGKILL)
         self.process.kill()
 
-    def death(self) -> tuple[WorkerDied, bool]:
+    def exit_error(self) -> tuple[WorkerDied, bool]:
         """Why the process has ended, and whether it took too long; waits for its end."""
         assert self.process is not None
         overdue = -self.process.wait() in TOO_LONG
-        cause = cause_of_death(self.process, self.reason)
+        cause = exit_cause(self.process, self.reason)
         limit = (
             self.opening.limit if self.opening else self.tasks[0].task.limit if self.tasks else None
         )

@@ -230,8 +230,8 @@ class ObjectSampler:
         can take; their provenance counts what `blocked` the others."""
         test = self.clear_test(object, screen, name, X_WO)
         grasps = self(object, cones, test)
-        told = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
-        return dataclasses.replace(grasps, provenance={**grasps.provenance, **told})
+        notes = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
+        return dataclasses.replace(grasps, provenance={**grasps.provenance, **notes})
 
     def clear_test(self, object: str, screen: HandClearance, name: str, X_WO: Array) -> ClearTest:
         """Tells which grasps of an object the hand can take; see `clear`."""

@@ -56,7 +56,7 @@ class SamplingSettings:
         0.0, "only grasps with this clearance of the open hand", unit=MILLIMETRES, low=0
     )
     conservative: bool = setting(
-        False, "test clearance faster, which leaves out a tenth of the clear grasps, too"
+        False, "test clearance faster, at the cost of a tenth of the clear grasps"
     )
     diverse: int = setting(
         1, "sample K times as many and keep those that are farthest apart", metavar="K", low=1
@@ -72,5 +72,5 @@ class SamplingSettings:
             raise InvalidInputError(f"margin is {self.margin} m; give a clearance of 0 or more")
         if (self.margin or self.conservative) and self.blind:
             raise InvalidInputError(
-                "margin and conservative are about the hand, which blind sampling does not know"
+                "margin and conservative are for the hand, which blind sampling ignores"
             )

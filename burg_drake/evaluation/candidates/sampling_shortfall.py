@@ -43,7 +43,7 @@ def shortfall(name: str, asked: int, provenance: Mapping[str, Any], found: int) 
     """
     if found >= asked:
         return ""
-    told = f"{name}: {found:,} of {asked:,} grasps"
+    text = f"{name}: {found:,} of {asked:,} grasps"
     lines, blocked = provenance.get("left_out", {}), provenance.get("blocked", {})
     parts, causes = [], {}
     tried = provenance.get("tried", 0)
@@ -56,8 +56,8 @@ def shortfall(name: str, asked: int, provenance: Mapping[str, Any], found: int) 
         parts.append(f"of {tried:,} antipodal grasps tried, {_of_bodies(bodies, margin)}")
         causes = bodies if tried > found else causes
     if not parts:
-        return told
-    return f"{told}: {'; '.join(parts)}; {_remedy(causes, provenance)}"
+        return text
+    return f"{text}: {'; '.join(parts)}; {_remedy(causes, provenance)}"
 
 
 def _named(blocked: Mapping[str, int], target: str) -> dict[str, int]:

@@ -118,8 +118,8 @@ def _sampled(
         rows = np.append(rows, first + np.flatnonzero(test(some)))
         first += len(some)
     rows = rows[:n]
-    told = {**tried.provenance, "tried": first, "blocked": dict(test.blocked)}
-    note = shortfall(object, n, {**told, "target": object}, len(rows)).encode()
+    provenance = {**tried.provenance, "tried": first, "blocked": dict(test.blocked)}
+    note = shortfall(object, n, {**provenance, "target": object}, len(rows)).encode()
     return {
         "X_OG": tried.X_OG[rows],
         "width": tried.width[rows],

@@ -12,8 +12,8 @@ from typing import Any
 from burg_drake.core import ClusterError, MissingDependencyError
 from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.connection_failure import unreached_reason
 from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
-from burg_drake.evaluation.cluster.unreached import why_unreached
 from burg_drake.evaluation.workers import Job, OnFailure, WorkerLimits
 
 REACH = 5.0
@@ -47,11 +47,11 @@ class DaskExecutor:
         Raises:
             ClusterError: the connection is not encrypted and goes beyond this machine.
         """
-        from burg_drake.evaluation.cluster.members import asking
+        from burg_drake.evaluation.cluster.members import scheduler_errors
 
         address = client.scheduler.address if client.scheduler is not None else ""
         require_safe(address, "the scheduler at ")
-        with asking(client):  # it may listen elsewhere, too, than where it was reached
+        with scheduler_errors(client):  # it may listen elsewhere, too, than where it was reached
             require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
@@ -109,7 +109,7 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
 
             nodes = LocalNodes(asked.local)
             stack.callback(nodes.close)
-            where, tend = nodes.address, nodes.mend
+            where, tend = nodes.address, nodes.restart_workers
         elif asked.document is not None and asked.document.jobqueue is not None:
             from burg_drake.evaluation.cluster.jobqueue import start_jobqueue
 
@@ -142,8 +142,8 @@ def _client(distributed: Any, where: Any, security: Any) -> Any:
         found = TimeoutError("no answer")
     if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
-            f"no scheduler of Dask is reached at {where} within {REACH:.0f} s:"
-            f" {why_unreached(where, found)}"
+            f"no Dask scheduler was reached at {where} within {REACH:.0f} s:"
+            f" {unreached_reason(where, found)}"
         ) from found
     if isinstance(found, BaseException):
         raise found

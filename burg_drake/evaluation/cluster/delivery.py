@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from burg_drake.core import BurgError, ClusterError
-from burg_drake.evaluation.cluster.members import LOST, asking
+from burg_drake.evaluation.cluster.members import LOST, scheduler_errors
 from burg_drake.evaluation.cluster.remote import deliver
 from burg_drake.evaluation.cluster.sent_job import SentJob
 from burg_drake.evaluation.stages import one_line
@@ -32,18 +32,18 @@ def deliver_bundle(client: Any, job: SentJob, addresses: Sequence[str]) -> None:
     for address in addresses:
         job.deliveries[address] += 1
         if job.deliveries[address] > ATTEMPTS:
-            raise _undelivered(job, address, "its files are not there afterwards")
-    with asking(client):
-        told = client.run(
+            raise _delivery_error(job, address, "its files are not there afterwards")
+    with scheduler_errors(client):
+        errors = client.run(
             deliver, job.bundle.data, job.bundle.name, workers=list(addresses), on_error="return"
         )
-    for address, error in told.items():
+    for address, error in errors.items():
         if isinstance(error, LOST) and job.deliveries[address] < ATTEMPTS:
             continue  # a look will tell whether the worker is lost
         if isinstance(error, BaseException):
             why = str(error) if isinstance(error, BurgError) else one_line(error)
-            raise _undelivered(job, address, why)
+            raise _delivery_error(job, address, why)
 
 
-def _undelivered(job: SentJob, address: str, why: str) -> ClusterError:
-    return ClusterError(f"worker {address} does not get the scene {job.job.key!r}: {why}")
+def _delivery_error(job: SentJob, address: str, why: str) -> ClusterError:
+    return ClusterError(f"worker {address} did not receive the scene {job.job.key!r}: {why}")

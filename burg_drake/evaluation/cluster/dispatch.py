@@ -24,8 +24,8 @@ from burg_drake.evaluation.cluster.members import (
     LOST,
     ClusterWorker,
     ClusterWorkers,
-    asking,
     lost_scheduler,
+    scheduler_errors,
 )
 from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
 from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
@@ -142,7 +142,7 @@ class Dispatch:
                 try:
                     self.jobs.append(SentJob(job))
                 except BurgError as error:
-                    self._tell(JobFailed(job, error))
+                    self._report_failure(JobFailed(job, error))
                     continue
                 return self.jobs[-1]
         self._exhausted = True
@@ -151,7 +151,7 @@ class Dispatch:
     def send(self, chunk: SentChunk, hand: ClusterWorker) -> None:
         """Sends a chunk to a worker."""
         packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
-        with asking(self.client):
+        with scheduler_errors(self.client):
             future = self.client.submit(
                 judge_chunk,
                 packed,
@@ -166,11 +166,11 @@ class Dispatch:
         hand.chunks.append(chunk)
         self._sent[future.key] = (chunk, hand)
 
-        def came(future: Any) -> None:  # in another thread
+        def finished(future: Any) -> None:  # in another thread
             chunk.done = True
             self._done.put(future)
 
-        future.add_done_callback(came)
+        future.add_done_callback(finished)
 
     def collect(self) -> Iterator[Answer]:
         """Waits a while for what comes, and takes all that has come."""
@@ -218,7 +218,7 @@ class Dispatch:
         for place, verdict in answers.verdicts:
             judged.add(place)
             yield job.job, chunk.grasps[place], verdict
-            job.crashes_in_a_row = job.crashes_in_a_row + 1 if place in answers.deadly else 0
+            job.crashes_in_a_row = job.crashes_in_a_row + 1 if place in answers.crashing else 0
             if job.crashes_in_a_row >= self.limits.hopeless and not job.failed:
                 self.fail(
                     job,
@@ -275,9 +275,9 @@ class Dispatch:
         """Gives a job up, and tells of it once."""
         if not job.failed:
             job.give_up()
-            self._tell(JobFailed(job.job, error))
+            self._report_failure(JobFailed(job.job, error))
 
-    def _tell(self, failure: JobFailed) -> None:
+    def _report_failure(self, failure: JobFailed) -> None:
         if self._on_failure is None:
             raise failure.error
         self._on_failure(failure)

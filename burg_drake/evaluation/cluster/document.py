@@ -175,29 +175,29 @@ def read_cluster(text: str) -> Cluster:
     return Cluster(document=document, tls=tls)
 
 
-def require_safe(address: str, whose: str = "") -> None:
+def require_safe(address: str, prefix: str = "") -> None:
     """Refuses an address at which anybody could listen, or run code.
 
     Args:
         address: where a scheduler or a worker listens.
-        whose: put before the address in messages, of what is connected; that is safe in this
+        prefix: put before the address in messages, of what is connected; that is safe in this
             process, too, which nobody can ask for.
 
     Raises:
         InvalidInputError: it is not an address.
         ClusterError: plain TCP beyond this machine.
     """
-    if whose and address.startswith("inproc://"):
+    if prefix and address.startswith("inproc://"):
         return
     found = ADDRESS.fullmatch(address)
     if found is None:
-        what = "worker" if "worker" in whose else "scheduler"
+        what = "worker" if "worker" in prefix else "scheduler"
         raise InvalidInputError(
-            f"{whose}{quoted(address)} is not an address of a {what}; write tls://HOST:PORT"
+            f"{prefix}{quoted(address)} is not an address of a {what}; write tls://HOST:PORT"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
-            f"{whose}{address} is not encrypted, and whoever reaches its port runs code as you:"
+            f"{prefix}{address} is not encrypted, and whoever reaches its port runs code as you:"
             f" {HOW_TLS}"
         )
 

@@ -10,7 +10,7 @@ import subprocess
 from multiprocessing.connection import Connection
 
 from burg_drake.core import ClusterError
-from burg_drake.core.workers import cause_of_death, start_worker
+from burg_drake.core.workers import exit_cause, start_worker
 
 START = 60.0
 """Time in which a process has to start [s]."""
@@ -52,7 +52,7 @@ class LocalNodes:
         """Processes of the workers."""
         return [process for process, _ in self._nodes[1:]]
 
-    def mend(self) -> None:
+    def restart_workers(self) -> None:
         """Starts a worker in the place of each that has ended."""
         if self.scheduler.poll() is not None:
             return
@@ -84,5 +84,5 @@ def _address(node: Node) -> str:
             return address
         why = f"it does not answer within {START:.0f} s"
     except (EOFError, OSError):
-        why = cause_of_death(process)
+        why = exit_cause(process)
     raise ClusterError(f"a process of the local cluster does not start: {why}")

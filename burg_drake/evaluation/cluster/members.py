@@ -98,13 +98,13 @@ def threads_by_address(client: Any) -> dict[str, int]:
     """
     if client.status != "running":  # a scheduler that is started again knows nothing of us
         raise lost_scheduler(client)
-    with asking(client):
+    with scheduler_errors(client):
         found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=ANSWER)
         return found
 
 
 @contextlib.contextmanager
-def asking(client: Any) -> Iterator[None]:
+def scheduler_errors(client: Any) -> Iterator[None]:
     """Around what asks the scheduler: its loss is said in one line.
 
     Raises:
@@ -140,8 +140,8 @@ def admitted(client: Any, addresses: Iterable[str]) -> list[str]:
     addresses = list(addresses)
     if not addresses:
         return []
-    with asking(client):
-        told = client.run(software, workers=addresses, on_error="return")
-    gone = {a for a, answer in told.items() if isinstance(answer, OSError)}  # died meanwhile
-    require_same({a: answer for a, answer in told.items() if a not in gone})
-    return [a for a in addresses if a in told and a not in gone]
+    with scheduler_errors(client):
+        found = client.run(software, workers=addresses, on_error="return")
+    gone = {a for a, answer in found.items() if isinstance(answer, OSError)}  # died meanwhile
+    require_same({a: answer for a, answer in found.items() if a not in gone})
+    return [a for a in addresses if a in found and a not in gone]

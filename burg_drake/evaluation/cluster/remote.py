@@ -48,7 +48,7 @@ class Answers:
 
     Attributes:
         verdicts: in the order of completion, with the place of the grasp in the chunk.
-        deadly: places of the grasps whose outcome is that they end the child.
+        crashing: places of the grasps whose outcome is that they end the child.
         seconds: time that it took.
         missing: whether the bundle is not on this machine, and nothing was done.
         ended: whether the worker closes or the run has ended, and nothing is known.
@@ -56,7 +56,7 @@ class Answers:
     """
 
     verdicts: Sequence[tuple[int, Verdict]] = ()
-    deadly: frozenset[int] = frozenset()
+    crashing: frozenset[int] = frozenset()
     seconds: float = 0.0
     missing: bool = False
     ended: bool = False
@@ -103,7 +103,7 @@ class Supervisor(WorkerPlugin):
             return Answers(ended=True)
         start, failed = time.monotonic(), list[JobFailed]()
         places = {id(grasp): k for k, grasp in enumerate(job.candidates)}
-        pool.deadly.clear()
+        pool.crashing.clear()
         try:
             found = [
                 (places[id(grasp)], verdict) for _, grasp, verdict in pool.run([job], failed.append)
@@ -117,7 +117,7 @@ class Supervisor(WorkerPlugin):
         ids = [grasp.id for grasp in job.candidates]
         return Answers(
             found,
-            frozenset(ids.index(id) for id in pool.deadly),
+            frozenset(ids.index(id) for id in pool.crashing),
             time.monotonic() - start,
             error=failed[0].error if failed else None,
         )
@@ -151,7 +151,7 @@ class Supervisor(WorkerPlugin):
             self._idle.remove(pool)
             self._pools.remove(pool)
             del self._timers[id(pool)]
-        pool.dismiss()
+        pool.release()
 
 
 def judge_chunk(chunk: Chunk) -> Answers:

@@ -7,7 +7,7 @@ import uuid
 from typing import Any
 
 from burg_drake.core import ClusterError
-from burg_drake.evaluation.cluster.members import asking
+from burg_drake.evaluation.cluster.members import scheduler_errors
 
 PATIENCE = 600.0
 """So long the run waits without any worker [s]."""
@@ -34,7 +34,7 @@ class Waiting:
         """
         if self._since is None:
             self._since = time.monotonic()
-            with asking(self._client):
+            with scheduler_errors(self._client):
                 key = f"call-{uuid.uuid4().hex}"
                 self._call = self._client.submit(int, key=key, pure=False)
         if time.monotonic() > self._since + PATIENCE:

@@ -201,7 +201,7 @@ def _owners(
     """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and notes about it."""
     names.require_used([""])
     among = names.of_object("") if names.given else None
-    owner = _told(grasps, names, object_ids)
+    owner = _named_owners(grasps, names, object_ids)
     open_ = owner == ""
     owner[open_], held = held_instances(names.scene, X_SG[open_], gripper, among)
     missed = int((~held).sum())
@@ -219,13 +219,13 @@ def _owners(
     )
 
 
-def _told(
+def _named_owners(
     grasps: GraspSet, names: InstanceNames, object_ids: Mapping[int, str]
 ) -> NDArray[np.object_]:
     """(N,) instances that object ids tell; empty texts where they do not."""
-    told = np.full(len(grasps), "", dtype=object)
+    named = np.full(len(grasps), "", dtype=object)
     if not object_ids:
-        return told
+        return named
     if OBJECT_ID not in grasps.columns:
         raise InvalidInputError(f"{names.path} has no object ids to name").about("object_ids")
     ids = grasps.columns[OBJECT_ID]
@@ -242,8 +242,8 @@ def _told(
                 f"object id {number} is given as {name!r}, of which scene {names.scene.name!r}"
                 f" has several: {', '.join((instance, *others))}; name one of them"
             )
-        told[ids == number] = instance
-    return told
+        named[ids == number] = instance
+    return named
 
 
 def _without_instance(grasps: GraspSet) -> GraspSet:

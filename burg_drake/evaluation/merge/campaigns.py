@@ -12,7 +12,7 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.merge.finishing import MissingFromMerge
 from burg_drake.evaluation.merge.journals import choose
-from burg_drake.evaluation.merge.united import (
+from burg_drake.evaluation.merge.united_run import (
     all_sessions,
     common_shard,
     copy_documents,
@@ -43,12 +43,12 @@ from burg_drake.evaluation.store import (
 )
 
 
-def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -> MissingFromMerge:
+def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) -> MissingFromMerge:
     """Writes a united run over many scenes, but for what is made from its journals.
 
     Args:
         campaigns: the runs.
-        beside: an empty folder to write it to.
+        staging: an empty folder to write it to.
         folder: where it is to be, which references have to fit.
 
     Returns:
@@ -71,13 +71,13 @@ def merge_campaigns(campaigns: Sequence[Campaign], beside: Path, folder: Path) -
         shard=common_shard(campaigns),
         stretches=all_sessions([campaign.document.stretches for campaign in campaigns]),
     )
-    united = Campaign(beside, document)
-    (beside / SCENES_FOLDER).mkdir()
+    united = Campaign(staging, document)
+    (staging / SCENES_FOLDER).mkdir()
     merge = _Merge(campaigns, united, folder)
     for name in united.names:
         merge.take(name)
     merge.copy_parts()
-    atomic_write(beside / LEDGER_FILE, ledger_text(merge.states))
+    atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
     save_campaign(united)
     return MissingFromMerge(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 

@@ -50,8 +50,8 @@ def note_unfinished(folder: Path, sources: Sequence[Path], left: MissingFromMerg
 def unfinished(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
     """What these runs lacked, if a folder has what they make together, not finished."""
     try:
-        told = json.loads(_note(folder, sources).read_text(encoding="utf-8"))
-        return MissingFromMerge(told["missing"], tuple(told["scenes"]), tuple(told["shards"]))
+        stored = json.loads(_note(folder, sources).read_text(encoding="utf-8"))
+        return MissingFromMerge(stored["missing"], tuple(stored["scenes"]), tuple(stored["shards"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -26,7 +26,7 @@ from burg_drake.evaluation.merge.finishing import (
     note_unfinished,
     unfinished,
 )
-from burg_drake.evaluation.merge.united import missing_shards, write_united
+from burg_drake.evaluation.merge.united_run import missing_shards, write_united
 from burg_drake.evaluation.records import unchanged
 from burg_drake.evaluation.store import Campaign, Run, is_campaign, open_results
 
@@ -53,7 +53,7 @@ class Merged:
         notes = []
         shard = self.result.document.shard
         if shard:
-            notes.append(f"all that was given is shard {shard}, and so is the united run")
+            notes.append(f"only shard {shard} was given, so the united run is only that shard")
         if not (self.missing or self.scenes):
             return tuple(notes)
         if self.missing:
@@ -108,30 +108,30 @@ def _unite(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
         raise InvalidInputError(
             f"{one} is a run of one scene, {many} one of many; only runs of the same can be united"
         )
-    beside = _place_beside(folder)
+    staging = _staging_folder(folder)
     try:
         campaigns = [result for result in results if isinstance(result, Campaign)]
         if campaigns:
-            left = merge_campaigns(campaigns, beside, folder)
+            left = merge_campaigns(campaigns, staging, folder)
         else:
             runs = [result for result in results if isinstance(result, Run)]
-            choice = write_united(runs, beside, folder)
+            choice = write_united(runs, staging, folder)
             left = MissingFromMerge(choice.missing, (), missing_shards(runs))
-        note_unfinished(beside, folders, left)
-        move(beside, folder)
+        note_unfinished(staging, folders, left)
+        move(staging, folder)
         return left
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
 
 
-def move(beside: Path, folder: Path) -> None:
+def move(staging: Path, folder: Path) -> None:
     """Puts a folder where it is to be.
 
     Raises:
         InvalidInputError: it cannot be.
     """
     try:
-        os.rename(beside, folder)  # also in the place of an empty one
+        os.rename(staging, folder)  # also in the place of an empty one
     except OSError as error:
         raise InvalidInputError(f"cannot write {folder}: {error.strerror}") from error
 
@@ -144,7 +144,7 @@ def _distinct(paths: Sequence[str | Path]) -> list[Path]:
     return list(found.values())
 
 
-def _place_beside(folder: Path) -> Path:
+def _staging_folder(folder: Path) -> Path:
     """An empty folder beside another; those of merges that were killed go."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise InvalidInputError(f"{folder} is there already; choose another folder").about("out")
@@ -153,6 +153,6 @@ def _place_beside(folder: Path) -> Path:
     for path in parent.iterdir():
         if left.fullmatch(path.name) and path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
-    beside = parent / f".{folder.name}.{secrets.token_hex(8)}"
-    beside.mkdir()
-    return beside
+    staging = parent / f".{folder.name}.{secrets.token_hex(8)}"
+    staging.mkdir()
+    return staging

@@ -56,9 +56,9 @@ from .run_document import (
     input_reference as input_reference,
     numbers as numbers,
     origin_of as origin_of,
+    request_identity as request_identity,
     require_same_run as require_same_run,
     run_hash as run_hash,
-    what_is_asked as what_is_asked,
 )
 from .shard import (
     Shard as Shard,

@@ -15,8 +15,8 @@ from burg_drake.evaluation.records.run_document import (
     TableFormat,
     WorkSession,
     differences,
+    request_identity,
     require_same_shard,
-    what_is_asked,
 )
 from burg_drake.evaluation.records.shard import Shard, as_shard
 from burg_drake.station.document import Engine
@@ -64,7 +64,7 @@ class CampaignDocument:
         scenes: all of them, also in a shard.
         libraries: hash of all objects of each library, by folder.
         versions: of the software and the machine.
-        stretches: who worked on it when.
+        stretches: sessions in which it was worked on.
     """
 
     version: int = 1
@@ -113,7 +113,7 @@ class CampaignDocument:
 
 def identity(document: CampaignDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same run, in words, by topic."""
-    return {"scenes": f"{len(document.scenes)} scenes", **what_is_asked(document)}
+    return {"scenes": f"{len(document.scenes)} scenes", **request_identity(document)}
 
 
 def campaign_hash(document: CampaignDocument) -> str:

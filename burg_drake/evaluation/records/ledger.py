@@ -113,22 +113,22 @@ def ledger_text(states: Iterable[SceneState]) -> str:
 def _line(state: SceneState) -> str:
     """Fields at their default are left out."""
     plain = asdict(SceneState(scene="", state="open"))
-    told = {
+    fields = {
         name: value
         for name, value in asdict(replace(state, why=state.why[:4000])).items()
         if value != plain[name] or name in ("scene", "state")
     }
-    return json.dumps(told, separators=(",", ":")) + "\n"
+    return json.dumps(fields, separators=(",", ":")) + "\n"
 
 
 def _read(line: bytes) -> SceneState | None:
     try:
-        told = json.loads(line)
+        stored = json.loads(line)
     except (ValueError, RecursionError):
         return None
-    if not isinstance(told, Mapping) or not isinstance(told.get("scene"), str):
+    if not isinstance(stored, Mapping) or not isinstance(stored.get("scene"), str):
         return None
-    fields: dict[str, Any] = dict(told)
+    fields: dict[str, Any] = dict(stored)
     if fields.get("state") not in ("open", "done", "failed", "empty"):
         return None
     if any(type(value) is not KINDS.get(name, int) for name, value in fields.items()):

@@ -116,7 +116,7 @@ class RunDocument:
         shard: which share of the grasps is judged here, as `K/N`; all of them if empty.
         table: format of the results file.
         versions: of the software and the machine.
-        stretches: who worked on it when.
+        stretches: sessions in which it was worked on.
     """
 
     version: int = 1
@@ -138,12 +138,12 @@ class RunDocument:
 
 
 def begun_now(workers: int, before: int) -> WorkSession:
-    """A stretch of work that begins now, when so many grasps have a verdict."""
+    """A session that begins now, when so many grasps have a verdict."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
     return WorkSession(started=started, workers=workers, before=before)
 
 
-class RunQuestion(Protocol):
+class RunRequestFields(Protocol):
     """What a call asks about each scene; documents of runs say it, see `RunDocument`."""
 
     @property
@@ -166,10 +166,13 @@ class RunQuestion(Protocol):
 
 def identity(document: RunDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same run, in words, by topic."""
-    return {"scene": f"content {document.scene.content[:HASH_DIGITS]}", **what_is_asked(document)}
+    return {
+        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
+        **request_identity(document),
+    }
 
 
-def what_is_asked(document: RunQuestion) -> dict[str, str]:
+def request_identity(document: RunRequestFields) -> dict[str, str]:
     """The same of all scenes that it is asked about, in words, by topic."""
     grasps, engine = document.grasps, document.engine
     others = [without_motion(values) for values in (document.trial, document.arm)]
@@ -243,7 +246,7 @@ def require_same_shard(folder: Path, there: str, here: str) -> None:
         held = f"shard {there} of this run" if there else "all of this run"
         asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
-            f"{folder} holds {held}, and {asked} is given; choose another folder, and burg-drake"
+            f"{folder} holds {held}, and {asked} is given; choose another folder; burg-drake"
             " merge unites shards"
         ).about("out")
 

@@ -13,10 +13,10 @@ from .counts import (
     pushes as pushes,
 )
 from .notes import (
+    missing_grasps_note as missing_grasps_note,
     run_notes as run_notes,
     shortfalls as shortfalls,
     unclear_notes as unclear_notes,
-    ungiven_note as ungiven_note,
     unmoved_notes as unmoved_notes,
 )
 from .shortened_lifts import short_lifts as short_lifts

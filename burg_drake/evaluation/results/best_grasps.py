@@ -35,8 +35,8 @@ def ranked_run(run: Run, grasps: GraspSet) -> RankedGrasps:
     row = {id: i for i, id in enumerate(run.candidates.id)}
     best = [row[id] for id in run.best(len(row))]
     stages = list(Stage)
-    came = [stages.index(Stage(s)) if s else -1 for s in grasps.column("stage").tolist()]
-    rest = np.argsort(-np.array(came), kind="stable")
+    reached = [stages.index(Stage(s)) if s else -1 for s in grasps.column("stage").tolist()]
+    rest = np.argsort(-np.array(reached), kind="stable")
     order = np.concatenate([np.array(best, dtype=np.int64), rest[~np.isin(rest, best)]])
     return RankedGrasps(order, "outcome, lifted ones as the run ranks them")
 

@@ -18,7 +18,9 @@ from burg_drake.station.document import GraspMotion
 CAUSES = 3
 """So many outcomes are named."""
 HIT = {Outcome.COLLISION_TARGET: SELF, Outcome.COLLISION_TABLE: TABLE}
-REMEDY_OF_ARM = "another station or place on the board may help; mode `hand` leaves the arm out"
+REMEDY_OF_ARM = (
+    "another station, or another place on the board, may help; mode `hand` leaves the arm out"
+)
 REMEDIES = {
     Stage.CLEAR: "sample grasps at which the hand is clear, which is the default",
     Stage.REACHABLE: REMEDY_OF_ARM,
@@ -34,10 +36,10 @@ def run_notes(run: Run) -> tuple[str, ...]:
     """A sentence for each instance with fewer grasps than asked, or for those that no grasps were
     given for, and for each object of which nothing could be executed, once all of its grasps are
     judged."""
-    return (*_ungiven(run), *shortfalls(run), *_unexecuted(run))
+    return (*_without_grasps(run), *shortfalls(run), *_unexecuted(run))
 
 
-def ungiven_note(objects: Iterable[str], given: Iterable[str]) -> str:
+def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:
     """Which of the objects have no given grasp; "" if all have some."""
     missing = sorted({*objects} - {*given})
     return f"no grasps to judge for {listing(missing)}" if missing else ""
@@ -54,11 +56,11 @@ def shortfalls(run: Run) -> list[str]:
     return [note for note in notes if note]
 
 
-def _ungiven(run: Run) -> list[str]:
+def _without_grasps(run: Run) -> list[str]:
     grasps = run.document.grasps
     if grasps.per_object is not None:
         return []
-    note = ungiven_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
+    note = missing_grasps_note(grasps.objects, [name for name, n in grasps.objects.items() if n])
     return [note] if note else []
 
 

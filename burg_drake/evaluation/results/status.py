@@ -41,7 +41,7 @@ class Status:
         judged: grasps that have a verdict.
         total: of how many; expected, as long as scenes have not been sampled.
         outcomes: number of grasps by outcome.
-        rate: grasps a second: lately, or of the stretch of work that is under way; None if unknown.
+        rate: grasps a second: lately, or of the session of work that is under way; None if unknown.
         left: expected time left [s]; None if unknown.
         last: date of the last verdict, seconds since 1970; None if there is none.
         shard: share that is judged here, as `K/N`; empty if all.
@@ -163,9 +163,9 @@ class Watch:
         tail.refresh()
         return tail
 
-    def _rate(self, judged: int, stretches: tuple[WorkSession, ...], working: bool) -> float | None:
+    def _rate(self, judged: int, sessions: tuple[WorkSession, ...], working: bool) -> float | None:
         """Grasps a second: of the time in which this was followed, if that is long enough, else
-        of the stretch that is under way."""
+        of the session that is under way."""
         now = time.monotonic()
         self._history.append((now, judged))
         while len(self._history) > 2 and self._history[1][0] < now - WINDOW:
@@ -175,7 +175,7 @@ class Watch:
         begun, before = self._history[0]
         if now - begun >= WINDOW / 4:
             return (judged - before) / (now - begun) or None
-        return _rate_of(stretches[-1], judged) if stretches else None
+        return _rate_of(sessions[-1], judged) if sessions else None
 
 
 def _date_of(path: Path) -> tuple[int, ...]:
@@ -184,14 +184,14 @@ def _date_of(path: Path) -> tuple[int, ...]:
     return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
 
 
-def _rate_of(stretch: WorkSession, judged: int) -> float | None:
-    """Grasps a second of a stretch that is under way; None if it does not say how many were judged
+def _rate_of(session: WorkSession, judged: int) -> float | None:
+    """Grasps a second of a session that is under way; None if it does not say how many were judged
     when it began."""
-    if stretch.judged is not None or stretch.before is None:
+    if session.judged is not None or session.before is None:
         return None
-    begun = datetime.fromisoformat(stretch.started)
+    begun = datetime.fromisoformat(session.started)
     seconds = (datetime.now(UTC) - begun).total_seconds()
-    done = judged - stretch.before
+    done = judged - session.before
     return done / seconds if seconds > 0 and done > 0 else None
 
 

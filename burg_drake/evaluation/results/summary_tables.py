@@ -68,7 +68,10 @@ def _stage_table(summary: Summary) -> TextTable:
         )
     table.caption = "held: to the end; lifted: held, and no other object disturbed\n"
     if summary.mode != "hand":
-        table.caption += "reach, plan: the arm can be there; it can move there, in and up\n"
+        table.caption += (
+            "reach, plan: the arm reaches the grasp; it has a path there, for the approach and"
+            " the lift\n"
+        )
     table.caption += "success: lifted of executed; CI: Wilson's interval"
     return table
 

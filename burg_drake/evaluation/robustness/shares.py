@@ -50,7 +50,7 @@ def lifted_shares(
         if grasps and not set(of) & set(runs):
             raise InvalidInputError(
                 f"{path} is of run {listing(sorted(set(of)))}, not of {listing(sorted(runs))};"
-                " give the table of the run whose verdicts are asked about"
+                " give the table of the run whose verdicts are compared"
             )
     else:
         of = [_only_run(path, runs, ids, grasps)] * len(grasps)

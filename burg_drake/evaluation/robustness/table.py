@@ -176,11 +176,11 @@ def _caption(settings: RobustnessSettings) -> str:
     parts = []
     if {"tug", "shake"} & set(settings.tests):
         parts.append(
-            "tug, shake: acceleration borne along the weakest direction of the grasp frame"
-            " (x closes, z approaches)"
+            "tug, shake: acceleration withstood along the weakest direction of the grasp frame"
+            " (x closing, z approach)"
         )
     if "friction" in settings.tests:
-        parts.append("least mu: smallest friction coefficient that lifts, of the object's own")
+        parts.append("least mu: smallest friction coefficient that lifts, out of the object's own")
     if "noise" in settings.tests:
         noise = settings.noise
         parts.append(

@@ -172,10 +172,10 @@ class _Call:
         found = self._found()
         event = Progress(STARTING, there, sum(self.expected.values()), outcomes=found)
         self.pace = ProgressMeter(self.reporter.show, event, "judging")
-        stretch = begun_now(self.executor.workers, found.total())
-        stretches = document.stretches
+        session = begun_now(self.executor.workers, found.total())
+        sessions = document.stretches
         save_campaign(
-            replace(self.campaign, document=replace(document, stretches=(*stretches, stretch)))
+            replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
         )
         begun = time.monotonic()
         try:
@@ -187,9 +187,9 @@ class _Call:
             for judging in list(self.judging.values()):
                 judging.close()
             seconds = round(time.monotonic() - begun, 3)
-            stretch = replace(stretch, judged=self.judged, seconds=seconds)
+            session = replace(session, judged=self.judged, seconds=seconds)
             save_campaign(
-                replace(self.campaign, document=replace(document, stretches=(*stretches, stretch)))
+                replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
             )
 
     def _jobs(self, left: list[str], crew: SceneProcesses) -> Generator[Job | None, None, None]:
@@ -244,7 +244,7 @@ class _Call:
         if judging.is_done:
             del self.judging[job.key]
             self._finish(judging, crew)
-        elif judging.is_worth_a_part():
+        elif judging.is_part_due():
             crew.take(job.key)
 
     def _give_up(self, failed: JobFailed) -> None:

@@ -60,9 +60,9 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Writes into the run's document that it is worked on."""
-        self._stretch = begun_now(self._workers, self._before)
+        self._session = begun_now(self._workers, self._before)
         self._begun = time.monotonic()
-        self._save(self._stretch)
+        self._save(self._session)
 
     def take(self, id: str, verdict: Verdict) -> None:
         """Keeps a verdict."""
@@ -72,7 +72,7 @@ class SceneJudging:
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             self._failed[id] = verdict.interrupted
 
-    def is_worth_a_part(self) -> bool:
+    def is_part_due(self) -> bool:
         """Whether so many were judged again that their rows should go to a part."""
         return self._judged % PART_ROWS == 0
 
@@ -84,7 +84,7 @@ class SceneJudging:
         self._journal = None
         if self.left:
             seconds = round(time.monotonic() - self._begun, 3)
-            self._save(replace(self._stretch, judged=self._judged, seconds=seconds))
+            self._save(replace(self._session, judged=self._judged, seconds=seconds))
 
     def state(self, state: Literal["open", "done"]) -> SceneState:
         """How far it is."""
@@ -105,10 +105,10 @@ class SceneJudging:
             missing=self._missing,
         )
 
-    def _save(self, stretch: WorkSession) -> None:
+    def _save(self, session: WorkSession) -> None:
         document = self._run.document
-        stretches = (*document.stretches, stretch)
-        save_run(replace(self._run, document=replace(document, stretches=stretches)))
+        sessions = (*document.stretches, session)
+        save_run(replace(self._run, document=replace(document, stretches=sessions)))
 
 
 def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:

@@ -56,7 +56,7 @@ class EvaluationSettings:
     )
     approach_angle_deg: float = setting(
         DEFAULT_APPROACH_ANGLE_DEG,
-        "in a scene, sample grasps within this angle of straight down"
+        "in a scene, sample grasps whose approach is within this angle of straight down"
         f" (default: {DEFAULT_APPROACH_ANGLE_DEG:g}; 180: any)",
         name="approach_angle",
         metavar="DEG",
@@ -66,23 +66,23 @@ class EvaluationSettings:
     )
     blind: bool = setting(
         False,
-        "sample without regard to the hand, by points of contact alone, as in the literature",
+        "sample by contact points alone, regardless of the hand, as in the literature",
     )
     only: Iterable[str] | None = None
     mode: Mode | None = setting(
         None,
-        "hand: the hand alone executes grasps in simulation; reach: those that the arm can execute;"
-        " arm: those, by the whole arm from the pregrasp on (default: reach, or hand if there is no"
-        " arm)",
+        "hand: simulate all grasps with the hand alone; reach: with the hand alone, those that"
+        " the arm can execute; arm: those, with the whole arm from the pregrasp on (default:"
+        " reach, or hand if there is no arm)",
         choices=MODES,
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
-        "how time is stepped: for truth, for results, for a first look",
+        "engine preset: for reference values, for results, for a first look",
         choices=tuple(ENGINES),
     )
     motion: GraspMotion | None = None
-    seed: int = setting(0, "of the sampling")
+    seed: int = setting(0, "seed of the sampling")
     shard: Shard | str | None = setting(
         None,
         "judge a share of the work, such as 2/8, on one of several machines: every N-th scene, or"

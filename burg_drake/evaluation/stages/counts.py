@@ -150,11 +150,11 @@ def grasp_counts(
         clear = np.flatnonzero(blocker == "")
         verdicts = arm.check_all([name] * len(clear), X_WG[clear], grasps.width[clear])
         hindrance = blocker.copy()
-        hindrance[clear] = [_in_the_way(verdict, others) for verdict in verdicts]
+        hindrance[clear] = [_blocker_of(verdict, others) for verdict in verdicts]
         yield name, _count(grasps, blocker, hindrance)
 
 
-def _in_the_way(verdict: Reach, others: set[str]) -> str:
+def _blocker_of(verdict: Reach, others: set[str]) -> str:
     """What hinders the arm; "" if nothing does."""
     if verdict.outcome is None:
         return ""

@@ -84,8 +84,8 @@ def write_part(folder: Path, number: int, table: Any, segments: Sequence[Journal
     """
     arrow = require_arrow("a columnar table")
     meant = [field.with_metadata(_meaning(field.name)) for field in table.schema]
-    told = json.dumps([list(asdict(segment).values()) for segment in segments])
-    table = table.cast(arrow.schema(meant, {SEGMENTS_KEY: told}))
+    stored = json.dumps([list(asdict(segment).values()) for segment in segments])
+    table = table.cast(arrow.schema(meant, {SEGMENTS_KEY: stored}))
     sink = arrow.BufferOutputStream()
     arrow.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
     data = bytes(sink.getvalue())
@@ -112,8 +112,8 @@ def open_part(path: Path) -> Part | None:
             if _hash(stream.read()) != name[2]:
                 return None
             file = arrow.parquet.ParquetFile(stream)
-            told = json.loads(file.schema_arrow.metadata[SEGMENTS_KEY])
-            segments = tuple(JournalSegment(*values) for values in told)
+            stored = json.loads(file.schema_arrow.metadata[SEGMENTS_KEY])
+            segments = tuple(JournalSegment(*values) for values in stored)
             if sum(segment.rows for segment in segments) != file.metadata.num_rows:
                 return None
     except (InvalidInputError, OSError, ValueError, KeyError, TypeError):

@@ -63,7 +63,7 @@ class PartWriter:
             path.unlink(missing_ok=True)
         self._ends: dict[str, int] = {}
         self._number = max((part.number for part in self._index.parts), default=0)
-        self._remove_what_does_not_hold()
+        self._remove_stale_segments()
 
     def behind(self) -> list[str]:
         """Scenes whose journals have more than the parts."""
@@ -142,7 +142,7 @@ class PartWriter:
         self._number += 1
         self._index.parts.append(write_part(self._folder, self._number, table, segments))
 
-    def _remove_what_does_not_hold(self) -> None:
+    def _remove_stale_segments(self) -> None:
         stale: set[JournalSegment] = set()
         for scene, found in self._index.segments().items():
             place = self._places.get(scene)

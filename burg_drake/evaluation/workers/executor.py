@@ -78,4 +78,4 @@ class LocalExecutor:
         """See `Executor.judge`."""
         pool = JudgePool(self.workers, self.limits)
         yield from pool.run(jobs, on_failure)
-        pool.dismiss()
+        pool.release()

@@ -26,10 +26,10 @@ from burg_drake.core.workers import Task, WorkerPool
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
-from burg_drake.evaluation.workers.lane import GivenWork, Lane
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.open_job import TASK_SIZE, OpenJob, Screening
 from burg_drake.evaluation.workers.worker import judge_one, screen_batch, screen_sizes
+from burg_drake.evaluation.workers.worker_slot import GivenWork, WorkerSlot
 
 KEPT_JUDGES = 2
 """Judges that a worker keeps; more would take memory."""
@@ -43,19 +43,19 @@ class JudgePool:
     Attributes:
         count: number of workers, at most.
         limits: what they may take.
-        lanes: the workers.
+        slots: the workers.
         jobs: those under way.
         stopped: whether it was told to stop.
-        deadly: ids of grasps whose outcome is that they end their workers, in the order in which
+        crashing: ids of grasps whose outcome is that they end their workers, in the order in which
             they came up.
     """
 
     def __init__(self, count: int, limits: WorkerLimits) -> None:
         self.count = count
         self.limits = limits
-        self.lanes: list[Lane] = []
+        self.slots: list[WorkerSlot] = []
         self.jobs: list[OpenJob] = []
-        self.deadly: list[str] = []
+        self.crashing: list[str] = []
         self.stopped = False
         self._workers: WorkerPool | None = None
         self._done: SimpleQueue[GivenWork] = SimpleQueue()
@@ -72,15 +72,15 @@ class JudgePool:
         self.open()
         try:
             while not self.stopped:
-                self.employ()
-                if not any(lane.busy for lane in self.lanes):
+                self.assign_work()
+                if not any(slot.busy for slot in self.slots):
                     break
                 given = self._done.get()
                 if self.stopped:
                     raise SimulationError("the workers were ended")
-                given.lane.given.remove(given)
+                given.slot.given.remove(given)
                 if not given.job.failed:
-                    yield from self.hear(given)
+                    yield from self.take_result(given)
         except BaseException:
             self.kill()
             raise
@@ -90,13 +90,13 @@ class JudgePool:
         if self._workers is None:
             self._workers = WorkerPool(self.count, kept_sessions=KEPT_JUDGES)
             self._done = SimpleQueue()
-            self.lanes = [Lane(k) for k in range(self.count)]
+            self.slots = [WorkerSlot(k) for k in range(self.count)]
 
-    def employ(self) -> None:
+    def assign_work(self) -> None:
         """Gives idle workers something to do, those first that are there already."""
-        for lane in sorted(self.lanes, key=lambda lane: not lane.started):
-            if not lane.busy and (job := self.choose(lane)) is not None:
-                self.give(lane, job)
+        for slot in sorted(self.slots, key=lambda slot: not slot.started):
+            if not slot.busy and (job := self.choose(slot)) is not None:
+                self.give(slot, job)
         self.jobs = [job for job in self.jobs if self.is_under_way(job)]
 
     def is_under_way(self, job: OpenJob) -> bool:
@@ -105,13 +105,13 @@ class JudgePool:
 
     def engaged(self, job: OpenJob) -> int:
         """Number of workers that are at a job."""
-        return sum(lane.busy and lane.job is job for lane in self.lanes)
+        return sum(slot.busy and slot.job is job for slot in self.slots)
 
-    def choose(self, lane: Lane) -> OpenJob | None:
+    def choose(self, slot: WorkerSlot) -> OpenJob | None:
         """What an idle worker is to work on."""
-        built = self.built(lane)
-        if lane.job is not None and lane.job.waiting:
-            return lane.job
+        built = self.built(slot)
+        if slot.job is not None and slot.job.waiting:
+            return slot.job
         for job in self._coming:
             if job is None:  # none is ready yet; asked again when something has happened
                 break
@@ -125,46 +125,46 @@ class JudgePool:
         }
         return max(share, key=share.__getitem__) if share else None
 
-    def built(self, lane: Lane) -> tuple[str, ...]:
+    def built(self, slot: WorkerSlot) -> tuple[str, ...]:
         """Keys of the judges that a worker has."""
         assert self._workers is not None
-        return self._workers.sessions(lane.number)
+        return self._workers.sessions(slot.number)
 
-    def give(self, lane: Lane, job: OpenJob) -> None:
+    def give(self, slot: WorkerSlot, job: OpenJob) -> None:
         """Hands a worker work of a job, or has it build the judge first."""
-        lane.job, lane.started = job, True
-        if job.key not in self.built(lane) or job.key not in self._screens:
+        slot.job, slot.started = job, True
+        if job.key not in self.built(slot) or job.key not in self._screens:
             build: Task[Any] = Task(screen_sizes, session=job.session)
-            self.submit(lane, [(GivenWork(lane, job, ()), build)])
+            self.submit(slot, [(GivenWork(slot, job, ()), build)])
             return
         job.know(self._screens[job.key])
         work, limit = job.next_work(), self.limits.of_task
         if isinstance(work, Screening):
-            given = GivenWork(lane, job, work.grasps, screening=True)
+            given = GivenWork(slot, job, work.grasps, screening=True)
             task: Task[Any] = Task(screen_batch, (work.grasps,), {}, job.session, limit, retries=0)
-            self.submit(lane, [(given, task)])
+            self.submit(slot, [(given, task)])
             return
-        each = [GivenWork(lane, job, (grasp,)) for grasp in work.grasps]
+        each = [GivenWork(slot, job, (grasp,)) for grasp in work.grasps]
         self.submit(
-            lane,
+            slot,
             [
                 (one, Task(judge_one, one.grasps[0], {}, job.session, limit, one.begins))
                 for one in each
             ],
         )
 
-    def submit(self, lane: Lane, work: list[tuple[GivenWork, Task[Any]]]) -> None:
+    def submit(self, slot: WorkerSlot, work: list[tuple[GivenWork, Task[Any]]]) -> None:
         """Sends a worker tasks; what becomes of each comes to `run`."""
         if self.stopped or self._workers is None:
             raise SimulationError("the workers were ended")
-        futures = self._workers.submit_tasks([task for _, task in work], lane.number)
+        futures = self._workers.submit_tasks([task for _, task in work], slot.number)
         for (given, _), future in zip(work, futures, strict=True):
             given.future = future
-            lane.given.append(given)
+            slot.given.append(given)
         for (given, _), future in zip(work, futures, strict=True):
             future.add_done_callback(partial(_put, self._done, given))
 
-    def hear(self, given: GivenWork) -> Iterator[Answer]:
+    def take_result(self, given: GivenWork) -> Iterator[Answer]:
         """Deals with what became of work."""
         job, future = given.job, given.future
         assert future is not None
@@ -197,7 +197,7 @@ class JudgePool:
         reason = str(error) if died else one_line(error)
         interrupted = isinstance(error, WorkerDied) and error.from_outside
         failed = Outcome.SIMULATION_FAILED
-        self.deadly.append(candidate.id)
+        self.crashing.append(candidate.id)
         yield (
             job.job,
             candidate,
@@ -218,16 +218,16 @@ class JudgePool:
         if job.failed:
             return
         job.give_up()
-        for given in [given for lane in self.lanes for given in lane.given if given.job is job]:
+        for given in [given for slot in self.slots for given in slot.given if given.job is job]:
             if given.future is not None:
                 given.future.interrupt()
         if self._on_failure is None:
             raise error
         self._on_failure(JobFailed(job.job, error))
 
-    def dismiss(self) -> None:
+    def release(self) -> None:
         """Lets idle workers end by themselves, and ends those that are at work."""
-        if self._workers is not None and not any(lane.busy for lane in self.lanes):
+        if self._workers is not None and not any(slot.busy for slot in self.slots):
             self._workers.shutdown()
         self.kill()
 
@@ -242,7 +242,7 @@ class JudgePool:
         workers, self._workers = self._workers, None
         if workers is not None:
             workers.kill_workers()
-        self.lanes.clear()
+        self.slots.clear()
         self.jobs.clear()
 
 

@@ -48,4 +48,4 @@ def judge_all(
     with closing(pool.run([Job("", make_judge, candidates)])) as answers:
         for _, candidate, verdict in answers:
             yield candidate, verdict
-    pool.dismiss()
+    pool.release()

@@ -129,7 +129,7 @@ def stopped_table(judged: Judgement, name: str = "") -> TextTable:
 def calibration_table(found: Sequence[MarginCalibration], name: str = "") -> TextTable:
     """How well each margin ranks success above failure."""
     weighted = any(c.auroc_weighted is not None for c in found)
-    table = TextTable(f"What margins say about success{name}").texts("margin", "better")
+    table = TextTable(f"How margins predict success{name}").texts("margin", "better")
     table.numbers("trials", "AUROC", "95 % CI")
     if weighted:
         table.numbers("all grasps")
@@ -144,7 +144,7 @@ def calibration_table(found: Sequence[MarginCalibration], name: str = "") -> Tex
         table.row(margin_title(c.name)[0], better, *cells)
     table.caption = (
         "AUROC: how often the better margin is that of the success, of a success and a failure;"
-        " 0.5 says nothing"
+        " 0.5 means no information"
     )
     return table
 

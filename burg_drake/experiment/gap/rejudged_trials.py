@@ -149,7 +149,7 @@ class Rejudging:
         return paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
 
 
-def why_skipped(trial: RealTrial, run: Run | None, content: str | None) -> str:
+def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
     """Why a trial cannot be judged again in a run; empty if it can.
 
     Args:
@@ -183,9 +183,9 @@ def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
         same = [run for run in runs if run.document.scene.content == source.scene.content]
         if same:
             tried = {t.grasp: t.content for t in sheet.trials if t.run == key}
-            found[key] = max(same, key=partial(_likeness, hash=source.hash, tried=tried))
+            found[key] = max(same, key=partial(_match_rank, hash=source.hash, tried=tried))
     return found
 
 
-def _likeness(run: Run, hash: str, tried: Mapping[str, str]) -> tuple[bool, int]:
+def _match_rank(run: Run, hash: str, tried: Mapping[str, str]) -> tuple[bool, int]:
     return run.document.hash == hash, len(grasp_contents(run, tried).items() & tried.items())

@@ -35,7 +35,7 @@ from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecuto
 from burg_drake.experiment.gap.displacement import commanded
 from burg_drake.experiment.gap.measured_places import measured_scene
 from burg_drake.experiment.gap.rejudged_files import write_rejudging
-from burg_drake.experiment.gap.rejudged_trials import Rejudged, Rejudging, why_skipped
+from burg_drake.experiment.gap.rejudged_trials import Rejudged, Rejudging, skip_reason
 from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
 from burg_drake.experiment.trials import (
     RealTrial,
@@ -54,7 +54,7 @@ ID_DIGITS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class _Question:
+class _RejudgeTask:
     """A trial that is to be judged again; without a judge where its scene cannot be."""
 
     trial: Rejudged
@@ -96,7 +96,7 @@ def rejudge(
     runs = load_sources(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     skipped = _skipped(sheet, runs)
-    asked = _questions([t for t in sheet.trials if t.number not in skipped], runs)
+    tasks = _rejudge_tasks([t for t in sheet.trials if t.number not in skipped], runs)
     folder = writable_folder(out)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         remove_unfinished(folder)
@@ -106,10 +106,10 @@ def rejudge(
             if not verdict.is_open(retry_failed=retry_failed)
         }
         failed: dict[str, str] = {}
-        for id, verdict in _judge(asked, known, executor, reporter, failed):
+        for id, verdict in _judge(tasks, known, executor, reporter, failed):
             journal.append(id, verdict)
             known[id] = verdict
-    trials = tuple(_answered(one.trial, known, failed) for one in asked)
+    trials = tuple(_answered(one.trial, known, failed) for one in tasks)
     found = Rejudging(
         path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
     )
@@ -124,28 +124,28 @@ def _skipped(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
     found = {}
     for trial in sheet.trials:
         content = contents.get(trial.run, {}).get(trial.grasp)
-        if why := why_skipped(trial, runs.get(trial.run), content):
+        if why := skip_reason(trial, runs.get(trial.run), content):
             found[trial.number] = why
     return found
 
 
-def _questions(trials: Sequence[RealTrial], runs: Mapping[str, Run]) -> list[_Question]:
+def _rejudge_tasks(trials: Sequence[RealTrial], runs: Mapping[str, Run]) -> list[_RejudgeTask]:
     from burg_drake.station.checks import SceneCheck
 
     places: dict[str, tuple[Scene, Station, SceneCheck]] = {}
-    asked = []
+    tasks = []
     for trial in trials:
         run = runs[trial.run]
         if trial.run not in places:
             scene, station = run.scene(), run.station()
             places[trial.run] = scene, station, SceneCheck(station, scene.library)
-        asked.append(_question(trial, run, *places[trial.run]))
-    return asked
+        tasks.append(_rejudge_task(trial, run, *places[trial.run]))
+    return tasks
 
 
-def _question(
+def _rejudge_task(
     real: RealTrial, run: Run, planned: Scene, station: Station, check: SceneCheck
-) -> _Question:
+) -> _RejudgeTask:
     assert real.outcome is not None
     grasp, verdict = run.candidate(real.grasp), run.verdicts.get(real.grasp)
     origin = origin_of(run.document)
@@ -164,7 +164,7 @@ def _question(
         reason=measured.reason,
     )
     if measured.scene is None:
-        return _Question(trial, None)
+        return _RejudgeTask(trial, None)
     settings = origin.settings(f"{run.path}: trial")
     factory = SceneJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
     X_OG = commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
@@ -175,7 +175,7 @@ def _question(
     )
     id = f"{real.number}:{key[:ID_DIGITS]}"
     candidate = Candidate(id, grasp.instance, X_OG, width=grasp.width)
-    return _Question(replace(trial, candidate=candidate), factory)
+    return _RejudgeTask(replace(trial, candidate=candidate), factory)
 
 
 def _answered(trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str, str]) -> Rejudged:
@@ -186,7 +186,7 @@ def _answered(trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str
 
 
 def _judge(
-    asked: Sequence[_Question],
+    tasks: Sequence[_RejudgeTask],
     known: Mapping[str, Verdict],
     executor: Executor,
     reporter: Reporter,
@@ -195,7 +195,7 @@ def _judge(
     """Asks what is not known yet, trials of one scene together.
 
     Args:
-        asked, known, executor, reporter: what is asked, and what need not be.
+        tasks, known, executor, reporter: what is asked, and what need not be.
         failed: gets the reason, by id, for trials of scenes that cannot be built.
 
     Yields:
@@ -203,7 +203,7 @@ def _judge(
     """
     jobs: dict[str, Job] = {}
     total = 0
-    for one in asked:
+    for one in tasks:
         if one.factory is None or one.trial.candidate is None:
             continue
         total += 1

@@ -25,12 +25,12 @@ from burg_drake.visualization.style import Html, element, html_document, join, p
 HOW = (
     "Carry out the trials in the order of their numbers. Each block has one scene: set it up on its"
     " printed board as its pictures show it, and set it up again after every trial.",
-    "Tick one box a trial, when the robot has ended its motion. If none fits, write what happened"
-    " behind “other”.",
+    "Tick one box per trial when the robot has ended its motion. If none fits, write what"
+    " happened behind “other”.",
     "Look at the picture before the trial: the hand is where the robot will close it, and the"
     " object to be gripped has an orange rim. Do not correct the scene or the robot for it.",
-    "A trial that was disturbed, by a person or an object that fell before, is “not attempted”; go"
-    " on, and repeat it at the end if there is time.",
+    "A trial that is invalid, because of a person or an object that fell before it, is “not"
+    " attempted”; go on, and repeat it at the end if there is time.",
 )
 
 

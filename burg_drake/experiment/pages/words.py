@@ -17,7 +17,7 @@ SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
     RealOutcome.DROPPED: ("dropped", "lifted, and lost while it was held"),
     RealOutcome.CLOSED_EMPTY: ("closed empty", "the fingers closed without the object"),
     RealOutcome.HAND_COLLISION_APPROACH: (
-        "hit on the way",
+        "hit on the approach",
         "the hand hit something before it closed",
     ),
     RealOutcome.PROTECTIVE_STOP: ("protective stop", "the robot stopped itself"),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from burg_drake.core import InvalidInputError
-from burg_drake.evaluation.records import HASH_DIGITS, differences, engine_label, what_is_asked
+from burg_drake.evaluation.records import HASH_DIGITS, differences, engine_label, request_identity
 from burg_drake.evaluation.store import (
     RUN_FILE,
     Campaign,
@@ -134,7 +134,7 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
 
 def settings_apart(first: JudgedRuns, second: JudgedRuns) -> tuple[str, ...]:
     """In what the runs of two folders differ, in words."""
-    asked = [what_is_asked(judged.found.document) for judged in (first, second)]
+    asked = [request_identity(judged.found.document) for judged in (first, second)]
     return tuple(
         text.replace(" there, ", " in the first, ").removesuffix(" here") + " in the second"
         for text in differences(*asked)

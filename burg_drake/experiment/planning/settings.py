@@ -36,7 +36,9 @@ class SelectionSettings:
         InvalidInputError: a balance that does not exist, or a number that is too small.
     """
 
-    per_object: int = setting(10, "grasps of each object of a run, if there are as many", low=1)
+    per_object: int = setting(
+        10, ("number of grasps of each object of a run, if there are so many"), low=1
+    )
     balance: str = setting(
         "outcome",
         "what the grasps of an object are balanced by, as far as there are enough: outcome"
@@ -44,7 +46,9 @@ class SelectionSettings:
         " probability (success under noise, of `robustness`) or none",
         metavar="BY",
     )
-    bins: int = setting(4, "of a margin or a probability, with as many grasps each", low=1)
+    bins: int = setting(
+        4, ("number of bins of a margin or a probability, with equally many grasps each"), low=1
+    )
     among: Among = setting(
         "executed",
         "choose among grasps at which the hand is clear, that the arm can be at, or that were"
@@ -53,14 +57,14 @@ class SelectionSettings:
     )
     success: Success = setting(
         "lifted",
-        "what counts: lifted, or held, also where another object was moved",
+        "what counts as success: lifted, or held even if another object was moved",
         choices=get_args(Success),
     )
     scenes: int = setting(0, "draw N scenes (default: all)", low=1)
     blocks: int = setting(
         1, "blocks for the trials of a scene; each scene has one before any has its second", low=1
     )
-    seed: int = setting(0, "of choice and order")
+    seed: int = setting(0, "seed of selection and order")
 
     def __post_init__(self) -> None:
         kinds = [name for name in get_args(Balance) if name != "margin"]

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from burg_drake.core import Array, InvalidInputError, content_hash, grasp_from_axes, pregrasp
 from burg_drake.core.grasps import GraspSet
 from burg_drake.geometry import Surface
-from burg_drake.grasping.sampling.approach import ApproachCone, random_turns
+from burg_drake.grasping.sampling.approach import ApproachCone, random_approach_angles
 from burg_drake.grasping.sampling.contact_pairs import (
     BLOCK,
     FINGER_CLEARANCE,
@@ -263,7 +263,7 @@ def _grasps_on(
     closing, center = pairs.p_OC2 - pairs.p_OC1, 0.5 * (pairs.p_OC1 + pairs.p_OC2)
     width = np.linalg.norm(closing, axis=1)
     u, v = perpendicular(closing / width[:, None])
-    turn = random_turns(settings.approach_cones, u, v, settings.approaches, rng)
+    turn = random_approach_angles(settings.approach_cones, u, v, settings.approaches, rng)
     allowed = np.flatnonzero(~np.isnan(turn[:, 0]))
     turn = turn[allowed, :, None]
     approach = np.cos(turn) * u[allowed, None] + np.sin(turn) * v[allowed, None]
@@ -282,7 +282,7 @@ def _accepted(grasps: _Grasps, accept: Accept) -> _Grasps:
     passed = np.asarray(accept(grasps.X_OG), dtype=bool)
     if passed.shape != (len(grasps.X_OG),):
         raise InvalidInputError(
-            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has to"
-            " tell for each grasp whether to keep it"
+            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has"
+            " to say for each grasp whether to keep it"
         )
     return _Grasps(grasps.X_OG[passed], grasps.width[passed], grasps.score[passed])

@@ -55,7 +55,7 @@ class ApproachCone:
         return np.arctan2(along_v, along_u), half
 
 
-def random_turns(
+def random_approach_angles(
     cones: Sequence[ApproachCone], u: Array, v: Array, approaches: int, rng: np.random.Generator
 ) -> Array:
     """Random turns t of directions `cos(t) u + sin(t) v` that lie in every one of the cones.
@@ -77,12 +77,12 @@ def random_turns(
         return 2.0 * np.pi * first + 2.0 * np.pi * step
     share = (first + step) % 1.0
     if len(cones) > 1:
-        return _turns_in_all(cones, u, v, share)
+        return _angles_in_all(cones, u, v, share)
     middle, half = cones[0].turns(u, v)
     return middle[:, None] + half[:, None] * (2.0 * share - 1.0)
 
 
-def _turns_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Array) -> Array:
+def _angles_in_all(cones: Sequence[ApproachCone], u: Array, v: Array, share: Array) -> Array:
     """Turns (N, K) [rad] below which these shares (N, K) of the turns lie that all cones allow.
 
     The ends of the other cones' intervals cut that of the first one; whether a piece between two

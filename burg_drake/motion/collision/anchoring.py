@@ -51,7 +51,7 @@ def anchor(
     ]
     body_of: dict[GeometryId, BodyIndex] = {}
 
-    def tie(body: BodyIndex, context: CollisionCheckerContext) -> None:
+    def anchor(body: BodyIndex, context: CollisionCheckerContext) -> None:
         graph_context = context.scene_graph_context()
         X_WB = plant.EvalBodyPoseInWorld(plant_context, plant.get_body(body))
         anchored = []
@@ -67,11 +67,11 @@ def anchor(
         declaration.ExcludeBetween(GeometrySet(anchored), GeometrySet(never))
         graph.collision_filter_manager(graph_context).Apply(declaration)
 
-    def tie_all(_: RobotDiagram, context: CollisionCheckerContext) -> None:
+    def anchor_all(_: RobotDiagram, context: CollisionCheckerContext) -> None:
         for body in bodies:
-            tie(body, context)
+            anchor(body, context)
 
-    checker.PerformOperationAgainstAllModelContexts(tie_all)
+    checker.PerformOperationAgainstAllModelContexts(anchor_all)
     return body_of
 
 
@@ -99,7 +99,7 @@ def release(
     others |= {geometry for geometry, of in anchored.items() if of in ignored}
     tied = {geometry for geometry, of in anchored.items() if of == body}
 
-    def untie(_: RobotDiagram, context: CollisionCheckerContext) -> None:
+    def release(_: RobotDiagram, context: CollisionCheckerContext) -> None:
         graph_context = context.scene_graph_context()
         known = {*context.GetQueryObject().inspector().GetAllGeometryIds()}  # each has its own
         for geometry in tied & known:
@@ -112,4 +112,4 @@ def release(
         declaration.ExcludeBetween(GeometrySet(own), GeometrySet([*(others & known)]))
         graph.collision_filter_manager(graph_context).Apply(declaration)
 
-    checker.PerformOperationAgainstAllModelContexts(untie)
+    checker.PerformOperationAgainstAllModelContexts(release)

@@ -101,7 +101,7 @@ class ArmKinematics:
         infinite = np.full(len(self.lower), np.inf)
         return replace(self, lower=-infinite, upper=infinite)
 
-    def turn_around(self, posture: Array, margin: float) -> tuple[Array, Array]:
+    def one_revolution_around(self, posture: Array, margin: float) -> tuple[Array, Array]:
         """Limits for planning.
 
         Args:
@@ -118,7 +118,7 @@ class ArmKinematics:
         lower, upper = self.lower + margin, self.upper - margin
         return np.maximum(lower, posture - half), np.minimum(upper, posture + half)
 
-    def turned_near(self, q: Array, posture: Array) -> Array:
+    def wrapped_near(self, q: Array, posture: Array) -> Array:
         """Turns revolute joints by whole turns.
 
         Args:

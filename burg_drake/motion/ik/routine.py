@@ -69,7 +69,7 @@ class RoutineSolutions:
         polished, met = solve_ik(
             self._arm.unlimited(), X_AH[pose], q, iterations=ITERATIONS, tolerance=TOLERANCE
         )
-        q = self._arm.turned_near(polished, 0.5 * (self._lower + self._upper))
+        q = self._arm.wrapped_near(polished, 0.5 * (self._lower + self._upper))
         if self._limited:
             met &= ((self._lower <= q) & (q <= self._upper)).all(axis=1)
         return pose[met], q[met]
@@ -97,6 +97,6 @@ class RoutineSolutions:
             k = int(np.argmax(np.maximum(off, turned)))
             raise InvalidInputError(
                 f"the IK routine's positions {q[k].round(4).tolist()} bring the hand"
-                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees beside the pose that was"
-                " asked for; poses are of the hand body in the frame of the arm's base"
+                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees away from the"
+                " requested pose; poses are of the hand body in the frame of the arm's base"
             )

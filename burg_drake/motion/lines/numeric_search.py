@@ -175,7 +175,7 @@ class _NumericBatch:
         search = self._search
         X_AH = search.lines.X_AH(X_AG, search.layers[layer])
         pose, q = search.solutions.solve(X_AH, turn)
-        return pose, search.arm.turned_near(q, search.home)
+        return pose, search.arm.wrapped_near(q, search.home)
 
     def _follow(self, grasp: Indices, k: Indices) -> None:
         """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
@@ -287,6 +287,6 @@ class _NumericBatch:
         if not len(q):
             return Failure(Outcome.NO_IK)
         arm, margin = search.arm, search.settings.limit_margin
-        q = arm.turned_near(q, 0.5 * (arm.lower + arm.upper))
+        q = arm.wrapped_near(q, 0.5 * (arm.lower + arm.upper))
         beyond = np.maximum(arm.lower + margin - q, q - arm.upper + margin).max(axis=1)
         return Failure(Outcome.JOINT_LIMIT, excess=max(0.0, float(beyond.min())))

@@ -92,7 +92,7 @@ class ArmReach:
         self.kinematics = ArmKinematics.of(diagram)
         self.edges = EdgeChecker(self.proximity, self.collision, exact=self.settings.exact)
         home = np.array(arm.home)
-        lower, upper = self.kinematics.turn_around(home, self.settings.limit_margin)
+        lower, upper = self.kinematics.one_revolution_around(home, self.settings.limit_margin)
         focus = postures_over_objects(diagram, self.proximity.links, home, lower, upper)
         self.tree = HomeTree(self.edges, home, lower, upper, focus=focus)
         self._sweep = HandSweep(scene, station, self.motion)

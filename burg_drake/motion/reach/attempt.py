@@ -93,12 +93,12 @@ class MotionSearch:
             chains = {grasp: chain for grasp, chain in proposed.items() if chain is not None}
             found |= self._reached(self._unblocked(chains))
             for grasp in left:
-                if grasp not in found and (grasp not in chains or self._is_hopeless(grasp)):
+                if grasp not in found and (grasp not in chains or self._is_exhausted(grasp)):
                     found[grasp] = self._refused_reach(grasp)
             left = [grasp for grasp in left if grasp not in found]
         return [found[grasp] for grasp in range(len(self._task.instance))]
 
-    def _is_hopeless(self, grasp: int) -> bool:
+    def _is_exhausted(self, grasp: int) -> bool:
         """Whether so much has been tried that no more is."""
         refused = self._refused[grasp] >= self._settings.chains
         return bool(refused or self._unconnected[grasp] >= self._settings.starts_tried)

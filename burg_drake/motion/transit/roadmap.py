@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
 from burg_drake.motion.collision import EdgeChecker
-from burg_drake.motion.transit.focus import random_postures
+from burg_drake.motion.transit.object_postures import random_postures
 
 NEIGHBOURS = 6
 """Nearest nodes that a node is connected with, where the way is free."""

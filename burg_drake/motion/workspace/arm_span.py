@@ -91,7 +91,7 @@ def unreachable_objects(span: ArmSpan, scene: Scene, station: Station) -> dict[s
         beyond = span.beyond(p_WV)
         if beyond > 0.0:
             found[name] = (
-                f"{name!r} is out of every reach: it is {span.radius + beyond:.2f} m from the"
-                f" arm's shoulder, and the arm reaches {span.radius:.2f} m at most"
+                f"{name!r} is out of reach: it is {span.radius + beyond:.2f} m from the arm's"
+                f" shoulder, and the arm reaches {span.radius:.2f} m at most"
             )
     return found

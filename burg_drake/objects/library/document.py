@@ -19,8 +19,8 @@ from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import atomic_write
 from burg_drake.core.paths import (
     NO_PACKAGES,
+    may_name_packages,
     named_files,
-    names_elsewhere,
     require_name,
     require_names,
     resolve,
@@ -146,7 +146,7 @@ class ObjectLibrary:
 
     def _content(self, entry: ObjectEntry) -> str:
         model = self.root / entry.sdf
-        if not model.is_file() or not names_elsewhere(model):
+        if not model.is_file() or not may_name_packages(model):
             return entry.build
         return content_hash(entry.build, named_files(model, NO_PACKAGES))
 

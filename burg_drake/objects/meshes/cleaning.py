@@ -83,7 +83,7 @@ def _merge(result: Repaired) -> None:
         sewn.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=digits)
         if sewn.is_watertight:
             result.sentences.append(
-                f"sewed {len(mesh.vertices) - len(sewn.vertices)} nearly coincident vertices"
+                f"merged {len(mesh.vertices) - len(sewn.vertices)} nearly coincident vertices"
             )
             result.mesh = sewn
         else:

@@ -45,7 +45,7 @@ def close_openings(result: Repaired, openings: Openings, thickness: float | None
         apart = split_bodies(mesh)
         if apart is not None:
             result.mesh = apart
-            result.sentences.append("parted bodies that touch along edges")
+            result.sentences.append("separated bodies that touch along edges")
         else:
             result.sentences.append(
                 "left open, as more than two faces meet at some edges; the volume is taken from"

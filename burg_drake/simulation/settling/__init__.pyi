@@ -7,7 +7,7 @@ from .settled_scene import (
     SettledScene as SettledScene,
     settle_scene as settle_scene,
 )
-from .usual import (
+from .settling_defaults import (
     SETTLING_ENGINE as SETTLING_ENGINE,
     SETTLING_TIME as SETTLING_TIME,
 )

@@ -21,7 +21,7 @@ from burg_drake.simulation.rest import (
 )
 from burg_drake.simulation.settling.reduced_friction import reduce_friction
 from burg_drake.simulation.settling.scene_state import placed_scene
-from burg_drake.simulation.settling.usual import SETTLING_ENGINE, SETTLING_TIME
+from burg_drake.simulation.settling.settling_defaults import SETTLING_ENGINE, SETTLING_TIME
 from burg_drake.station.checks import DEEPEST, overlaps
 from burg_drake.station.diagram import (
     StationDiagram,

@@ -87,7 +87,7 @@ class LiftCarrier:
         if number != self._number:
             self._number = number
             self._X_WG_start = self._floating.X_WG(self._plant_context)
-            self._floating.turn_lift(self._plant_context, segment.direction_W)
+            self._floating.set_lift_direction(self._plant_context, segment.direction_W)
             self._trial.simulator.Initialize()
         checks = _check_count(segment.length, settings)
         top_speed = 2 * segment.length / (checks * settings.poll)

@@ -56,7 +56,7 @@ class FloatingHand(HandHandle):
         self._set_mount(plant_context, X_WG @ self._X_GH, direction_W)
         self.set_fingers(plant_context, closed)
 
-    def turn_lift(self, plant_context: Context, direction_W: Array) -> None:
+    def set_lift_direction(self, plant_context: Context, direction_W: Array) -> None:
         """Has the lift go in another direction (3,) from where the hand is, at rest there; the
         fingers stay as they are, and move on as they do."""
         self._set_mount(plant_context, self.X_WH(plant_context), direction_W)
@@ -68,7 +68,7 @@ class FloatingHand(HandHandle):
     def _set_mount(self, plant_context: Context, X_WH: Array, direction_W: Array) -> None:
         # The lift joint goes along z of its frames L: the base has the hand's position, and the
         # mount takes up the hand's orientation.
-        R_WL = RotationMatrix(_turned_from_z(direction_W))
+        R_WL = RotationMatrix(_rotation_from_z(direction_W))
         R_WH = RotationMatrix(X_WH[:3, :3])
         self._base.SetPoseInParentFrame(plant_context, RigidTransform(R_WL, X_WH[:3, 3]))
         R_HL = R_WH.inverse().multiply(R_WL)
@@ -77,10 +77,10 @@ class FloatingHand(HandHandle):
         self.lift.set_translation_rate(plant_context, 0.0)
 
 
-def _turned_from_z(u: Array) -> Array:
+def _rotation_from_z(u: Array) -> Array:
     """A rotation (3, 3) that takes z to a unit vector (3,); none for z itself."""
     if u[2] < 0.0:
-        return _turned_from_z(-u) @ np.diag([1.0, -1.0, -1.0])
+        return _rotation_from_z(-u) @ np.diag([1.0, -1.0, -1.0])
     v = np.array((-u[1], u[0], 0.0))
     cross = np.array(((0.0, -v[2], v[1]), (v[2], 0.0, -v[0]), (-v[1], v[0], 0.0)))
     turned: Array = np.eye(3) + cross + cross @ cross / (1.0 + u[2])

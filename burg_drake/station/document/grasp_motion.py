@@ -51,21 +51,26 @@ class GraspMotion:
     standoff: float = _length(
         0.10,
         "standoff",
-        "straight path in along the approach, from the pregrasp to the grasp",
+        "length of the straight approach, from the pregrasp to the grasp",
     )
     retreat: float = _length(
-        0.0, "retreat", "path back along the approach with the object, before the lift"
+        0.0,
+        "retreat",
+        (
+            "length of the straight retreat with the object, back along the approach, before the"
+            " lift"
+        ),
     )
     lift_height: float = _length(0.30, "lift_height", "length of the lift", "lift_mm")
     least_lift: float | None = _length(
         None,
         "least_lift",
         "lift as far as there is room, at most by {lift_height} and at least by this; the column"
-        " lift_height tells how far",
+        " lift_height has the length",
     )
     lift_direction: Vector3 = setting(
         (0.0, 0.0, 1.0),
-        "of the lift in the world, of any length; 0 0 1 is up",
+        "direction of the lift in the world, of any length; 0 0 1 is up",
         metavar=("X", "Y", "Z"),
     )
 
@@ -89,8 +94,8 @@ class GraspMotion:
         shortest = self.retreat + self.shortest
         if shortest < SHORTEST:
             raise FieldError(
-                f"retreat and lift together may be as short as {1e3 * shortest:g} mm; the hand"
-                f" has to go {1e3 * SHORTEST:g} mm at least with the object",
+                f"retreat and lift together may be only {1e3 * shortest:g} mm; the hand has to"
+                f" go {1e3 * SHORTEST:g} mm at least with the object",
                 "least_lift" if self.least_lift is not None else "lift_height",
             )
 

@@ -171,8 +171,8 @@ def _description(view: SessionView) -> str:
         return all_of(
             box(
                 quiet(
-                    "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag beside"
-                    " objects selects all in a rectangle."
+                    "Nothing is selected. Click an object; Ctrl-click adds one, Shift-drag on"
+                    " free space selects all in a rectangle."
                 )
             )
         )

@@ -73,7 +73,7 @@ class ReachPanel:
         if station.document.arm is None:
             self._show_line("The station has no arm.")
             return
-        self._show_line("Computing, the first time for half a minute ...")
+        self._show_line("Computing; the first time takes half a minute ...")
         self._job = self._worker.submit(ReachTask(station, *asked), self._on_job_change)
 
     def _discard(self) -> None:
@@ -102,7 +102,7 @@ class ReachPanel:
         width, depth = self._actions.session.view.document.board.size
         pixels = reach_image(layer, pixels=PIXELS)
         self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), OPACITY))
-        share = f"Some rotation of the hand reaches {layer.covered:.0%} of the board."
+        share = f"Some orientation of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = all_of(box(reachability_key(), quiet(share)))
 
     def _show_line(self, line: str) -> None:

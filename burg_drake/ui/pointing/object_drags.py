@@ -78,52 +78,52 @@ class ObjectDrags:
 
     def _follow(self, event: Any, name: str, *, turns: bool) -> None:
         """Takes what has happened on a page as an action; the event loop goes on at once."""
-        client, who = event.client, event.client_id
+        client, client_id = event.client, event.client_id
         x = float(event.end_screen_pos[0])
         if event.phase == "start":
             p_SG = np.array(event.start_position)
-            self._actions.submit(lambda: self._begin(who, name, p_SG, x), client)
+            self._actions.submit(lambda: self._begin(client_id, name, p_SG, x), client)
         elif event.phase == "update":
             camera, p_SQ = PageCamera.of(client.camera), np.array(event.end_position)
             self._actions.submit(
-                lambda: self._turn(who, x) if turns else self._move(who, camera, p_SQ),
+                lambda: self._turn(client_id, x) if turns else self._move(client_id, camera, p_SQ),
                 client,
-                key=f"drag {who}",
+                key=f"drag {client_id}",
             )
         else:
-            self._actions.submit(lambda: self._end(who), client)
+            self._actions.submit(lambda: self._end(client_id), client)
 
-    def _begin(self, who: int, name: str, p_SG: Array, x: float) -> None:
-        self._end(who)
+    def _begin(self, client_id: int, name: str, p_SG: Array, x: float) -> None:
+        self._end(client_id)
         view = self._actions.session.view
         names = view.selection if name in view.selection else (name,)
         X_SO = {held: view.X_SO(held) for held in names}
         drag = self._actions.session.drag(names)
-        self._held[who] = _Held(drag, X_SO, mean_center(view, names), p_SG, x)
+        self._held[client_id] = _Held(drag, X_SO, mean_center(view, names), p_SG, x)
 
-    def _move(self, who: int, camera: PageCamera, p_SQ: Array) -> None:
-        held = self._held.get(who)
+    def _move(self, client_id: int, camera: PageCamera, p_SQ: Array) -> None:
+        held = self._held.get(client_id)
         if held is None:
             return
         p_SP = camera.on_plane(p_SQ, held.p_SG, UP)
         if p_SP is not None:
-            self._carry(who, held, make_pose(p_AB=p_SP - held.p_SG))
+            self._carry(client_id, held, make_pose(p_AB=p_SP - held.p_SG))
 
-    def _turn(self, who: int, x: float) -> None:
-        held = self._held.get(who)
+    def _turn(self, client_id: int, x: float) -> None:
+        held = self._held.get(client_id)
         if held is not None:
             R = rot_z(FULL_TURN * (x - held.x))
-            self._carry(who, held, motion_about(held.p_SM, R, np.zeros(3)))
+            self._carry(client_id, held, motion_about(held.p_SM, R, np.zeros(3)))
 
-    def _carry(self, who: int, held: _Held, X: Array) -> None:
+    def _carry(self, client_id: int, held: _Held, X: Array) -> None:
         """Holds what is dragged where a motion (4, 4) in S brings it from the start."""
         try:
             held.drag.move({name: X @ X_SO for name, X_SO in held.X_SO.items()})
         except BurgError:
-            self._held.pop(who, None)  # told once; the rest of the gesture is nothing any more
+            self._held.pop(client_id, None)  # one error; the rest of the gesture is ignored
             raise
 
-    def _end(self, who: int) -> None:
-        held = self._held.pop(who, None)
+    def _end(self, client_id: int) -> None:
+        held = self._held.pop(client_id, None)
         if held is not None and not held.drag.is_over:
             held.drag.end()

@@ -118,6 +118,6 @@ class Admission:
 
 
 NO_TOKEN = (
-    "this page opens by the address with a token that burg-drake printed last; each opens it in one"
-    " browser"
+    "open this page by the address with a token that burg-drake printed last; each address works"
+    " in one browser"
 )

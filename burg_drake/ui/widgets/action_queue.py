@@ -106,7 +106,7 @@ class ActionQueue:
             except BurgError as error:
                 self._on_error(asked.who, str(error))
             except Exception as error:  # the page goes on, whatever one action stumbled over
-                _log.exception("the setup page could not do what it was asked")
+                _log.exception("an action of the setup page failed")
                 self._on_error(asked.who, f"that failed unexpectedly: {error!r}")
 
     def _last(self, *, wait_for_typing: bool) -> _QueuedAction | None:

@@ -56,7 +56,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("redo", "Y", "cmd/ctrl", "Redo"),
     Shortcut("save", "S", "cmd/ctrl", "Save the scene"),
     Shortcut("all", "A", "cmd/ctrl", "Select all objects"),
-    Shortcut("none", "escape", None, "Select nothing, or put back what is dragged"),
+    Shortcut("none", "escape", None, "Select nothing, or cancel a drag"),
     Shortcut("delete", "delete", None, "Delete what is selected"),
     Shortcut("delete", "backspace", None, "Delete what is selected"),
     Shortcut("duplicate", "D", "cmd/ctrl", "Duplicate what is selected"),
@@ -81,12 +81,12 @@ SHORTCUTS: tuple[Shortcut, ...] = (
 )
 
 MOUSE: tuple[tuple[str, str], ...] = (
-    ("Click", "Select an object; beside all objects: none"),
-    ("Ctrl+click", "Select one more, or one less"),
-    ("Shift+drag beside objects", "Select all in a rectangle"),
+    ("Click", "Select an object; on free space: none"),
+    ("Ctrl+click", "Add an object to the selection, or remove it"),
+    ("Shift+drag on free space", "Select all in a rectangle"),
     ("Drag an object", "Move it, and all that is selected with it, over the board"),
     ("Shift+drag an object", "Turn it about the vertical"),
-    ("Drag beside objects, wheel, right drag", "Turn the view, come nearer, shift the view"),
+    ("Drag on free space, wheel, right drag", "Rotate, zoom and shift the view"),
 )
 
 Call = Callable[[viser.ClientHandle | None], Any]

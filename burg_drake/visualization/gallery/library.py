@@ -9,7 +9,7 @@ from pydrake.geometry import Meshcat, Rgba
 
 from burg_drake.core import InvalidInputError
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.visualization.gallery.exhibit import (
+from burg_drake.visualization.gallery.gallery_object import (
     LINE,
     ROOT,
     STRETCH,
@@ -74,14 +74,14 @@ def show_library(
     entries = [library.entry(name) for name in chosen]
     unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
     contact = hydroelastic_meshes(library, chosen)
-    exhibits = [prepare_object(library, name, contact[name], unit) for name in chosen]
-    layout = lay_out([e.row for e in exhibits], unit, STRETCH * LINE * unit)
-    for exhibit, placed in zip(exhibits, layout.rows, strict=True):
-        draw_object(meshcat, exhibit, placed, unit)
+    objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
+    layout = lay_out([e.row for e in objects], unit, STRETCH * LINE * unit)
+    for item, placed in zip(objects, layout.rows, strict=True):
+        draw_object(meshcat, item, placed, unit)
     for k, bank in enumerate(layout.banks):
         draw_slab(meshcat, f"{ROOT}/floor/{k}", bank, -TILE_HEIGHT, FLOOR)
     aim(meshcat, layout)
-    return _legend(exhibits)
+    return _legend(objects)
 
 
 def aim(meshcat: Meshcat, layout: GalleryLayout) -> None:
@@ -99,8 +99,8 @@ def aim(meshcat: Meshcat, layout: GalleryLayout) -> None:
     meshcat.SetProperty(lamp, "angle", LAMP_ANGLE)
 
 
-def _legend(exhibits: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
-    compliant = any(mesh.compliant for e in exhibits for mesh in e.contact)
+def _legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
+    compliant = any(mesh.compliant for e in objects for mesh in e.contact)
     contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
     red = "#" + "".join(f"{round(255 * c):02x}" for c in HIGH_PRESSURE)
     return (

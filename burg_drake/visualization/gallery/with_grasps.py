@@ -13,7 +13,7 @@ from burg_drake.core import Array, make_pose, rot_z
 from burg_drake.core.grasps import GraspSet
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.visualization.gallery.exhibit import (
+from burg_drake.visualization.gallery.gallery_object import (
     CAPTION,
     LINE,
     ROOT,

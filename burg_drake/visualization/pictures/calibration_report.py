@@ -190,8 +190,8 @@ def _uncertainty(calibration: Calibration) -> tuple[Html, str]:
     shades = np.clip(of_cells / max(1.0, of_cells.max()), 0.0, 1.0).reshape(CELLS)
     drawn = _cells(calibration, shades, [f"{value:.2f}" for value in of_cells.tolist()], ACCENT)
     return drawn, (
-        "How far the camera model may be off, as the scatter of the residuals shows it [pixels];"
-        f" {worst:.2f} at worst, at the edge."
+        "How far the camera model may be off, estimated from the scatter of the residuals"
+        f" [pixels]; {worst:.2f} at worst, at the edge."
     )
 
 

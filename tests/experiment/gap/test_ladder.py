@@ -176,9 +176,9 @@ def test_options_of_a_scene_are_refused_with_a_run(
 ) -> None:
     words = ["gap", str(ladder.steps[0].runs[0].path), "-o", str(tmp_path / "out")]
     assert main([*words, "--engine", "standard"]) == 2
-    assert "--engine is about a scene;" in capsys.readouterr().err
+    assert "--engine is for scenes;" in capsys.readouterr().err
     assert main([*words, "--lift-mm", "100"]) == 2
-    assert "--lift-mm is about a scene;" in capsys.readouterr().err
+    assert "--lift-mm is for scenes;" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -58,8 +58,8 @@ POLICY = (
 KEPT = "private, max-age=86400"
 """Of pictures of grasps, whose addresses name the plan."""
 NO_TOKEN = (
-    "this page opens by the address with a token that burg-drake printed last; each opens it in one"
-    " browser"
+    "open this page by the address with a token that burg-drake printed last; each address works"
+    " in one browser"
 )
 
 

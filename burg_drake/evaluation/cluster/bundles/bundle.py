@@ -133,10 +133,10 @@ def require_content(bundle: Bundle, scene: Scene, station: Station) -> None:
     ):
         if there != here:
             raise InvalidInputError(
-                f"the {kind} of {scene.name!r} on {station.name!r} changed on the way to a worker:"
-                f" content {there[:12]} was sent, {here[:12]} has arrived; a model names files by"
-                " a way that does not hold there, such as a link to another folder or an absolute"
-                " path, or the worker has another release of burg_drake"
+                f"the {kind} of {scene.name!r} on {station.name!r} changed on the way to a"
+                f" worker: content {there[:12]} was sent, {here[:12]} has arrived; a model names"
+                " files by a path that is not valid there, such as a link to another folder or"
+                " an absolute path, or the worker has another release of burg_drake"
             )
 
 

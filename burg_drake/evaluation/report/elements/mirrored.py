@@ -103,7 +103,7 @@ def _axis(focus: Array, limit: Limit | None) -> _Axis:
     return _Axis(step * max(1, math.ceil(top / step + 1e-9)), step)
 
 
-def _bars(series: Sequence[Series], axis: _Axis, base: float, way: int) -> list[Html]:
+def _bars(series: Sequence[Series], axis: _Axis, base: float, sign: int) -> list[Html]:
     """Bars of one half; `way` is 1 downward."""
     edges = axis.edges
     inside = [np.histogram(s.values, edges)[0] for s in series]
@@ -120,16 +120,16 @@ def _bars(series: Sequence[Series], axis: _Axis, base: float, way: int) -> list[
         for s, n in zip(series, column, strict=True):
             if n:
                 near, far = (BAR * m / highest for m in (below, below + n))
-                y = base + near if way > 0 else base - far
+                y = base + near if sign > 0 else base - far
                 tip = element("title", f"{s.name}: {n}, {where}")
                 place = {"x": f"{left:.2f}", "y": f"{y:.2f}"}
                 span = {"width": f"{right - left:.2f}", "height": f"{far - near:.2f}"}
                 bars.append(element("rect", tip, **place, **span, class_=s.style))
             below += n
         if k == BINS and below:
-            y = base + way * (BAR * below / highest + 3) + (8 if way > 0 else 0)
+            y = base + sign * (BAR * below / highest + 3) + (8 if sign > 0 else 0)
             bars.append(element("text", format_count(below), x=right, y=f"{y:.1f}", class_="end"))
-    y = base + way * BAR
+    y = base + sign * BAR
     bars.append(element("text", format_count(highest), x=LEFT - 4, y=y, dy="0.35em", class_="end"))
     return bars
 

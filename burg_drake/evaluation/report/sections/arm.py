@@ -44,13 +44,13 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
             rows.append(element("tr", name, *cells, element("td", MEANING.get(outcome, "")), way))
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
-        f"Of {clear} grasps at which the open hand is clear, the arm can execute {planned}{share}:"
-        " along a collision-free path from home to the pregrasp, straight to the grasp, and"
-        " straight up with the object, or as the motion says. The others end at the first thing"
-        " that fails."
+        f"Of {clear} grasps at which the open hand is clear, the arm can execute"
+        f" {planned}{share}: along a collision-free path from home to the pregrasp, straight to"
+        " the grasp, and straight up with the object, or as the motion says. The others end at"
+        " the first thing that fails."
     )
-    head = ["outcome", "grasps", "of clear", "what it means", "mostly in the way"]
-    return folded("What hindered the arm", text, table(head, rows, numbers=(1, 2)) if rows else "")
+    head = ["outcome", "grasps", "of clear", "what it means", "main obstacles"]
+    return folded("What stopped the arm", text, table(head, rows, numbers=(1, 2)) if rows else "")
 
 
 def _blockers(columns: Columns, outcome: Outcome) -> str:
@@ -77,7 +77,7 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
             numbers = [element("td", cell, class_="number") for cell in cells]
             rows.append(element("tr", element("th", label, scope="row"), *numbers))
     touches = Counter(t for t in columns["touched"].tolist() if t)
-    text = "How well the simulated arm kept to its plans, under its torque limits."
+    text = "How well the simulated arm followed its plans within its torque limits."
     text += f" {summary.pushes}" if summary.pushes else ""
     if touches:
         found = ", ".join(f"{name} ({count})" for name, count in touches.most_common(BLOCKERS))

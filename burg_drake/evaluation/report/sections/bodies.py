@@ -37,8 +37,8 @@ def collision_section(columns: Columns) -> Html | None:
     head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
     return folded(
         "Start collisions",
-        "What the open hand is in at the grasp, and how far it would have to move back. A grasp"
-        " counts for one body, even if the hand is in several.",
+        "What the open hand overlaps at the grasp, and how far it would have to move back. A"
+        " grasp counts for one body, even if the hand overlaps several.",
         table(head, rows, numbers=(1, 2, 3, 4, 5)),
     )
 
@@ -57,7 +57,15 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
     if not names:
         return None
     limit = f"over {disturbance * 1e3:g} mm"
-    head = ["object", "trials on others", "moved", limit, "median", "farthest", "mostly by trials"]
+    head = [
+        "object",
+        "trials on others",
+        "moved",
+        limit,
+        "median",
+        "farthest",
+        ("main causes: trials"),
+    ]
     rows = []
     for name in names:
         far = moved[name]

@@ -11,8 +11,8 @@ from burg_drake.visualization.style import GROUPS, group_of
 MEANING = {
     "candidates": "grasps that were judged",
     "clear": "the open hand overlaps nothing",
-    "reachable": "hand and arm can be at the grasp",
-    "planned": "the arm can go there and lift",
+    "reachable": "hand and arm reach the grasp",
+    "planned": "the arm has a path there and for the lift",
     "executed": "the trial was simulated to its end",
     "held": "both fingers hold the object to the end",
     "lifted": "and nothing else was disturbed",

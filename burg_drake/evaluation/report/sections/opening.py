@@ -92,8 +92,8 @@ def _losses(summary: Summary) -> str:
     """What was lost before the trial, by stage."""
     words = {
         "clear": "the open hand collides",
-        "reachable": "hand or arm cannot be there",
-        "planned": "the arm has no path",
+        "reachable": "hand or arm cannot reach it",
+        "planned": "the arm finds no path",
         "executed": "the simulation failed",
     }
     counts = [

@@ -43,9 +43,9 @@ def reachability_section(run: Run) -> Html | None:
     return section(
         "Reach of the arm",
         f"Which share of {count} hand orientations, straight down and tilted by up to"
-        f" {steepest:g} degrees to all sides, the arm reaches over the board without colliding with"
-        " itself and the station. Outlines show where the objects stand, which are not in the way"
-        " here; the arm's way to a place is not asked for.",
+        f" {steepest:g} degrees to all sides, the arm reaches over the board without colliding"
+        " with itself and the station. Outlines show where the objects stand, which are not"
+        " obstacles here; paths to these poses are not searched for.",
         element("div", *charts, class_="charts"),
         reachability_key(),
     )

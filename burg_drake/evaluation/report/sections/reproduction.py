@@ -53,13 +53,16 @@ def repeat_section(run: Run) -> Html:
 
 
 def provenance(run: Run) -> Html:
-    """All inputs with their hashes, settings, versions, stretches and files."""
-    facts = [*_inputs(run.document), *_settings(run.document), *_stretches(run.document)]
+    """All inputs with their hashes, settings, versions, sessions and files."""
+    facts = [*_inputs(run.document), *_settings(run.document), *_sessions(run.document)]
     files = (
         f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
         f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
     )
-    text = "Everything that decides about the results, who judged when, and what is in the folder."
+    text = (
+        "All inputs of the results, the sessions in which they were judged, and the files of the"
+        " folder."
+    )
     return folded("All settings and versions", text, _list([*facts, ("files", files)]))
 
 
@@ -90,9 +93,11 @@ def campaign_facts(campaign: Campaign) -> Html:
             for folder, content in document.libraries.items()
         ),
         *_settings(document),
-        *_stretches(document),
+        *_sessions(document),
     ]
-    text = "Everything that decides about the results but the scenes, and who judged when."
+    text = (
+        "All inputs of the results except the scenes, and the sessions in which they were judged."
+    )
     return folded("All settings and versions", text, _list(facts))
 
 
@@ -172,12 +177,12 @@ def _listed(settings: dict[str, float]) -> str:
     return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
 
 
-def _stretches(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+def _sessions(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     lines = []
-    for stretch in document.stretches:
-        judged = "interrupted" if stretch.judged is None else f"{stretch.judged} grasps"
-        took = "" if stretch.seconds is None else f" in {format_duration(stretch.seconds)}"
-        plural = "" if stretch.workers == 1 else "s"
-        text = f"{stretch.started}: {judged}{took}, {stretch.workers} worker{plural}"
+    for session in document.stretches:
+        judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
+        took = "" if session.seconds is None else f" in {format_duration(session.seconds)}"
+        plural = "" if session.workers == 1 else "s"
+        text = f"{session.started}: {judged}{took}, {session.workers} worker{plural}"
         lines.append(("judged", text))
     return [*lines, ("command", document.command)]

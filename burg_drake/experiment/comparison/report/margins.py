@@ -27,10 +27,10 @@ def margin_section(judged: Judgement) -> Html | None:
     plots = [reliability_plot(c, "actual success") for c in found[:MOST_PLOTS]]
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
-        "AUROC: of a grasp that succeeded and one that failed, how often the first has the better"
-        " margin (↑ the larger, ↓ the smaller); one half says nothing. Dots: share of successes"
-        f" among {trials} in bins of about equally many trials, with Wilson's intervals; line: the"
-        " monotone curve that fits best; dashes: all of them."
+        "AUROC: of a grasp that succeeded and one that failed, how often the first has the"
+        " better margin (↑ the larger, ↓ the smaller); one half means no information. Dots:"
+        f" share of successes among {trials} in bins of about equally many trials, with Wilson's"
+        " intervals; line: the monotone curve that fits best; dashes: all of them."
     )
     return section(
         "Do margins predict success?",

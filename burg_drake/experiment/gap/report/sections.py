@@ -137,7 +137,7 @@ def _objects_table(change: Change) -> Html | None:
         for name, count in lost.most_common()
         for into in [Counter(m.after for m in change.lost if m.object == name)]
     ]
-    return table(["object", "lost", "what they turn into"], rows, numbers=(1,))
+    return table(["object", "lost", "what they become"], rows, numbers=(1,))
 
 
 def _listing(change: Change) -> Html:
@@ -147,7 +147,7 @@ def _listing(change: Change) -> Html:
     first = shlex.join(replay_command(moves[0].run, moves[0].grasp))
     more = f", the first {ROWS} of {len(moves)}" if len(moves) > ROWS else ""
     inside = join(
-        element("p", "Any of them can be watched; replay shows again what was in the way:"),
+        element("p", "Any of them can be watched; replay repeats what was in the way:"),
         command(first),
         table(["grasp", "before", "after", "in the way", "command"], rows),
     )

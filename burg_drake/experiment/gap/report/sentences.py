@@ -49,19 +49,19 @@ def _sentence(change: Change, document: GapDocument) -> str:
     won = f", {len(change.won)} {_are(len(change.won))} won" if change.won else ""
     if change.step == "reach":
         return (
-            f"Of these {whole}, {lost}{share} {_are(lost)} lost to the arm{_why(change)}{won};"
+            f"Of these {whole}, {lost}{share} {_are(lost)} lost to the arm{_causes(change)}{won};"
             f" {left} {_are(left)} left."
         )
     if change.step == "arm":
         return (
             f"Of these {whole}, {lost}{share} {_are(lost)} lost when the whole arm executes them"
-            f"{_why(change)}{won}; {left} {_are(left)} left."
+            f"{_causes(change)}{won}; {left} {_are(left)} left."
         )
     low, high = change.share_lost
     return (
         f"When objects stand {_noise(document)} from where they should be (standard deviations),"
         f" {format_percent(lost / whole)} of the {whole} trials of these grasps in"
-        f" {document.samples} displaced scenes fail{_why(change)}; the 95 % interval is"
+        f" {document.samples} displaced scenes fail{_causes(change)}; the 95 % interval is"
         f" {100 * low:.0f} to {100 * high:.0f} %."
     )
 
@@ -74,7 +74,7 @@ def _noise(document: GapDocument) -> str:
     return f"{document.place_mm:g} mm along x and y and {document.turn_deg:g} degrees"
 
 
-def _why(change: Change) -> str:
+def _causes(change: Change) -> str:
     """The outcomes that successes turn into, most frequent first."""
     into = Counter(move.after for move in change.lost)
     parts = [f"{count} {words(outcome)}" for outcome, count in into.most_common(4)]

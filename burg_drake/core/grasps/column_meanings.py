@@ -51,68 +51,70 @@ _VERDICT = _meanings(TextField)
 
 _MARGINS = {
     **_meanings(MarginsField),
-    "friction": Column(PLAIN, "coefficient of the target; empty in results: the library's"),
-    "mass": Column("kg", "of the target; empty in results: the library's"),
+    "friction": Column(
+        PLAIN, ("friction coefficient of the target; empty in results: the library's")
+    ),
+    "mass": Column("kg", "mass of the target; empty in results: the library's"),
     "cpu": Column("s", "CPU time of all stages"),
     **_meanings(StagesField),
 }
 
 _ORIGIN = {
-    "seed": Column(PLAIN, "of the sampling, in robustness tables of the perturbations"),
-    "engine": Column(TEXT, "preset of the time stepping; marked if its values were changed"),
-    "run": Column(TEXT, "short hash of all that decides about results; hash in run.yaml"),
-    "scene": Column(TEXT, "where the scene was, or the name of a built-in one"),
+    "seed": Column(PLAIN, "seed of the sampling, in robustness tables of the perturbations"),
+    "engine": Column(TEXT, "engine preset; marked if its settings were changed"),
+    "run": Column(TEXT, "short hash of everything that determines the results; hash in run.yaml"),
+    "scene": Column(TEXT, "path of the scene, or the name of a built-in one"),
     "scene_content": Column(TEXT, "content hash of the scene with its objects"),
-    "station": Column(TEXT, "where the station was, or the name of a built-in one"),
+    "station": Column(TEXT, "path of the station, or the name of a built-in one"),
     "station_content": Column(TEXT, "content hash of the station with its models"),
-    "mode": Column(TEXT, "what was asked of each grasp: hand, reach or arm"),
-    "engine_settings": Column(TEXT, "of the engine as NAME=VALUE, SI units"),
-    "trial_settings": Column(TEXT, "of the trial's phases as NAME=VALUE, SI units"),
-    "versions": Column(TEXT, "of software and machine as NAME=VALUE"),
+    "mode": Column(TEXT, "how each grasp was judged: hand, reach or arm"),
+    "engine_settings": Column(TEXT, "settings of the engine as NAME=VALUE, SI units"),
+    "trial_settings": Column(TEXT, "settings of the trial's phases as NAME=VALUE, SI units"),
+    "versions": Column(TEXT, "versions of software and machine as NAME=VALUE"),
 }
 
 _ROBUSTNESS = {
-    "friction_min": Column(PLAIN, "smallest coefficient that lifts; 0 below what was tried"),
+    "friction_min": Column(
+        PLAIN, ("smallest friction coefficient that lifts; 0 if it is below all that were tried")
+    ),
     "repeats": Column(PLAIN, "number of perturbed repeats"),
-    "lifted": Column(PLAIN, "how many perturbed repeats lifted"),
+    "lifted": Column(PLAIN, "number of perturbed repeats that lifted"),
     "success": Column(PLAIN, "share of the perturbed repeats that lifted"),
     "success_low": Column(PLAIN, "lower end of Wilson's 95 % interval of that share"),
     "success_high": Column(PLAIN, "upper end of Wilson's 95 % interval of that share"),
     "failed": Column(TEXT, "tests that could not be simulated"),
-    "settings": Column(TEXT, "of the tests as NAME=VALUE, SI units"),
+    "settings": Column(TEXT, "settings of the tests as NAME=VALUE, SI units"),
 }
 
 _QUALITY = {
     "force_closure": Column(PLAIN, "1 if the contacts' line lies within both friction cones"),
-    "friction_needed": Column(PLAIN, "coefficient from which on it would"),
-    "antipodal_angle": Column("rad", "largest angle of closing direction and inward normal"),
-    "slide": Column(
-        "m", "distance that the object slides in the hand until it is held; inf if never"
-    ),
+    "friction_needed": Column(PLAIN, "smallest coefficient for force closure"),
+    "antipodal_angle": Column("rad", "largest angle between closing direction and inward normal"),
+    "slide": Column("m", "distance that the object slides in the hand until held; inf if never"),
     "epsilon": Column(PLAIN, "radius of the largest ball within the wrench space"),
-    "volume": Column(PLAIN, "of the wrench space"),
+    "volume": Column(PLAIN, "volume of the wrench space"),
     "load_margin": Column(
         "weights",
-        "force that the grip bears in the worst direction; below 1 the object's weight may"
+        "force that the grip withstands in the worst direction; below 1 the object's weight may"
         " turn it in the hand, which need not be a drop",
     ),
     "gravity_margin": Column(
         "weights",
-        "force that the grip bears along gravity; below 1 the object begins to turn in the"
+        "force that the grip withstands along gravity; below 1 the object begins to turn in the"
         " hand, which need not be a drop",
     ),
     "contact_offset": Column("m", "distance of the centre of mass from the contacts' line"),
     "nearest": Column(TEXT, "the body that the open hand is nearest to, or overlaps"),
     "screened": Column(TEXT, "clear, or the collision of the open hand"),
-    "collides_with": Column(TEXT, "the body that it collides with"),
+    "collides_with": Column(TEXT, "the body that the open hand collides with"),
 }
 
 _FOREIGN = {
-    "pregrasp_width": Column("m", "distance between the pads with which the hand arrives"),
+    "pregrasp_width": Column("m", "distance between the pads at the pregrasp"),
     "object_in_gripper": Column(PLAIN, "label: 1 if the grasp holds its object, 0 if not"),
     "label": Column(PLAIN, "of VGN and GIGA: 1 if the grasp holds its object, 0 if not"),
     "scene_id": Column(TEXT, "of VGN and GIGA: the scene of a grasp"),
-    "height": Column("m", "of GraspNet-1Billion: of the fingers"),
+    "height": Column("m", "of GraspNet-1Billion: height of the fingers"),
     "depth": Column("m", "of GraspNet-1Billion: how far the fingers reach beyond the centre"),
     "object_id": Column(PLAIN, "of GraspNet-1Billion: number of the object"),
     "name": Column(TEXT, "of Isaac Sim: the grasp's name in its file"),
@@ -132,10 +134,12 @@ GROUPS: Mapping[str, Mapping[str, Column]] = {
 FAMILIES: Mapping[str, Column] = {
     **_meanings(InstancesField),
     **_meanings(JointsField),
-    "tug_AXIS_g": Column("g", "acceleration along an axis of G that the grip bears; or inf"),
+    "tug_AXIS_g": Column("g", "acceleration along an axis of G that the grip withstands; or inf"),
     "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
-    "shake_AXIS_g": Column("g", "amplitude of an oscillation along an axis of G that it bears"),
-    "n_OUTCOME": Column(PLAIN, "how many perturbed repeats ended so"),
+    "shake_AXIS_g": Column(
+        "g", ("amplitude of an oscillation along an axis of G that the grip withstands")
+    ),
+    "n_OUTCOME": Column(PLAIN, "number of perturbed repeats with this outcome"),
 }
 """Columns whose names have a part that differs, written in capitals."""
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from burg_drake.motion.ik.links import ArmLinks
-from burg_drake.motion.transit.focus import COSINE, FARTHEST, NEAREST, postures_over_objects
+from burg_drake.motion.transit.object_postures import (
+    COSINE,
+    FARTHEST,
+    NEAREST,
+    postures_over_objects,
+)
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import load_station

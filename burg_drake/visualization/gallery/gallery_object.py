@@ -142,30 +142,30 @@ def _touching(entry: ObjectEntry) -> str:
 
 
 def draw_object(
-    meshcat: Meshcat, exhibit: GalleryObject, placed: PlacedGalleryRow, unit: float
+    meshcat: Meshcat, shown: GalleryObject, placed: PlacedGalleryRow, unit: float
 ) -> None:
-    name = exhibit.name
-    write_label(meshcat, f"{ROOT}/labels/{name}", exhibit.label, placed.p_WL)
-    poses = [f"poses/{name}/{k}" for k in range(len(exhibit.R_WO_poses))]
+    name = shown.name
+    write_label(meshcat, f"{ROOT}/labels/{name}", shown.label, placed.p_WL)
+    poses = [f"poses/{name}/{k}" for k in range(len(shown.R_WO_poses))]
     homes = [f"{ROOT}/{home}" for home in (*(f"{c}/{name}" for c in COLUMNS), *poses)]
     for k, (home, p_WI) in enumerate(zip(homes, placed.p_WI, strict=True)):
         resting = k - len(COLUMNS)
-        R_WO = exhibit.R_WO if resting < 0 else exhibit.R_WO_poses[resting]
+        R_WO = shown.R_WO if resting < 0 else shown.R_WO_poses[resting]
         lift = np.zeros(3)
         if home == f"{ROOT}/pieces/{name}":
-            _draw_pieces(meshcat, f"{home}/object", exhibit.pieces)
+            _draw_pieces(meshcat, f"{home}/object", shown.pieces)
         elif home == f"{ROOT}/contact/{name}":
-            _draw_contact(meshcat, f"{home}/object", exhibit.contact, R_WO)
+            _draw_contact(meshcat, f"{home}/object", shown.contact, R_WO)
         else:
-            meshcat.SetObject(f"{home}/object", exhibit.visual)
+            meshcat.SetObject(f"{home}/object", shown.visual)
         if resting >= 0:
-            item, margin = exhibit.row.rest[resting], TILE_MARGIN * unit
+            item, margin = shown.row.rest[resting], TILE_MARGIN * unit
             bounds = np.array([item.lower[:2] - margin, item.upper[:2] + margin]) + p_WI[:2]
             draw_slab(meshcat, f"{home}/ground", bounds, 0.0, TILE)
             lift[2] = TILE_HEIGHT
         X_WO = RigidTransform(RotationMatrix(R_WO), p_WI + lift)
         meshcat.SetTransform(f"{home}/object", X_WO)
-        caption, width = exhibit.captions[k]
+        caption, width = shown.captions[k]
         write_label(
             meshcat, f"{home}/caption", caption, placed.captions[k] - (width / 2.0, 0.0, 0.0)
         )

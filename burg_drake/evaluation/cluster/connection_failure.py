@@ -9,7 +9,7 @@ TRY = 2.0
 """Time to try whether anybody listens [s]."""
 
 
-def why_unreached(where: object, error: BaseException) -> str:
+def unreached_reason(where: object, error: BaseException) -> str:
     """A reason in one line.
 
     Args:
@@ -31,8 +31,8 @@ def why_unreached(where: object, error: BaseException) -> str:
     except OSError as refused:
         return refused.strerror or words
     return (
-        f"somebody listens there who does not answer as a scheduler with {parts.scheme}:// does"
-        f" ({words})"
+        f"something listens there, but does not answer as a scheduler with {parts.scheme}://"
+        f" does ({words})"
     )
 
 

@@ -16,7 +16,7 @@ class GivenWork:
     """What a worker was given in one piece.
 
     Attributes:
-        lane: the worker.
+        slot: the worker.
         job: what it belongs to.
         grasps: one to be judged, some to be screened, or none to build the judge.
         screening: whether they are screened.
@@ -24,7 +24,7 @@ class GivenWork:
         stage: the last one that began.
     """
 
-    lane: Lane
+    slot: WorkerSlot
     job: OpenJob
     grasps: tuple[Grasp, ...]
     screening: bool = False
@@ -37,7 +37,7 @@ class GivenWork:
 
 
 @dataclass(eq=False)
-class Lane:
+class WorkerSlot:
     """A worker.
 
     Attributes:

@@ -35,13 +35,13 @@ from burg_drake.station.document import StationDocument
 
 
 def write_united(
-    runs: Sequence[Run], beside: Path, folder: Path, shard: str | None = None
+    runs: Sequence[Run], staging: Path, folder: Path, shard: str | None = None
 ) -> JournalChoice:
     """Writes a united run, but for what is made from its journal.
 
     Args:
         runs: of one scene.
-        beside: an empty folder to write it to.
+        staging: an empty folder to write it to.
         folder: where it is to be, which references have to fit.
         shard: that the united run is; what all of them are if None.
 
@@ -58,8 +58,8 @@ def write_united(
     ids = share(first.candidates.id, shard)
     journals = [run.path / JOURNAL_FILE for run in runs]
     choice = choose(journals, ids)
-    shutil.copyfile(first.path / GRASPS_FILE, beside / GRASPS_FILE)
-    with (beside / JOURNAL_FILE).open("wb") as stream:
+    shutil.copyfile(first.path / GRASPS_FILE, staging / GRASPS_FILE)
+    with (staging / JOURNAL_FILE).open("wb") as stream:
         stream.writelines(chosen_lines(journals, choice))
         stream.flush()
         os.fsync(stream.fileno())
@@ -68,8 +68,8 @@ def write_united(
         shard=shard,
         stretches=all_sessions([run.document.stretches for run in runs]),
     )
-    save_run(Run(beside, document))
-    copy_documents(first, beside, folder)
+    save_run(Run(staging, document))
+    copy_documents(first, staging, folder)
     return choice
 
 
@@ -91,21 +91,25 @@ def require_mergeable(first: Run, other: Run) -> None:
     )
 
 
-def copy_documents(run: Run, beside: Path, folder: Path) -> None:
+def copy_documents(run: Run, staging: Path, folder: Path) -> None:
     """Copies scene and station of a run, with references that hold in another folder."""
     for name in (SCENE_FILE, STATION_FILE):
-        shutil.copyfile(run.path / name, beside / name)
+        shutil.copyfile(run.path / name, staging / name)
     scene = load_document(run.path / SCENE_FILE, SceneDocument)
     if not scene.library.startswith(PACKAGE_URI):
         with suppress(BurgError):  # it is gone: the run's document knows where it was
             root = resolve(scene.library, "models", run.path)
             library = portable_reference(root, folder)
-            save_scene(replace(scene, library=library), beside / SCENE_FILE)
+            save_scene(replace(scene, library=library), staging / SCENE_FILE)
     station = load_document(run.path / STATION_FILE, StationDocument)
-    told = [station.hand, *([station.arm.model] if station.arm else []), *station.packages.values()]
-    if not all(reference.startswith(PACKAGE_URI) for reference in told):
+    references = [
+        station.hand,
+        *([station.arm.model] if station.arm else []),
+        *station.packages.values(),
+    ]
+    if not all(reference.startswith(PACKAGE_URI) for reference in references):
         with suppress(BurgError):
-            save_document(portable_station(run.station(), folder), beside / STATION_FILE)
+            save_document(portable_station(run.station(), folder), staging / STATION_FILE)
 
 
 def common_shard(runs: Sequence[Run | Campaign]) -> str:
@@ -128,7 +132,7 @@ def missing_shards(runs: Sequence[Run | Campaign]) -> tuple[str, ...]:
     )
 
 
-def all_sessions(stretches: Sequence[Sequence[WorkSession]]) -> tuple[WorkSession, ...]:
-    """All stretches of work, by their beginning."""
-    found = dict.fromkeys(stretch for some in stretches for stretch in some)
-    return tuple(sorted(found, key=lambda stretch: stretch.started))
+def all_sessions(sessions: Sequence[Sequence[WorkSession]]) -> tuple[WorkSession, ...]:
+    """All sessions, by their beginning."""
+    found = dict.fromkeys(session for some in sessions for session in some)
+    return tuple(sorted(found, key=lambda session: session.started))
