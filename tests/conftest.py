@@ -171,7 +171,7 @@ def _pool_or_this_process(pool: type) -> Any:
                 for candidate, answer in grasps:
                     yield job, candidate, judge_grasp(judge, candidate, screened=answer)
 
-        def dismiss(self) -> None:
+        def release(self) -> None:
             pass
 
     return lambda count, limits: ThisProcess() if count == 1 else pool(count, limits)

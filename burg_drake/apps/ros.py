@@ -38,7 +38,7 @@ def _add_options(parser: Parser) -> None:
         "--camera-info",
         metavar="TOPIC",
         default="",
-        help="the camera's intrinsics (default: camera_info beside the images)",
+        help="the camera's intrinsics (default: camera_info next to the images)",
     )
     parser.add_argument(
         "--intrinsics", metavar="FILE", help="take the intrinsics from a file, not from a topic"

@@ -263,7 +263,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
     answers = []
-    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
+    lost = r"^the scheduler at tcp://127\S+ does not answer any more; verdicts so far are kept"
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
         with pytest.raises(ClusterError, match=lost):
             for answer in executor.judge([job]):
@@ -292,7 +292,7 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 
     monkeypatch.setattr(ClusterWorkers, "look", look_and_kill)
     try:
-        lost = r"^the scheduler at tcp://127\S+ does not answer any more; what was judged is kept"
+        lost = r"^the scheduler at tcp://127\S+ does not answer any more; verdicts so far are kept"
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
             list(executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:

@@ -15,7 +15,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.atomic import UNFINISHED
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.merge import united
+from burg_drake.evaluation.merge import united_run
 from burg_drake.evaluation.merge.runs import unite
 from burg_drake.evaluation.records.journal import JOURNAL_FILE, decode, encode
 from burg_drake.evaluation.records.shard import Shard
@@ -239,9 +239,9 @@ def test_what_is_united_cannot_be_written_meanwhile(
                 call(given, station, out, grasps_per_object=1)
         return copytree(*arguments, **options)
 
-    choose, copytree = united.choose, shutil.copytree
+    choose, copytree = united_run.choose, shutil.copytree
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(united, "choose", look)
+        patch.setattr(united_run, "choose", look)
         unite([one.path], tmp_path / "a")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

@@ -210,8 +210,8 @@ def test_a_csv_alone_is_the_motion(plan: Plan, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError) as error:
         load_plan(path, scene=scene)
     assert str(error.value) == (
-        f"{path} does not say which scene and arm it is for; of a CSV that is in the file"
-        " NAME.csv-metadata.json beside it"
+        f"{path} does not say which scene and arm it is for; a CSV plan has that in the file"
+        " NAME.csv-metadata.json next to it"
     )
 
 

@@ -58,7 +58,10 @@ def add_to(verbs: Any) -> None:
         "burg-drake gap runs/first --trials trials.yaml -o gap",
         "burg-drake gap tabletop_six --mode reach --samples 0 -o gap",
         "",
-        "The same command continues where an interrupted one stopped. Each step is a plain run.",
+        (
+            "The same command continues where an interrupted one stopped. Every step is an"
+            " ordinary run."
+        ),
         options=_add_options,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")

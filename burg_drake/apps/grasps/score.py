@@ -36,7 +36,7 @@ def add_to(group: Any) -> None:
         "antipodal_angle [rad]. Where pads meet faces that lean more than friction holds, the",
         "object slides in the hand until they hold it: slide [m], inf if they never do. Of the",
         "object at rest there: epsilon, volume, load_margin (how many times its weight the grip",
-        "bears without slipping, in the worst direction), gravity_margin (along gravity, in a",
+        "withstands, in the worst direction), gravity_margin (along gravity, in a",
         "scene; below 1 the object begins to turn in the hand, which need not be a drop),",
         "patch_area [m2], contact_offset [m]. In a scene also clearance [m], negative where the",
         "open hand overlaps something, nearest, screened (clear, or which collision),",

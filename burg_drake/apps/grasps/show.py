@@ -47,7 +47,7 @@ def add_to(group: Any) -> None:
         "",
         "A click on a grasp of a page, or in its list, shows the whole gripper there; in the live",
         "view the slider `grasp` of Meshcat's controls does, in the order of the list: the highest",
-        "number first that colours stand for, or the best.",
+        "value of the coloured column first, or the best.",
     )
     show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
     add_file_options(show)

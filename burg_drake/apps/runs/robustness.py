@@ -36,7 +36,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
         "",
-        "The same command goes on where an interrupted one stopped. The table keeps what earlier",
+        "The same command continues where an interrupted one stopped. The table keeps what earlier",
         "commands found for the same grasps with the same settings.",
         options=_add_options,
     )

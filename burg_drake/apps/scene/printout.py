@@ -51,9 +51,7 @@ def _add_options(parser: Parser) -> None:
         " scaled to compensate",
     )
     parser.add_argument("--no-height-map", action="store_true", help="print the markers alone")
-    parser.add_argument(
-        "--no-names", action="store_true", help="do not write the objects' names beside them"
-    )
+    parser.add_argument("--no-names", action="store_true", help="do not print the objects' names")
 
 
 def require_pdf(path: str) -> None:

@@ -33,7 +33,7 @@ def add_to(group: Any) -> None:
         "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
         "",
         "Each scene is drawn again until it meets all conditions, and settled in simulation.",
-        "Interrupt it whenever you like: the same command goes on, and a larger --count adds",
+        "Interrupt it whenever you like: the same command continues, and a larger --count adds",
         "scenes. Exit code 1 if not all scenes were accepted; scenes.csv says why.",
         options=_add_options,
     )

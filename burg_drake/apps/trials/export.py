@@ -29,7 +29,7 @@ def add_to(group: Any) -> None:
             "File names begin with the number of the trial; index.csv lists all trials, with"
             " what stops"
         ),
-        "the arm where there is no file. The same command goes on where an interrupted one",
+        "the arm where there is no file. The same command continues where an interrupted one",
         "stopped. Exit code 1 if a trial could not be judged.",
     )
     add_sheet(parser)

@@ -40,7 +40,7 @@ def add_to(group: Any) -> None:
         "burg-drake trials record trials.yaml 17 --photo photo.png --intrinsics K.yaml",
         "burg-drake trials record trials.yaml 17 --outcome dropped --correct",
         "",
-        "Only this trial changes in the file; what people have written stays. The journal beside",
+        "Only this trial changes in the file; what people have written stays. The journal next to",
         "it keeps every entry, also those that are replaced. With intrinsics, the placement of the",
         "objects is measured on the photo. Exit code 1 if there is no board in it; the rest of the",
         "entry is recorded then.",

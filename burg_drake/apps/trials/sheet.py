@@ -25,7 +25,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake trials sheet trials.yaml -o sheet.html --show-simulated",
         "",
         "The page needs nothing else and prints on A4 and letter. The printed board of each scene",
-        "is written beside it, as sheet_SCENE.pdf.",
+        "is written next to it, as sheet_SCENE.pdf.",
     )
     add_sheet(parser)
     add_moved(parser)

@@ -31,7 +31,7 @@ def data_root() -> Path:
         if (root / "models").is_dir() and (root / "scenes").is_dir():
             return root
     raise InvalidInputError(
-        f"no models/ and scenes/ beside or inside {package}; reinstall burg_drake"
+        f"no models/ and scenes/ next to or inside {package}; reinstall burg_drake"
     )
 
 

@@ -26,7 +26,7 @@ REMEDIES = {
 SELF, TABLE = "the object itself", "the table"
 REMEDY_OF_TABLE = "another pose of the object, or a hand with thinner fingers, would help"
 REMEDY_OF_SELF = "other directions of the approach, or a slimmer hand, would help"
-REMEDY_OF_OTHERS = "more room beside {body} would help"
+REMEDY_OF_OTHERS = "more room around {body} would help"
 REMEDY_OF_MARGIN = "a smaller margin would help"
 BODIES = 3
 """So many bodies are named that are in the way."""

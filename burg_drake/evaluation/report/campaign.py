@@ -118,8 +118,8 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
     if not campaign.complete:
         judged, expected = format_count(summary.total.judged), format_count(campaign.expected)
         parts.append(
-            f"This run is not complete: {judged} of {expected} grasps are judged. The same command"
-            " continues it."
+            f"This run is not complete: {judged} of {expected} grasps are judged. The same"
+            " command continues it."
         )
     return element("p", " ".join(parts), class_="notice") if parts else None
 

@@ -199,7 +199,7 @@ def _notes(
             )
     if judged.not_represented:
         notes.append(
-            f"no trial stands for {judged.not_represented} grasps that could have been chosen;"
+            f"no trial represents {judged.not_represented} grasps that could have been chosen;"
             " figures for all grasps leave them out"
         )
     twice = len(trials) - len({(t.run, t.grasp) for t in trials})

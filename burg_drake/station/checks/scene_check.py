@@ -238,8 +238,7 @@ class SceneCheck:
             kind="out_of_bounds",
             amount=beyond,
             message=(
-                f"{name!r} stands {length_text(beyond)} beside the table of station"
-                f" {self._station.name!r}"
+                f"{name!r} is {length_text(beyond)} off the table of station {self._station.name!r}"
             ),
         )
 

@@ -123,10 +123,10 @@ def _text(document: RunDocument) -> str:
     by_hand = "" if preset else " The engine is not a preset: give it to `evaluate` in Python."
     return (
         "Results follow from the inputs, the seed and the versions below; not from the number of"
-        " workers or the order of their work. In a folder that is complete the command returns at"
-        f" once; give another -o to judge again.{by_hand} In the table of results x, y, z and qw to"
-        " qz are the grasp frame G in the object frame O; the file beside it says what each column"
-        " is."
+        " workers or the order of their work. In a folder that is complete the command returns"
+        f" at once; give another -o to judge again.{by_hand} In the table of results x, y, z and"
+        " qw to qz are the grasp frame G in the object frame O; the file next to it describes"
+        " each column."
     )
 
 

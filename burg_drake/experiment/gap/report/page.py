@@ -120,8 +120,8 @@ def _reproduction(steps: GapSteps, command_line: str) -> Html:
     listed = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
     return section(
         "How to repeat",
-        "Every step is an ordinary run that burg-drake report, replay and robustness open. The same"
-        " command continues where it was interrupted.",
+        "Every step is an ordinary run that burg-drake report, replay and robustness open. The"
+        " same command continues where it was interrupted.",
         command(command_line),
         element("dl", *listed, class_="facts"),
     )
