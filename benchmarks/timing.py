@@ -21,7 +21,7 @@ from pydrake.multibody.tree import MultibodyForces
 from pydrake.trajectories import PiecewisePolynomial
 from reach import Grasps, clear_grasps
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.paths.resources import data_root
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.ik.numeric import ArmKinematics

@@ -10,8 +10,9 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.stats import chisquare, kstest
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, transform_points
+from burg_drake.core.frames import transform_points
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.arrangement.arranging import arrange, choose
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
 from burg_drake.cameras.overlay.corrections import COLORS, Mark, mark
-from burg_drake.cameras.overlay.painting import Bytes, Ink, fill, stroke
+from burg_drake.cameras.overlay.painting import Ink, fill, stroke
 from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.overlay.tag_layout import lay_out
 from burg_drake.cameras.overlay.text_tags import WHITE, notice, paste, tag
@@ -17,7 +17,6 @@ from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.cameras.projection import (
     NOTHING,
     OUTLINE,
-    Indices,
     SceneMesh,
     SurfaceCamera,
     SurfaceImage,
@@ -27,7 +26,7 @@ from burg_drake.cameras.projection import (
     footprints,
     visible_lines,
 )
-from burg_drake.core import Array, InvalidInputError, inverse, transform_points
+from burg_drake.core import Array, Bytes, Indices, InvalidInputError, inverse, transform_points
 from burg_drake.core.terminal import CATEGORIES, distinct_colors
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 

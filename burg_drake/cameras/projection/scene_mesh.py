@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from burg_drake.cameras.projection.mesh_outline import Indices, MeshOutline
-from burg_drake.core import Array, UnknownNameError, nearest, transform_points
+from burg_drake.cameras.projection.mesh_outline import MeshOutline
+from burg_drake.core import Array, Indices, UnknownNameError, nearest, transform_points
 from burg_drake.geometry import RayCaster
 from burg_drake.scene.document import Scene
 

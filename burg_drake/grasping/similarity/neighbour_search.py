@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import DEGREES, MILLIMETRES, Array, InvalidInputError, ShownUnit, setting
+from burg_drake.core import (
+    DEGREES,
+    MILLIMETRES,
+    Array,
+    Indices,
+    InvalidInputError,
+    ShownUnit,
+    setting,
+)
 from burg_drake.grasping.similarity.pose_distance import (
     LEVER,
     P,
@@ -27,7 +35,6 @@ from burg_drake.grasping.similarity.pose_distance import (
     pair_translation,
 )
 
-Indices = NDArray[np.intp]
 Settle = Callable[[Indices, Indices, Indices, Array], NDArray[np.bool_]]
 """Takes the rows that are open, pairs as positions among those rows and columns, and how far each
 row has looked; returns which rows stay open."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.motion.lines.chain_candidates import APPROACH, GRASP, LIFT, RETREAT, WHOLE, Indices
+from burg_drake.core import Array, Indices
+from burg_drake.motion.lines.chain_candidates import APPROACH, GRASP, LIFT, RETREAT, WHOLE
 from burg_drake.motion.lines.line_poses import LinePoses
 
 Solve = Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]

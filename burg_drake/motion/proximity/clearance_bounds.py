@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, content_hash
+from burg_drake.core import Array, Indices, InvalidInputError, Single, content_hash
 from burg_drake.grasping.clearance import shape_of
-from burg_drake.motion.ik import Indices, LinkPoses, Single
+from burg_drake.motion.ik import LinkPoses
 from burg_drake.motion.proximity.arm_shape import ArmShape
 from burg_drake.motion.proximity.displacement_bound import ROUNDING, DisplacementBound
 from burg_drake.motion.proximity.distance_field import DistanceField

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, cached
-from burg_drake.motion.ik import Single
+from burg_drake.core import Array, Arrays, Single, cached
 from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, Solid, content_of
 
 CELL = 5e-3

@@ -11,8 +11,8 @@ from pydrake.geometry import SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array
-from burg_drake.motion.ik import ArmLinks, Indices, LinkPoses, Single
+from burg_drake.core import Array, Indices, Single
+from burg_drake.motion.ik import ArmLinks, LinkPoses
 from burg_drake.motion.proximity.ball_tree import BallTrees
 from burg_drake.motion.proximity.link_distance import LinkDistance
 from burg_drake.motion.proximity.pair_table import JointGrid, PairTable, is_affordable, may_meet

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, content_hash
+from burg_drake.core import Array, Single, content_hash
 from burg_drake.geometry import Ball, Boxes, Cylinder, Shape
-from burg_drake.motion.ik import Single
 
 
 @dataclass(frozen=True, eq=False)

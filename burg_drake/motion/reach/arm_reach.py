@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core import Array, InvalidInputError, check_pose, inverse, swap_fingers
+from burg_drake.core import Array, Indices, InvalidInputError, check_pose, inverse, swap_fingers
 from burg_drake.motion.collision import ArmCollision, EdgeChecker, require_free_home
 from burg_drake.motion.ik import ArmKinematics, IkRoutine, PandaIk, RoutineSolutions
 from burg_drake.motion.lines import (
@@ -42,8 +42,6 @@ BATCH = 128
 POSES = 12 * BATCH
 """... and poses of their ways at which postures are looked for: bounds the memory of long ways to
 some 130 MB."""
-
-Indices = NDArray[np.intp]
 
 
 class ArmReach:

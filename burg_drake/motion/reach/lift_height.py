@@ -10,14 +10,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices
 from burg_drake.core.grasps import Outcome
 from burg_drake.motion.reach.verdict import Reach
-
-Booleans = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 STEP = 0.01
 """Distance of the heights that are tried [m]."""
