@@ -11,7 +11,7 @@ from burg_drake.core import Array, Indices, UnknownNameError, nearest, transform
 from burg_drake.geometry import RayCaster
 from burg_drake.scene.document import Scene
 
-Surface = tuple[Array, Indices]
+TriangleArrays = tuple[Array, Indices]
 
 
 class SceneMesh:
@@ -24,7 +24,7 @@ class SceneMesh:
         boxes: (N, 2, 3) corners of each instance's bounding box along the axes of S [m].
     """
 
-    def __init__(self, placed: dict[str, Surface]) -> None:
+    def __init__(self, placed: dict[str, TriangleArrays]) -> None:
         """Joins surfaces.
 
         Args:

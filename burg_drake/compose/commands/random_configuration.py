@@ -10,7 +10,7 @@ from burg_drake.compose.commands.command import require_number
 from burg_drake.compose.document import State, Surroundings, known_scene, object_vertices
 from burg_drake.core import Array, InvalidInputError, listing, transform_points
 from burg_drake.scene.arrangement import ObjectRequest, area, arrange, choose
-from burg_drake.scene.document import Layout, PoseChoice
+from burg_drake.scene.document import LayoutName, PoseChoice
 from burg_drake.station.document import boxes_in_scene
 
 MOST = 60
@@ -25,14 +25,14 @@ class RandomConfiguration:
         seed: the same one gives the same configuration.
         count: so many objects of the library take the place of the free ones; those that are there
             stay, elsewhere, if None.
-        layout: how they stand to one another; see `scene.document.layout.Layout`.
+        layout: how they stand to one another; see `scene.document.layout.LayoutName`.
         poses: how stable poses are drawn.
         repeat: an object of the library may come several times.
     """
 
     seed: int = 0
     count: int | None = None
-    layout: Layout = "random"
+    layout: LayoutName = "random"
     poses: PoseChoice = "probability"
     repeat: bool = False
 

@@ -27,11 +27,11 @@ WHATEVER_HEIGHT = (
 )
 """Outcomes that no smaller lift changes."""
 
-Judge = Callable[[float, Indices], Sequence[Reach]]
+ReachAtHeight = Callable[[float, Indices], Sequence[Reach]]
 """Verdicts on some grasps (S,) that are lifted to a height [m]."""
 HandIsFree = Callable[[float, Indices], Booleans]
 """Whether the hand alone is free on its ways (S,), lifted to a height [m]."""
-IsFree = Callable[[int, Indices], Booleans]
+LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether some rows (S,) are free up to a level."""
 
 
@@ -43,7 +43,7 @@ def lift_heights(least: float, most: float) -> Array:
 
 
 def raise_lifts(
-    whole: Sequence[Reach], tried: Array, judge: Judge, hand_is_free: HandIsFree
+    whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
     """Goes on with grasps whose lift is not whole.
 
@@ -90,7 +90,7 @@ def raise_lifts(
     return found
 
 
-def _halved(low: Indices, high: Indices, is_free: IsFree) -> tuple[Indices, Indices]:
+def _halved(low: Indices, high: Indices, is_free: LevelIsFree) -> tuple[Indices, Indices]:
     """Neighbouring levels of which the lower is free and the upper is not, for R rows, from levels
     (R,) of which that is known."""
     while (high - low > 1).any():
@@ -99,7 +99,7 @@ def _halved(low: Indices, high: Indices, is_free: IsFree) -> tuple[Indices, Indi
 
 
 def _narrowed(
-    low: Indices, high: Indices, middle: Indices, is_free: IsFree
+    low: Indices, high: Indices, middle: Indices, is_free: LevelIsFree
 ) -> tuple[Indices, Indices]:
     """The same with what is between them looked at at one level each (R,)."""
     low, high = low.copy(), high.copy()
