@@ -17,7 +17,10 @@ from .live.frame_processing import (
     ViewSettings as ViewSettings,
 )
 from .live.picture import Picture as Picture
-from .live.session import LiveSession as LiveSession
+from .live.session import (
+    FrameCounts as FrameCounts,
+    LiveSession as LiveSession,
+)
 from .live.snapshot import (
     SeenBoard as SeenBoard,
     Snapshot as Snapshot,

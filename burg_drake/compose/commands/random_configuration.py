@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from burg_drake.compose.commands.command import require_number
-from burg_drake.compose.document import State, Surroundings, known_scene, object_vertices
+from burg_drake.compose.document import (
+    State,
+    Surroundings,
+    known_scene,
+    object_vertices,
+    shapes_for,
+)
 from burg_drake.core import Array, InvalidInputError, listing, transform_points
 from burg_drake.scene.arrangement import ObjectRequest, area, arrange, choose
 from burg_drake.scene.document import LayoutName, PoseChoice
@@ -41,7 +47,7 @@ class RandomConfiguration:
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._wanted(state, surroundings, rng)
-        shapes, board = surroundings.checker.shapes(state), state.document.board
+        shapes, board = shapes_for(surroundings.checker, state), state.document.board
         covered = sum(min(map(area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(
