@@ -32,7 +32,8 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.core.frames import Array, inverse
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import inverse
 from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
 from burg_drake.scene.document.scene import Board
 from tests.cameras.synthetic import ImageDegradation, board_image, covers_of, degraded

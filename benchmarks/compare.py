@@ -27,7 +27,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.judge_assessment import judgement

@@ -6,6 +6,7 @@ What a rule finds is shown on small packages that break it.
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -219,6 +220,30 @@ def test_a_face_that_shows_what_there_is_not_is_found(tmp_path: Path) -> None:
 def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:
     house = built(tmp_path, a_in_low="class Ball: ...", b_in_high="class Ball: ...")
     assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['Ball = Literal["round"]', "Ball = Callable[[int], str]", "Ball = int | None", "Ball = Any",
+     "Ball: TypeAlias = int", "Ball: typing.TypeAlias = int", "Ball = Round",
+     'Ball = TypeVar("Ball")',
+     pytest.param("type Ball = int", marks=pytest.mark.skipif(
+         sys.version_info < (3, 12), reason="no such statement"))],
+)  # fmt: skip
+def test_a_type_of_two_meanings_is_found(tmp_path: Path, text: str) -> None:
+    house = built(tmp_path, a_in_low="class Ball: ...", b_in_high=text)
+    assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+def test_a_type_that_is_repeated_is_found(tmp_path: Path) -> None:
+    text = "Ball = tuple[int, ...]"
+    house = built(tmp_path, a_in_low=text, b_in_high=text)
+    assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+@pytest.mark.parametrize("text", ["_Ball = int | None", "BALL = 1", 'Ball = TypeVar("Ball")'])
+def test_what_is_private_or_stands_for_any_type_may_be_repeated(tmp_path: Path, text: str) -> None:
+    assert defined_twice(built(tmp_path, a_in_low=text, b_in_high=text)) == []
 
 
 def test_a_crowded_folder_is_found(tmp_path: Path) -> None:

@@ -1,3 +1,10 @@
+from .arrays import (
+    Array as Array,
+    Booleans as Booleans,
+    Bytes as Bytes,
+    Indices as Indices,
+    Single as Single,
+)
 from .cache import (
     Arrays as Arrays,
     cache_folder as cache_folder,
@@ -26,7 +33,6 @@ from .errors import (
     shown as shown,
 )
 from .frames import (
-    Array as Array,
     canonical_fingers as canonical_fingers,
     check_pose as check_pose,
     grasp_from_axes as grasp_from_axes,

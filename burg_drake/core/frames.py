@@ -19,9 +19,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-
-Array = NDArray[np.float64]
 
 POSE_TOLERANCE = 1e-6
 """Largest deviation from orthonormality that `check_pose` accepts."""

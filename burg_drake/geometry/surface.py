@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.core import Array, InvalidInputError, MeshError
-from burg_drake.geometry.rays import Indices, RayCaster
+from burg_drake.core import Array, Indices, InvalidInputError, MeshError
+from burg_drake.geometry.rays import RayCaster
 
 if TYPE_CHECKING:
     import trimesh

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from burg_drake.cameras.calibration.target import CharucoTarget
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Image
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.markers import marker_dictionary
 from tests.cameras import synthetic
 

@@ -36,8 +36,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import MissingDependencyError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.world.board_visual import board_meshes
 from burg_drake.station.world.camera_sensors import LIGHTS

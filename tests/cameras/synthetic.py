@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.markers import MarkerLayout
 from burg_drake.scene.document.scene import Board
 

@@ -18,9 +18,10 @@ from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
 from burg_drake.cameras.projection.scene_mesh import build_scene_mesh
 from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
 from burg_drake.cameras.systems.pose_filter import PoseFilter
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle, rotation_from_rpy
+from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_rpy
 from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Camera, Station, load_station

@@ -21,8 +21,9 @@ from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
 from burg_drake.cameras.calibration.view_collector import ViewCollector
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Frame
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from tests.cameras.charuco_image import target_image
 
 TARGET = CharucoTarget()

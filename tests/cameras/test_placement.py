@@ -10,9 +10,9 @@ import pytest
 from burg_drake.cameras.placement.alignment.shape import target_shapes
 from burg_drake.cameras.placement.check import check_placement
 from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import dump_document
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.placement_photo import Photo, ScenePhotographer

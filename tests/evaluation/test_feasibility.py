@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from known_judge import refuse
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, grasp_from_axes, make_pose
+from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.grasp_set import GraspSet

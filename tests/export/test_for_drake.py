@@ -9,7 +9,7 @@ import pytest
 from pydrake.geometry import Role
 from pydrake.multibody.tree import RigidBody
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.export.scene_export import Exported
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram.builder import build_station_diagram

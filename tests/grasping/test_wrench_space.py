@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.grasping.quality.contacts import Contacts
 from burg_drake.grasping.quality.triangulation import triangulated_ball
 from burg_drake.grasping.quality.wrench_margins import (

@@ -42,7 +42,10 @@ def test_verdicts_do_not_depend_on_the_cache(
         lower, upper = reach.kinematics.lower, reach.kinematics.upper
         q = np.random.default_rng(1).uniform(lower, upper, (500, 7))
         verdicts = reach.check_all(names, X_WG)
-        bits = [reach.proximity.bounds(q).lower.tobytes(), reach.tree.roadmap.distance.tobytes()]
+        bits = [
+            reach._proximity.bounds(q).lower.tobytes(),
+            reach._tree.roadmap.distance.tobytes(),
+        ]
         for verdict in verdicts:
             bits += [verdict.outcome, verdict.blocker, np.array(verdict.clearance).tobytes()]
             if way := verdict.witness:

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from gantry import UPPER, box, gantry_diagram
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, grasp_from_axes, make_pose, rot_z, swap_fingers
+from burg_drake.core.frames import grasp_from_axes, make_pose, rot_z, swap_fingers
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, grasp_from_axes, pregrasp, swap_fingers
+from burg_drake.core.frames import grasp_from_axes, pregrasp, swap_fingers
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.motion.sweep.hand_sweep import HandSweep, Sweep
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene

@@ -197,11 +197,11 @@ def test_free_configurations_are_found_again(scene: Scene, station: Station) -> 
     rng = np.random.default_rng(11)
     lower, upper = arm.kinematics.lower + 0.01, arm.kinematics.upper - 0.01
     drawn = (rng.uniform(lower, upper) for _ in range(200))
-    free = [q for q in drawn if arm.collision.is_free(q)][:48]
+    free = [q for q in drawn if arm._tree.edges.collision.is_free(q)][:48]
     assert len(free) == 48
     found = arm.check_all([""] * 48, grasp_by_dh(np.array(free)))
     missed = [q for q, reach in zip(free, found, strict=True) if reach.outcome is not None]
-    assert sum(arm.tree.connect(q[None]) is not None for q in missed) <= 1
+    assert sum(arm._tree.connect(q[None]) is not None for q in missed) <= 1
 
 
 def test_what_the_numeric_search_reaches_the_closed_form_reaches(

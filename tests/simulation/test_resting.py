@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array
 from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
 from burg_drake.objects.library.entry import ObjectEntry, Source, StablePose
 from burg_drake.objects.library.obj_file import write_piece

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, grasp_from_axes
+from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.paths.resources import resolve
 from burg_drake.simulation.trials.trial_settings import USUAL_LIFT, TrialSettings
 from burg_drake.station.document.grasp_motion import GraspMotion

@@ -13,9 +13,9 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.mounted_hand import MountedHand

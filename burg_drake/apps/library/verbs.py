@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 from burg_drake.apps.library.building import run_add, run_build, run_import_burg, run_import_ycb
 from burg_drake.apps.library.viewing import run_check, run_list, run_show
@@ -222,7 +222,7 @@ def _add_named_values(parser: Parser) -> None:
 
 def _add_common_values(parser: Parser) -> None:
     from burg_drake.objects.library import CONTACT_KINDS
-    from burg_drake.objects.meshes import UNITS
+    from burg_drake.objects.meshes import UNITS, Openings
 
     parser.add_argument(
         "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
@@ -242,7 +242,7 @@ def _add_common_values(parser: Parser) -> None:
     )
     parser.add_argument(
         "--openings",
-        choices=("wall", "close"),
+        choices=get_args(Openings),
         help="large openings: make the surface a wall (default), or close them",
     )
     parser.add_argument(

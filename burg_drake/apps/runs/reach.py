@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from burg_drake.apps.options import (
     Output,
@@ -70,6 +70,8 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
+    from burg_drake.evaluation.store import PlanFormat
+
     add_scene(parser)
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
@@ -95,7 +97,7 @@ def _add_options(parser: Parser) -> None:
     )
     parser.add_argument(
         "--plan-format",
-        choices=("json", "csv"),
+        choices=get_args(PlanFormat),
         help="format of the plans: JSON laid out as ROS's JointTrajectory, or CSV tables;"
         " load_plan in Python reads both (default: json)",
     )

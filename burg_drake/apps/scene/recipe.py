@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from burg_drake.apps.options import add_station, positive_int, seed, workers
 
@@ -39,7 +39,7 @@ def written(name: str) -> str:
 
 
 def _add_objects(parser: Any) -> None:
-    from burg_drake.scene.document import SceneRecipe
+    from burg_drake.scene.document import PoseChoice, SceneRecipe
 
     group = parser.add_argument_group("objects")
     group.add_argument(
@@ -56,7 +56,7 @@ def _add_objects(parser: Any) -> None:
     )
     group.add_argument(
         "--poses",
-        choices=("probability", "uniform"),
+        choices=get_args(PoseChoice),
         default="probability",
         help="how stable poses are drawn (default: %(default)s)",
     )

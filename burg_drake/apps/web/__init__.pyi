@@ -4,7 +4,7 @@ from .requests import (
     picture_number as picture_number,
 )
 from .server import (
-    Answer as Answer,
+    Handler as Handler,
     PageHandler as PageHandler,
     PageServer as PageServer,
 )

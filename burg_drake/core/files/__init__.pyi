@@ -41,8 +41,8 @@ from .read_errors import (
 )
 from .stored_array import (
     NUMBERS as NUMBERS,
+    ArrayShape as ArrayShape,
     ReadBudget as ReadBudget,
-    Shape as Shape,
     StoredArray as StoredArray,
     require_grasps as require_grasps,
     text_array as text_array,

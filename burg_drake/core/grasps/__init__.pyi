@@ -50,7 +50,7 @@ from .verdict_columns import (
     joined_findings as joined_findings,
 )
 from .verdict_field import (
-    Part as Part,
     TableShape as TableShape,
     TextField as TextField,
+    VerdictPart as VerdictPart,
 )

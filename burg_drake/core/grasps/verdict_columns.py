@@ -11,8 +11,8 @@ from burg_drake.core.grasps.mode import Mode, asks
 from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
 from burg_drake.core.grasps.verdict_field import (
     InstancesField,
-    Part,
     VerdictField,
+    VerdictPart,
     declared,
 )
 
@@ -40,7 +40,7 @@ PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, In
 MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
 
 
-def fields_in(mode: Mode, part: Part) -> list[VerdictField]:
+def fields_in(mode: Mode, part: VerdictPart) -> list[VerdictField]:
     """The fields that a part of a row has in tables of a mode."""
     return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
 

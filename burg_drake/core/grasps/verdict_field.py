@@ -19,7 +19,7 @@ from burg_drake.core.grasps.outcome import Stage
 
 KIND: Final = "kind"
 """Key of the metadata of a dataclass's field."""
-Part = Literal["decided", "measured", "posture", "cost"]
+VerdictPart = Literal["decided", "measured", "posture", "cost"]
 """Parts of a row that fields of a verdict lie in, from left to right; other columns stand between
 them."""
 
@@ -53,7 +53,7 @@ class VerdictField(ABC):
     name: str = ""
     column: Column
     mode: Mode = "hand"
-    part: Part = "measured"
+    part: VerdictPart = "measured"
 
     @property
     def is_text(self) -> bool:
@@ -270,7 +270,7 @@ def text(
     *,
     of: type[str] = str,
     mode: Mode = "hand",
-    part: Part = "decided",
+    part: VerdictPart = "decided",
     replayed: bool = True,
 ) -> dict[str, VerdictField]:
     """Metadata of a text; see `TextField`."""

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.geometry import Indices, Surface
+from burg_drake.core import Array, Indices
+from burg_drake.geometry import Surface
 
 FINGER_CLEARANCE = 0.001
 """Room that each open finger keeps to its contact [m], so that the open hand can be placed."""

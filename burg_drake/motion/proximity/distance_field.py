@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, cached
-from burg_drake.motion.ik import Single
-from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, Solid, content_of
+from burg_drake.core import Array, Arrays, Single, cached
+from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, ProximitySolid, content_of
 
 CELL = 5e-3
 """Side of a cell [m]."""
@@ -48,7 +47,7 @@ class DistanceField:
     boxes: tuple[BoxSolid, ...]
 
     @classmethod
-    def of(cls, solids: list[Solid]) -> DistanceField:
+    def of(cls, solids: list[ProximitySolid]) -> DistanceField:
         """The field of solids in the world; of solids seen before, from the user's cache."""
         boxes = tuple(s for s in solids if isinstance(s, BoxSolid) and 2 * max(s.half) >= LARGE)
         small = [s for s in solids if s not in boxes]
@@ -98,7 +97,7 @@ class DistanceField:
         return bound
 
 
-def _arrays(small: list[Solid]) -> Arrays:
+def _arrays(small: list[ProximitySolid]) -> Arrays:
     """The grid around solids."""
     low = np.min([s.low for s in small], axis=0)
     high = np.max([s.high for s in small], axis=0)
@@ -117,7 +116,9 @@ def _arrays(small: list[Solid]) -> Arrays:
     return {"origin": low, "cell": np.array(cell), "shape": shape, **bounds}
 
 
-def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Single, Single]:
+def _bounds_at(
+    ticks: list[Array], cell: float, solids: list[ProximitySolid]
+) -> tuple[Single, Single]:
     """Bounds at the cells' centres."""
     shape = tuple(len(t) for t in ticks)
     near = np.full(shape, BAND, dtype=np.float32)
@@ -153,7 +154,7 @@ def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Si
 
 
 def _window(
-    ticks: list[Array], solid: Solid, margin: float
+    ticks: list[Array], solid: ProximitySolid, margin: float
 ) -> tuple[tuple[slice, ...], list[Array]]:
     """The part of the grid within a margin of a solid's box."""
     window = []

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, content_hash
+from burg_drake.core import Array, Single, content_hash
 from burg_drake.geometry import Ball, Boxes, Cylinder, Shape
-from burg_drake.motion.ik import Single
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,15 +143,15 @@ class HullSolid:
         return np.asarray(np.where(farthest > 0.0, farthest + offset, farthest), dtype=np.float32)
 
 
-Solid = BoxSolid | BallSolid | HullSolid
+ProximitySolid = BoxSolid | BallSolid | HullSolid
 
 
-def content_of(solids: list[Solid]) -> str:
+def content_of(solids: list[ProximitySolid]) -> str:
     """Hash of solids."""
     return content_hash([[type(solid).__name__, vars(solid)] for solid in solids])
 
 
-def solid_of(shape: Shape, X_WB: Array) -> Solid:
+def solid_of(shape: Shape, X_WB: Array) -> ProximitySolid:
     """A shape of a body at a pose (4, 4) as a solid."""
     X_WP = X_WB @ shape.X_BP
     if isinstance(shape.convex, Boxes):

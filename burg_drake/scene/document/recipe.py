@@ -8,7 +8,7 @@ from typing import ClassVar
 from burg_drake.core import content_hash
 from burg_drake.core.documents import dump_document, require_ranges
 from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.layout import TRIES, Layout, PoseChoice
+from burg_drake.scene.document.layout import TRIES, LayoutName, PoseChoice
 
 ATTEMPTS = 100
 """Whole scenes that are drawn until one is accepted."""
@@ -54,7 +54,7 @@ class SceneRecipe:
     only: tuple[str, ...] = ()
     repeat: bool = False
     board: Board = Board()
-    layout: Layout = "random"
+    layout: LayoutName = "random"
     poses: PoseChoice = "probability"
     tries: int = TRIES
     fewer: bool = False

@@ -42,7 +42,7 @@ from burg_drake.core import (
     transform_points,
 )
 from burg_drake.core.files import atomic_write
-from burg_drake.core.terminal import distinct_colors
+from burg_drake.core.terminal import Rgb, distinct_colors
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
@@ -84,7 +84,6 @@ LIGHTS = [
 ]
 """Room light from the upper left, a weaker one with the camera, a faint one from the right."""
 OBJECT_LABEL = 1
-Rgb = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
