@@ -14,6 +14,7 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError, quaternion_from_rotation
 from burg_drake.core.grasps import (
+    ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
     GraspSet,
     Outcome,
@@ -52,7 +53,11 @@ from burg_drake.station.document import GraspMotion, Station, StationLike, as_st
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
 """What becomes of a grasp, unless the computation itself fails."""
-MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess", LIFT_HEIGHT)
+MARGIN_COLUMNS = (
+    "clearance",
+    *(name for name in ARM_SCREEN_MARGINS if name != LIFT_HEIGHT),
+    LIFT_HEIGHT,
+)
 """Margins of a verdict that become columns; NaN where they are not defined."""
 
 

@@ -8,6 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from burg_drake.core.grasps.mode import Mode, asks
+from burg_drake.core.grasps.outcome import Stage
 from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
 from burg_drake.core.grasps.verdict_field import (
     InstancesField,
@@ -27,11 +28,15 @@ VERDICT_FIELDS = tuple(
 
 MARGINS = tuple(one.name for one in fields(Margins))
 """Names of all margins, in the order of tables."""
-SMALLER_IS_BETTER = frozenset(one.name for one in fields(Margins) if one.metadata["less_is_better"])
+SMALLER_IS_BETTER = frozenset(
+    one.name for one in fields(Margins) if one.metadata["smaller_is_better"]
+)
 """Names of the margins of which a smaller one is better."""
 LIFT_HEIGHT = "lift_height"
 """Margin: length of the lift that was asked for, or for which there is room."""
-ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess", LIFT_HEIGHT)
+ARM_SCREEN_MARGINS = tuple(
+    one.name for one in fields(Margins) if one.metadata["stage"] is Stage.REACHABLE
+)
 """Margins that the arm's screen measures."""
 CPU_COLUMNS = {stage: name for stage, (name, _, _) in CPU_TIMES.items()}
 """Columns of the CPU time of each stage."""
