@@ -1,5 +1,6 @@
 from .column import (
     PLAIN as PLAIN,
+    SHOWN_UNITS as SHOWN_UNITS,
     TEXT as TEXT,
     Column as Column,
 )
