@@ -22,6 +22,7 @@ from .errors import (
     did_you_mean as did_you_mean,
     listing as listing,
     nearest as nearest,
+    one_line as one_line,
     quoted as quoted,
     shown as shown,
 )

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, quaternion_from_rotation
+from burg_drake.core import InvalidInputError, one_line, quaternion_from_rotation
 from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
@@ -40,7 +40,6 @@ from burg_drake.evaluation.stages import (
     arm_settings,
     hand_alone,
     hand_screen,
-    one_line,
 )
 from burg_drake.evaluation.store import PlanFolder, PlanOutput, plans_document
 from burg_drake.evaluation.workers import judge_all

@@ -6,6 +6,7 @@ from .column import (
 )
 from .columns import (
     INPUT_PREFIX as INPUT_PREFIX,
+    column_metadata as column_metadata,
     describe as describe,
 )
 from .csv_metadata_file import (
