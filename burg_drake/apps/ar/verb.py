@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.options import (
     Parser,
     add_measured_board,
+    add_page,
     add_scene,
     add_verb,
+    chosen_intrinsics,
     number,
-    port,
     positive,
     positive_int,
     print_scale,
 )
 from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
-from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.cameras.live import Event, LiveSession, ViewActions
@@ -28,10 +28,8 @@ if TYPE_CHECKING:
     from burg_drake.cameras.sources import FrameSource
     from burg_drake.scene.document import Scene
 
-SIMULATED = "sim:"
 IDLE_AFTER = 3.0
 """The camera is not looked at when no browser has asked for a picture for so long [s]."""
-"""Length of the rulers on printouts."""
 
 
 def add_to(verbs: Any) -> None:
@@ -82,17 +80,7 @@ def _add_view(parser: Any) -> None:
     view.add_argument(
         "--tolerance-deg", type=positive, metavar="X", help="the same for how they are turned"
     )
-    view.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
-    )
-    view.add_argument(
-        "--host",
-        metavar="ADDRESS",
-        default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 all of"
-        " the network can see and use it, such as a tablet beside the board",
-    )
-    view.add_argument("--open", action="store_true", help="open the page in the browser")
+    add_page(view, "all of the network can see and use it, such as a tablet beside the board")
     view.add_argument(
         "--no-browser",
         action="store_true",
@@ -133,7 +121,7 @@ def run_ar(arguments: argparse.Namespace) -> int:
 
     scene = load_scene(arguments.scene)
     _require_places(arguments)
-    intrinsics = _intrinsics(arguments)
+    intrinsics = chosen_intrinsics(arguments)
     source = _open(arguments, scene, intrinsics)
     with terminated_as_interrupted():
         try:
@@ -239,19 +227,6 @@ def _open(arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics) -
 
     size = (intrinsics.width, intrinsics.height)
     return open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
-
-
-def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
-    from burg_drake.cameras.optics import load_intrinsics
-
-    if arguments.intrinsics is not None:
-        return load_intrinsics(arguments.intrinsics)
-    if not arguments.camera.startswith(SIMULATED):
-        raise InvalidInputError(
-            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
-            " one"
-        )
-    return load_intrinsics(arguments.camera)
 
 
 def _require_places(arguments: argparse.Namespace) -> None:

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_station, positive_int, seed, workers
+from burg_drake.apps.options import add_station, add_workers, positive_int, seed
 
 if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectLibrary
@@ -68,9 +68,7 @@ def _add_objects(parser: Any) -> None:
         default=1,
         help="number of scenes (default: %(default)d)",
     )
-    group.add_argument(
-        "--workers", metavar="N", type=workers, default=1, help="processes (default: %(default)d)"
-    )
+    add_workers(group, "processes (default: %(default)d)", default=1)
 
 
 def _add_layout(parser: Any) -> None:
