@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.options import (
     Parser,
     add_measured_board,
+    add_options,
     add_page,
     add_scene,
     add_verb,
     chosen_intrinsics,
-    number,
     positive,
     positive_int,
     print_scale,
+    settings_from,
 )
 from burg_drake.apps.terminal import deaf_to_interrupts, open_in_browser, terminated_as_interrupted
 
@@ -70,16 +71,10 @@ def _add_options(parser: Parser) -> None:
 
 
 def _add_view(parser: Any) -> None:
+    from burg_drake.cameras.overlay import OverlayStyle
+
     view = parser.add_argument_group("view")
-    view.add_argument(
-        "--opacity", type=share, metavar="X", help="of the objects, 0 (outlines) to 1"
-    )
-    view.add_argument(
-        "--tolerance-mm", type=positive, metavar="X", help="objects placed within it are green"
-    )
-    view.add_argument(
-        "--tolerance-deg", type=positive, metavar="X", help="the same for how they are turned"
-    )
+    add_options(view, OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True)
     add_page(view, "all of the network can see and use it, such as a tablet beside the board")
     view.add_argument(
         "--no-browser",
@@ -187,8 +182,6 @@ def _serve(
 def _session(
     arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics, source: FrameSource
 ) -> tuple[LiveSession, ViewActions]:
-    from dataclasses import replace
-
     from burg_drake.cameras.live import (
         EventLog,
         FrameProcessor,
@@ -198,19 +191,13 @@ def _session(
     )
     from burg_drake.cameras.overlay import OverlayStyle
 
-    style, settings = OverlayStyle(), ViewSettings()
-    if arguments.tolerance_mm is not None:
-        style = replace(style, tolerance=1e-3 * arguments.tolerance_mm)
-    if arguments.tolerance_deg is not None:
-        style = replace(style, angle_tolerance=math.radians(arguments.tolerance_deg))
-    if arguments.opacity is not None:
-        settings = replace(settings, opacity=arguments.opacity)
+    style = settings_from(arguments, OverlayStyle)
     always = _is_scripted(arguments) or arguments.check or arguments.snapshot
     live = LiveSession(
         FrameProcessor(scene, intrinsics, print_scale=print_scale(arguments), style=style),
         source,
         events=EventLog(_print_event),
-        settings=settings,
+        settings=ViewSettings(opacity=style.opacity),
         paced=not arguments.no_browser,
         idle_after=math.inf if always else IDLE_AFTER,
     )
@@ -240,11 +227,3 @@ def _require_places(arguments: argparse.Namespace) -> None:
         require_new_folder(arguments.snapshot)
     if not arguments.no_browser:
         writable_folder(arguments.output)
-
-
-def share(text: str) -> float:
-    """A number from 0 to 1."""
-    value = number(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
-    return value
