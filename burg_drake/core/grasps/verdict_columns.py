@@ -14,15 +14,15 @@ from burg_drake.core.grasps.verdict_field import (
     InstancesField,
     Part,
     VerdictField,
-    declared,
+    verdict_fields,
 )
 
-TRIAL_FINDINGS = declared(TrialFindings)
+TRIAL_FINDINGS = verdict_fields(TrialFindings)
 """What rows of tables tell of a trial."""
-FINDINGS = declared(Findings)
+FINDINGS = verdict_fields(Findings)
 """What stages find."""
 VERDICT_FIELDS = tuple(
-    sorted(declared(Verdict), key=lambda one: one.name not in ("outcome", "stage"))
+    sorted(verdict_fields(Verdict), key=lambda one: one.name not in ("outcome", "stage"))
 )
 """All fields that are written, in the order of files: how it ended, then why."""
 

@@ -300,7 +300,7 @@ def by_stage(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictF
     return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")}
 
 
-def declared(record: type[Any]) -> tuple[VerdictField, ...]:
+def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
     """The fields of a record that have a kind, in the order of their declaration."""
     return tuple(
         replace(one.metadata[KIND], name=one.name) for one in fields(record) if KIND in one.metadata
