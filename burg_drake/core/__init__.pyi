@@ -33,6 +33,7 @@ from .frames import (
     grasp_from_axes as grasp_from_axes,
     inverse as inverse,
     make_pose as make_pose,
+    perpendicular as perpendicular,
     pregrasp as pregrasp,
     quaternion_from_rotation as quaternion_from_rotation,
     rot_z as rot_z,
