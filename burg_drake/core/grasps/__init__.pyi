@@ -17,7 +17,6 @@ from .grasp_set import GraspSet as GraspSet
 from .mode import (
     MODES as MODES,
     Mode as Mode,
-    asks as asks,
 )
 from .outcome import (
     UNTRIED as UNTRIED,
@@ -39,7 +38,6 @@ from .verdict import (
 from .verdict_columns import (
     ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
     CPU_COLUMNS as CPU_COLUMNS,
-    FINDINGS as FINDINGS,
     LIFT_HEIGHT as LIFT_HEIGHT,
     MARGINS as MARGINS,
     MOVED as MOVED,

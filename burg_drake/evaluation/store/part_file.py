@@ -29,7 +29,6 @@ PLAIN_TEXT = ("id", "X_OG")
 """Texts that differ from row to row; of the others few differ, and each is kept once."""
 SEGMENTS_KEY = b"burg_drake.segments"
 NAME = re.compile(r"part-(\d+)-([0-9a-f]{16})\.parquet")
-MAGIC = b"PAR1"
 LARGEST_FOOTER = 1 << 26
 
 
