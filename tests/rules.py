@@ -91,6 +91,22 @@ def wrong_faces(house: Package) -> list[str]:
     return found
 
 
+def unasked(house: Package) -> list[str]:
+    """Names of faces that nothing outside of the package imports; public faces are for users."""
+    top = house.faces[house.name]
+    public = {house.name, *(f"{house.name}.{n}" for n, (at, _) in top.items() if at == house.name)}
+    taken = {(x.source, x.name) for x in house.imports if not x.module.startswith(f"{x.source}.")}
+    taken |= {place for names in house.faces.values() for place in names.values()}
+    whole = {f"{x.source}.{x.name}" for x in house.imports}
+    return [
+        f"{package} shows {name}, which nobody imports"
+        for package, names in house.faces.items()
+        if package not in public | whole
+        for name in names
+        if (package, name) not in taken
+    ]
+
+
 def defined_twice(house: Package) -> list[str]:
     """Names of classes and types that are defined in several places. Private ones may be, and so
     may type variables, which stand for nothing of their own."""

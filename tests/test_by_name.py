@@ -37,7 +37,8 @@ from burg_drake.generation.sample import sample_scene
 from burg_drake.grasping.clearance import hand_clearance_alone
 from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.planner import plan
-from burg_drake.motion.plans import Plan, load_plan
+from burg_drake.motion.plans import Plan
+from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.motion.reach import ArmReach
 from burg_drake.motion.workspace import (
     ArmSpan,

@@ -22,6 +22,7 @@ from tests.rules import (
     loaded_with,
     many_parameters,
     orders,
+    unasked,
     unplaced,
     upward,
     wrong_faces,
@@ -94,6 +95,10 @@ def test_imports_from_elsewhere_go_through_faces() -> None:
 
 def test_faces_show_what_there_is() -> None:
     assert wrong_faces(HOUSE) == []
+
+
+def test_faces_show_what_others_use() -> None:
+    assert unasked(HOUSE) == []
 
 
 def test_one_name_means_one_thing() -> None:
@@ -215,6 +220,22 @@ def test_a_face_that_shows_what_there_is_not_is_found(tmp_path: Path) -> None:
         "house.low shows h, which house.low.a does not have",
         "house.low shows g, which is the name of a module",
     ]
+
+
+def test_a_name_that_nobody_imports_is_found(tmp_path: Path) -> None:
+    house = built(
+        tmp_path,
+        a_in_low="f = g = 1",
+        b_in_low="from house.low import g",
+        c_in_high="from house.low import f\nfrom house import whole",
+        d_in_whole="f = 1",
+        e_in_for_users="f = 1",
+    )
+    face(house, "low", "from .a import f as f, g as g")
+    face(house, "whole", "from .d import f as f")
+    face(house, "for_users", "from .e import f as f")
+    (house.folder / "__init__.pyi").write_text("from . import for_users as for_users")
+    assert unasked(Package(house.folder)) == ["house.low shows g, which nobody imports"]
 
 
 def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ from .errors import (
     did_you_mean as did_you_mean,
     listing as listing,
     nearest as nearest,
+    one_line as one_line,
     quoted as quoted,
     shown as shown,
 )
@@ -38,6 +39,7 @@ from .frames import (
     grasp_from_axes as grasp_from_axes,
     inverse as inverse,
     make_pose as make_pose,
+    perpendicular as perpendicular,
     pregrasp as pregrasp,
     quaternion_from_rotation as quaternion_from_rotation,
     rot_z as rot_z,

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps import ARM_SCREEN_MARGINS, LIFT_HEIGHT, MARGINS, Margins
+from burg_drake.core.grasps import MARGINS, Margins
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.candidates.sampling import sample_candidates
@@ -182,5 +182,5 @@ def test_a_judge_without_a_last_word_is_a_mistake() -> None:
 
 
 def test_a_trial_measures_the_margins_that_no_stage_before_it_does() -> None:
-    before = {*ARM_SCREEN_MARGINS, "duration", LIFT_HEIGHT}
+    before = {"lift_height", "arm_clearance", "joint_excess", "duration"}
     assert Margins().of_trial().keys() == {*MARGINS} - before

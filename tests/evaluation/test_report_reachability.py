@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.reachability import reachability_section
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run

@@ -282,7 +282,7 @@ def test_unusable_meshes():
     cases = {
         "no faces with area": trimesh.Trimesh(),
         "not finite": broken,
-        r"wound inside out; turn its faces with mesh.invert\(\)": inverted,
+        r"wound inside out; flip its faces with mesh.invert\(\)": inverted,
     }
     for message, mesh in cases.items():
         with pytest.raises(MeshError, match=message):

@@ -14,7 +14,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import check_pose, make_pose, swap_fingers
 from burg_drake.grasping.similarity import neighbour_search
 from burg_drake.grasping.similarity.neighbour_search import Tolerance, find_nearest, find_within
-from burg_drake.grasping.similarity.pose_distance import components, pose_distances
+from burg_drake.grasping.similarity.pose_distance import components
+from tests.grasping.pose_distances import pose_distances
 
 TOLERANCES = [
     Tolerance(),

@@ -12,11 +12,11 @@ from burg_drake.apps.options import (
     add_quiet,
     add_verb,
     add_view,
+    add_workers,
     coefficient,
     friction,
     named_positive,
     positive,
-    workers,
 )
 
 FORMATS_TEXT = """\
@@ -257,7 +257,5 @@ def _add_effort(parser: Parser) -> None:
     parser.add_argument(
         "--no-confirm", action="store_true", help="do not simulate the stable poses"
     )
-    parser.add_argument(
-        "--workers", type=workers, metavar="N", help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_quiet(parser)

@@ -20,6 +20,7 @@ from burg_drake.apps.options import (
     add_scene,
     add_station,
     add_verb,
+    add_workers,
     chosen_motion,
     grasps_per_object,
     how_to_retry,
@@ -28,7 +29,6 @@ from burg_drake.apps.options import (
     read_given,
     require_file,
     require_sampled,
-    workers,
 )
 from burg_drake.apps.runs.reach_tables import print_tables
 from burg_drake.core import InvalidInputError
@@ -107,9 +107,7 @@ def _add_options(parser: Parser) -> None:
         help="decide by quick bounds instead of Drake's CollisionChecker: twice as fast, and wrong"
         " about one or two grasps in a hundred, either way",
     )
-    parser.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_retry_failed(parser, "grasps")
     add_quiet(parser)
 

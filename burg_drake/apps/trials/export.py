@@ -7,7 +7,7 @@ import sys
 from collections import Counter
 from typing import TYPE_CHECKING, Any, get_args
 
-from burg_drake.apps.options import Parser, add_quiet, add_retry_failed, add_verb, workers
+from burg_drake.apps.options import Parser, add_quiet, add_retry_failed, add_verb, add_workers
 from burg_drake.apps.trials.arguments import add_moved, add_sheet
 from burg_drake.core import shown
 
@@ -54,9 +54,7 @@ def _add_options(parser: Parser) -> None:
         "--station", metavar="STATION", help="station with the arm (default: that of each run)"
     )
     add_moved(parser)
-    parser.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_retry_failed(parser, "trials")
     add_quiet(parser)
     parser.set_defaults(after_interrupt="; run the same command to continue")

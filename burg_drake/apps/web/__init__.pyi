@@ -1,6 +1,5 @@
 from .requests import (
     address as address,
-    json_body as json_body,
     picture_number as picture_number,
 )
 from .server import (

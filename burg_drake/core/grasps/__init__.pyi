@@ -1,10 +1,12 @@
 from .column import (
     PLAIN as PLAIN,
+    SHOWN_UNITS as SHOWN_UNITS,
     TEXT as TEXT,
     Column as Column,
 )
 from .column_meanings import (
     INPUT_PREFIX as INPUT_PREFIX,
+    column_metadata as column_metadata,
     describe as describe,
 )
 from .csv_metadata_file import (
@@ -15,7 +17,6 @@ from .grasp_set import GraspSet as GraspSet
 from .mode import (
     MODES as MODES,
     Mode as Mode,
-    asks as asks,
 )
 from .outcome import (
     UNTRIED as UNTRIED,
@@ -37,7 +38,6 @@ from .verdict import (
 from .verdict_columns import (
     ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
     CPU_COLUMNS as CPU_COLUMNS,
-    FINDINGS as FINDINGS,
     LIFT_HEIGHT as LIFT_HEIGHT,
     MARGINS as MARGINS,
     MOVED as MOVED,

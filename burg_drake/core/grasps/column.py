@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,6 +11,13 @@ TEXT: Final = ""
 """Unit of what is not a number."""
 PLAIN: Final = "1"
 """Unit of numbers without one: ratios, counts, labels."""
+SHOWN_UNITS: Mapping[str, tuple[str, float]] = {
+    "m": ("mm", 1e3),
+    "rad": ("°", 180 / math.pi),
+    "m2": ("mm²", 1e6),
+    "N": ("N", 1.0),
+}
+"""Units for people by that of a column, and how many of them it is."""
 
 
 @dataclass(frozen=True)

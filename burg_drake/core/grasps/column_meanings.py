@@ -164,3 +164,9 @@ def describe(name: str) -> Column | None:
         theirs = describe(name.removeprefix(INPUT_PREFIX)) or Column(TEXT, "not known here")
         return replace(theirs, description=f"came with the grasps: {theirs.description}")
     return None
+
+
+def column_metadata(name: str) -> dict[str, str]:
+    """Unit and description of a column, as Parquet keeps them; nothing of one that others made."""
+    column = describe(name)
+    return {} if column is None else {"unit": column.unit, "description": column.description}

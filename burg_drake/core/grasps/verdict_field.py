@@ -245,22 +245,22 @@ def margin(
     meaning: str,
     *,
     mode: Mode = "hand",
-    by_trial: bool = True,
-    less_is_better: bool = False,
+    stage: Stage = Stage.EXECUTED,
+    smaller_is_better: bool = False,
 ) -> Any:
     """A margin: NaN where it was not measured.
 
     Args:
         unit, meaning: see `Column`.
         mode: the first mode in which it is measured.
-        by_trial: whether the trial measures it, or a stage before.
-        less_is_better: whether a grasp is the better the smaller it is.
+        stage: the last one that measures it; `EXECUTED` of what a trial measures.
+        smaller_is_better: whether a grasp is the better the smaller it is.
     """
     metadata = {
         "column": Column(unit, meaning),
         "mode": mode,
-        "by_trial": by_trial,
-        "less_is_better": less_is_better,
+        "stage": stage,
+        "smaller_is_better": smaller_is_better,
     }
     return field(default=math.nan, metadata=metadata)
 
@@ -300,7 +300,7 @@ def by_stage(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictF
     return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")}
 
 
-def declared(record: type[Any]) -> tuple[VerdictField, ...]:
+def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
     """The fields of a record that have a kind, in the order of their declaration."""
     return tuple(
         replace(one.metadata[KIND], name=one.name) for one in fields(record) if KIND in one.metadata

@@ -16,7 +16,7 @@ from typing import Any
 
 from distributed import KilledWorker
 
-from burg_drake.core import BurgError, ClusterError, SimulationError
+from burg_drake.core import BurgError, ClusterError, SimulationError, one_line
 from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.delivery import ATTEMPTS, deliver_bundle
@@ -30,7 +30,6 @@ from burg_drake.evaluation.cluster.members import (
 from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
 from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
 from burg_drake.evaluation.cluster.waiting import Waiting
-from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.workers import Answer, Job, JobFailed, OnFailure, WorkerLimits
 
 LOOK = 1.0
@@ -45,7 +44,7 @@ class Dispatch:
     Attributes:
         client: of Dask.
         limits: of the workers' children.
-        crew: the workers.
+        workers: of the cluster.
         jobs: those under way.
     """
 
@@ -53,7 +52,7 @@ class Dispatch:
         self.client = client
         self.limits = limits
         self._tend = tend
-        self.crew = ClusterWorkers(client)
+        self.workers = ClusterWorkers(client)
         self.jobs: list[SentJob] = []
         self._name = f"burg-drake-{uuid.uuid4().hex}"
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -88,7 +87,7 @@ class Dispatch:
         """Has the workers, and those that join later, supervise children of this run. A worker that
         dies meanwhile is no reason to stop."""
         for attempt in range(1, ATTEMPTS + 1):
-            self.crew.look()  # before anything is registered where others would not know it
+            self.workers.look()  # before anything is registered where others would not know it
             try:
                 self.client.register_plugin(Supervisor(self._name), name=self._name)
                 return
@@ -100,10 +99,10 @@ class Dispatch:
     def look(self) -> Iterator[Answer]:
         """Sees who is there."""
         self._tend()
-        for hand in self.crew.look():
-            yield from self.lose(hand)
+        for worker in self.workers.look():
+            yield from self.lose(worker)
         self._seen = time.monotonic()
-        if self.crew.hands:
+        if self.workers.by_address:
             self._waiting.end()
         else:
             self._waiting.go_on()
@@ -111,21 +110,21 @@ class Dispatch:
     def hand_out(self) -> None:
         """Gives every worker what it has room for; those with the least come first."""
         while True:
-            hands = [hand for hand in self.crew.hands.values() if hand.room > 0]
-            for hand in hands:
-                hand.job = self.choose(hand)
-            hands = [hand for hand in hands if hand.job is not None]
-            if not hands:
+            free = [worker for worker in self.workers.by_address.values() if worker.room > 0]
+            for worker in free:
+                worker.job = self.choose(worker)
+            free = [worker for worker in free if worker.job is not None]
+            if not free:
                 return
-            least = min(hand.load for hand in hands)
-            for hand in hands:
-                if hand.load <= least and hand.job is not None and hand.job.left:
-                    self.send(hand.job.cut(max(1, self.crew.threads)), hand)
+            least = min(worker.load for worker in free)
+            for worker in free:
+                if worker.load <= least and worker.job is not None and worker.job.left:
+                    self.send(worker.job.cut(max(1, self.workers.threads)), worker)
 
-    def choose(self, hand: ClusterWorker) -> SentJob | None:
+    def choose(self, worker: ClusterWorker) -> SentJob | None:
         """What a worker is to work on: its job, or the next one, or one that others are at."""
-        if hand.job is not None and hand.job.left:
-            return hand.job
+        if worker.job is not None and worker.job.left:
+            return worker.job
         job = self.take_up()
         if job is not None:
             return job
@@ -148,7 +147,7 @@ class Dispatch:
         self._exhausted = True
         return None
 
-    def send(self, chunk: SentChunk, hand: ClusterWorker) -> None:
+    def send(self, chunk: SentChunk, worker: ClusterWorker) -> None:
         """Sends a chunk to a worker."""
         packed = Chunk(self._name, chunk.job.recipe, chunk.grasps, self.limits)
         with scheduler_errors(self.client):
@@ -158,13 +157,13 @@ class Dispatch:
                 key=f"grasps-{uuid.uuid4().hex}",
                 pure=False,
                 retries=0,
-                workers=[hand.address],
+                workers=[worker.address],
                 allow_other_workers=False,
             )
         chunk.future = future
         chunk.job.sent += 1
-        hand.chunks.append(chunk)
-        self._sent[future.key] = (chunk, hand)
+        worker.chunks.append(chunk)
+        self._sent[future.key] = (chunk, worker)
 
         def finished(future: Any) -> None:  # in another thread
             chunk.done = True
@@ -184,31 +183,33 @@ class Dispatch:
         for future in futures:
             if future.key not in self._sent:
                 continue  # was taken back
-            chunk, hand = self._sent[future.key]
+            chunk, worker = self._sent[future.key]
             try:
                 answers: Answers = future.result(timeout=FETCH)
             except KilledWorker:
-                self.forget(chunk, hand)
+                self.forget(chunk, worker)
                 yield from self.doubt(chunk)
                 continue
             except OSError:
-                self._refetch(future, hand)
+                self._refetch(future, worker)
                 continue
             except CancelledError:  # by the loss of the scheduler, or by somebody else
                 answers = Answers(ended=True)
             except Exception as error:
-                raise ClusterError(f"worker {hand.address}: {one_line(error)}") from error
-            self.forget(chunk, hand)
+                raise ClusterError(f"worker {worker.address}: {one_line(error)}") from error
+            self.forget(chunk, worker)
             if answers.ended:
                 chunk.take_back()
                 self._seen = -LOOK
             elif answers.missing:
                 chunk.take_back()
-                missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))[1].append(hand.address)
+                missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))[1].append(
+                    worker.address
+                )
             elif not chunk.job.failed:
                 yield from self.take(chunk, answers)
         for job, addresses in missing.values():
-            there = [a for a in dict.fromkeys(addresses) if a in self.crew.hands]
+            there = [a for a in dict.fromkeys(addresses) if a in self.workers.by_address]
             deliver_bundle(self.client, job, there)
 
     def take(self, chunk: SentChunk, answers: Answers) -> Iterator[Answer]:
@@ -232,11 +233,11 @@ class Dispatch:
         open_ones = [grasp for k, grasp in enumerate(chunk.grasps) if k not in judged]
         yield from self.doubt(chunk, open_ones, "gave no answer about it")
 
-    def lose(self, hand: ClusterWorker) -> Iterator[Answer]:
+    def lose(self, worker: ClusterWorker) -> Iterator[Answer]:
         """Takes back what a lost worker had; what it was at is sent again grasp by grasp."""
-        suspects = [chunk for chunk in hand.chunks if not chunk.done][: hand.threads]
-        for chunk in list(hand.chunks):
-            self.forget(chunk, hand)
+        suspects = [chunk for chunk in worker.chunks if not chunk.done][: worker.threads]
+        for chunk in list(worker.chunks):
+            self.forget(chunk, worker)
             chunk.future.cancel()
             if chunk in suspects:
                 yield from self.doubt(chunk)
@@ -265,10 +266,10 @@ class Dispatch:
                 Verdict(failed, Stage.CLEAR, reason=reason, interrupted=True),
             )
 
-    def forget(self, chunk: SentChunk, hand: ClusterWorker) -> None:
+    def forget(self, chunk: SentChunk, worker: ClusterWorker) -> None:
         """A worker does not have a chunk any more."""
         del self._sent[chunk.future.key]
-        hand.chunks.remove(chunk)
+        worker.chunks.remove(chunk)
         chunk.job.sent -= 1
 
     def fail(self, job: SentJob, error: BurgError) -> None:
@@ -282,11 +283,11 @@ class Dispatch:
             raise failure.error
         self._on_failure(failure)
 
-    def _refetch(self, future: Any, hand: ClusterWorker) -> None:
+    def _refetch(self, future: Any, worker: ClusterWorker) -> None:
         """A result did not come: the worker is lost, which a look will tell, or is busy."""
         if self.client.status != "running":
             raise lost_scheduler(self.client)
-        if hand.address in self.crew.hands:
+        if worker.address in self.workers.by_address:
             self._done.put(future)
         self._seen = -LOOK
 

@@ -57,17 +57,17 @@ class ClusterWorkers:
     """Workers by address.
 
     Attributes:
-        hands: the workers.
+        by_address: the workers.
     """
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self.hands: dict[str, ClusterWorker] = {}
+        self.by_address: dict[str, ClusterWorker] = {}
 
     @property
     def threads(self) -> int:
         """Number of chunks that they work on at a time."""
-        return sum(hand.threads for hand in self.hands.values())
+        return sum(worker.threads for worker in self.by_address.values())
 
     def look(self) -> list[ClusterWorker]:
         """Takes on new workers whose versions are ours and whose addresses are safe.
@@ -79,14 +79,14 @@ class ClusterWorkers:
             ClusterError: the scheduler is lost, or a worker has other versions or is not safe.
         """
         there = threads_by_address(self._client)
-        lost = [hand for address, hand in self.hands.items() if address not in there]
-        for hand in lost:
-            del self.hands[hand.address]
-        new = [address for address in there if address not in self.hands]
+        lost = [worker for address, worker in self.by_address.items() if address not in there]
+        for worker in lost:
+            del self.by_address[worker.address]
+        new = [address for address in there if address not in self.by_address]
         for address in new:
             require_safe(address, "worker ")
         for address in admitted(self._client, new):
-            self.hands[address] = ClusterWorker(address, there[address])
+            self.by_address[address] = ClusterWorker(address, there[address])
         return lost
 
 
