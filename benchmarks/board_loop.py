@@ -23,7 +23,7 @@ import numpy as np
 from pydrake.systems.framework import Context
 
 import burg_drake as burg
-from burg_drake.cameras.systems.board_loop import BoardLoop, build_board_loop
+from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle
 from burg_drake.station.document.station_document import Camera
@@ -47,7 +47,9 @@ def main() -> None:
         document = replace(station.document, cameras={"board": camera})
         for name, scene in scenes.items():
             for samples in (1, 2, 3):
-                loop = build_board_loop(scene, replace(station, document=document), samples=samples)
+                loop = build_board_loop(
+                    scene, replace(station, document=document), LoopCamera(samples=samples)
+                )
                 context = loop.diagram.CreateDefaultContext()
                 found = np.array([look(loop, context, X_SC) for X_SC in views])
                 valid = found[:, 0] < np.inf

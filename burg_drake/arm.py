@@ -1,5 +1,8 @@
 """The arm: its inverse kinematics, how far it reaches, trajectories, and plans as files."""
 
+from burg_drake.evaluation.store import (
+    PlanOutput as PlanOutput,
+)
 from burg_drake.motion.ik import (
     ArmKinematics as ArmKinematics,
     ArmLimits as ArmLimits,

@@ -31,6 +31,7 @@ from burg_drake.experiment.pairing import (
     Side as Side,
 )
 from burg_drake.experiment.planning import (
+    SelectionSettings as SelectionSettings,
     mcnemar_power as mcnemar_power,
     plan_trials as plan_trials,
     smallest_difference as smallest_difference,

@@ -19,7 +19,8 @@ with tempfile.TemporaryDirectory() as folder:
         settings = burg.EvaluationSettings(engine=engine, mode="hand")
         burg.evaluate(scene, station, out, grasps=grasps, settings=settings, progress=False)
 
-    sheet = burg.trials.plan_trials(simulated, per_object=4, out=path / "trials.yaml")
+    chosen = burg.trials.SelectionSettings(per_object=4)
+    sheet = burg.trials.plan_trials(simulated, settings=chosen, out=path / "trials.yaml")
     print(f"{len(sheet.trials)} trials, the first one of {sheet.trials[0].grasp}")
     book, robot = burg.trials.TrialBook(path / "trials.yaml"), burg.load_run(tried)
     for trial in sheet.trials:

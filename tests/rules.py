@@ -11,6 +11,8 @@ from tests.imports import Package
 
 MOST = 15
 """Modules in a folder."""
+MOST_PARAMETERS = 9
+"""Of a function; what takes more takes a settings object."""
 EXTRAS = {
     "pandas": (),
     "pyarrow": (),
@@ -100,6 +102,19 @@ def crowded(house: Package) -> list[str]:
     """Folders with too many modules."""
     counts = Counter(module.rpartition(".")[0] for module in house.modules)
     return [f"{package} has {n} modules" for package, n in counts.items() if n > MOST]
+
+
+def many_parameters(house: Package) -> list[str]:
+    """Functions with too many parameters, `self` and `cls` aside."""
+    found = []
+    for module, tree in house.trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                listed = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+                count = len(listed) - (listed[:1] != [] and listed[0].arg in ("self", "cls"))
+                if count > MOST_PARAMETERS:
+                    found.append(f"{module}:{node.lineno} {node.name} has {count} parameters")
+    return found
 
 
 def eager(house: Package) -> list[str]:

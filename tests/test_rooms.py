@@ -19,6 +19,7 @@ from tests.rules import (
     eager,
     imports_drake,
     loaded_with,
+    many_parameters,
     orders,
     unplaced,
     upward,
@@ -100,6 +101,10 @@ def test_one_name_means_one_thing() -> None:
 
 def test_folders_are_not_crowded() -> None:
     assert crowded(HOUSE) == []
+
+
+def test_functions_take_few_parameters() -> None:
+    assert many_parameters(HOUSE) == []
 
 
 def test_what_need_not_be_there_is_imported_where_it_is_needed() -> None:
@@ -219,6 +224,13 @@ def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:
 def test_a_crowded_folder_is_found(tmp_path: Path) -> None:
     house = built(tmp_path, **{f"m{k}_in_low": "" for k in range(16)})
     assert crowded(house) == ["house.low has 16 modules"]
+
+
+def test_long_lists_of_parameters_are_found(tmp_path: Path) -> None:
+    nine = ", ".join(f"x{k}" for k in range(9))
+    methods = f"    def g(self, {nine}): ...\n    def h(self, {nine}, *, y): ..."
+    house = built(tmp_path, a_in_low=f"def f({nine}): ...\nclass A:\n{methods}")
+    assert many_parameters(house) == ["house.low.a:4 h has 10 parameters"]
 
 
 def test_eager_imports_are_found(tmp_path: Path) -> None:

@@ -33,6 +33,8 @@ OPTIONS_OF = {
     "X_SF": ("camera_pose",),
     "objects": ("grasps_object", "rename"),
     "moved": ("run",),
+    "out": ("output",),
+    "folder": ("output",),
 }
 """What the parsed arguments call those of the library that have another name there."""
 LONGEST_WORD = 300

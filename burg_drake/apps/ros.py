@@ -6,25 +6,27 @@ import argparse
 import signal
 from typing import Any, NoReturn
 
-from burg_drake.apps.options import add_measured_board, add_scene, add_verb, print_scale
+from burg_drake.apps.options import Parser, add_measured_board, add_scene, add_verb, print_scale
 
-# Kept in step with ros.link, which imports too much for a help text; a test compares them.
-PARENTS = ("camera", "board", "none")
 DEFAULT_IMAGE = "/camera/image_raw"
-DEFAULT_NODE = "burg_board"
-DEFAULT_FRAME = "board"
 
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "ros",
         run,
         "run a ROS 1 or ROS 2 node: overlay, pose of the camera, and the board on tf",
         "burg-drake ros tabletop_six --image /camera/color/image_raw",
         "burg-drake ros my_scene.yaml --image /usb_cam/image_raw/compressed --frame board_link",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.ros import Names, Parent
+
     add_scene(parser)
     parser.add_argument(
         "--image",
@@ -50,20 +52,20 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--frame",
         metavar="NAME",
-        default=DEFAULT_FRAME,
+        default=Names.board_frame,
         help="the board on tf (default: %(default)s)",
     )
     parser.add_argument(
         "--tf-parent",
-        choices=PARENTS,
-        default=PARENTS[0],
+        choices=[parent.value for parent in Parent],
+        default=Names.parent.value,
         help="which of camera's and board's frame is the other's parent on tf, or none to leave tf"
         " alone (default: %(default)s)",
     )
     parser.add_argument(
         "--name",
         metavar="NODE",
-        default=DEFAULT_NODE,
+        default=Names.node,
         help="the node; it publishes NODE/overlay, NODE/camera_pose, NODE/status"
         " (default: %(default)s)",
     )

@@ -64,6 +64,7 @@ from .sources.frame import (
 from .sources.opening import open_source as open_source
 from .systems.board_loop import (
     BoardLoop as BoardLoop,
+    LoopCamera as LoopCamera,
     build_board_loop as build_board_loop,
 )
 from .systems.pose_estimator import BoardPoseEstimator as BoardPoseEstimator

@@ -43,7 +43,8 @@ class Setting:
     """What a field says about itself.
 
     Attributes:
-        help: what it means, for people, without a full stop.
+        help: what it means, for people, without a full stop; another field in braces, such as
+            `{lift_height}`, is told by its option.
         unit: that people give it in; None if that is the field's own.
         name: of the option, without dashes; the field's and the unit's name if empty.
         flags: short names of the option, such as `-n`.

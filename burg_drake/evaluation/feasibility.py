@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from burg_drake.evaluation.candidates import (
     given_candidates,
 )
 from burg_drake.evaluation.grasp_sets import by_names, set_documents
-from burg_drake.evaluation.records import Columns, columns_of_verdicts, input_of, numbers
+from burg_drake.evaluation.records import Columns, Journal, columns_of_verdicts, input_of, numbers
 from burg_drake.evaluation.stages import (
     Decide,
     Decision,
@@ -40,7 +41,7 @@ from burg_drake.evaluation.stages import (
     hand_screen,
     one_line,
 )
-from burg_drake.evaluation.store import PlanFolder, PlanFormat as PlanFormat, plans_document
+from burg_drake.evaluation.store import PlanFolder, PlanOutput, plans_document
 from burg_drake.evaluation.workers import judge_all
 from burg_drake.motion.lines import ReachSettings
 from burg_drake.motion.plans import Plan
@@ -62,9 +63,7 @@ def reach(
     *,
     motion: GraspMotion | None = None,
     exact: bool = True,
-    plans: str | Path | None = None,
-    plan_format: PlanFormat = "json",
-    retry_failed: bool = False,
+    plans: str | Path | PlanOutput | None = None,
     workers: int | None = None,
     progress: bool | Listener = False,
 ) -> GraspSet:
@@ -82,14 +81,8 @@ def reach(
         motion: how the hand goes to a grasp and away from it; as the station says if None.
         exact: whether each yes is checked by Drake's `CollisionChecker`; without, it is a
             screening, several times faster.
-        plans: folder that gets the timed motion of each grasp that the arm can execute, as
-            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
-            interrupted call, which the same call goes on with. What is finished is kept, and
-            grasps are tried again whose worker process was ended from outside or whose plan is
-            missing.
-        plan_format: `csv` for tables, with what their columns are beside them; see
-            `plans.csv_file`. `load_plan` reads both.
-        retry_failed: try all grasps again that an earlier call with these `plans` could not judge.
+        plans: folder that gets the timed motion of each grasp that the arm can execute, which the
+            same call goes on with if it was interrupted; and more of it, see `PlanOutput`.
         workers: number of processes; as many as there are processors if None.
         progress: True shows a bar on standard error; a function gets the events.
 
@@ -121,41 +114,53 @@ def reach(
     given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
     candidates = given_candidates(scene, given)
     require_usable_arm(scene, station)
-    verdicts: dict[str, Verdict] = {}
-    with Reporter(progress) as reporter, ExitStack() as opened:
-        folder = journal = None
-        if plans is not None:
-            folder = PlanFolder(
-                Path(plans),
-                plans_document(
-                    input_of(scene, "scenes"),
-                    input_of(station, "stations"),
-                    candidates,
-                    numbers(arm_settings(motion, exact=exact)),
-                    exact=exact,
-                    format=plan_format,
-                ),
+    settings = arm_settings(motion, exact=exact)
+    output = PlanOutput(plans) if isinstance(plans, (str, Path)) else plans
+    with Reporter(progress) as reporter:
+        if output is None:
+            factory = ReachJudgeFactory(scene, station, motion, exact)
+            verdicts = _judged(candidates, factory, workers, reporter)
+        else:
+            document = plans_document(
+                input_of(scene, "scenes"),
+                input_of(station, "stations"),
+                candidates,
+                numbers(settings),
+                exact=exact,
+                format=output.format,
             )
-            journal = opened.enter_context(folder.opened())
-            verdicts = folder.finished(retry_failed=retry_failed)
-        factory = ReachJudgeFactory(scene, station, motion, exact, folder)
-        left = [candidate for candidate in candidates if candidate.id not in verdicts]
-        outcomes = Counter(v.outcome for v in verdicts.values())
-        done, total = len(candidates) - len(left), len(candidates)
-        event = Progress(STARTING, done, total, outcomes=outcomes, counted_outcome=YES)
-        pace = ProgressMeter(reporter.show, event, "judging")
-        for candidate, verdict in opened.enter_context(
-            closing(judge_all(left, factory, workers=workers))
-        ):
+            folder = PlanFolder(Path(output.folder), document)
+            factory = ReachJudgeFactory(scene, station, motion, exact, folder)
+            with folder.opened() as journal:
+                known = folder.finished(retry_failed=output.retry_failed)
+                _judged(candidates, factory, workers, reporter, known, journal)
+                verdicts = folder.verdicts()  # with the digits that a later call will find
+    rows = [verdicts[id] for id in candidates.id]
+    return _with_columns(candidates, rows, scene, station, settings)
+
+
+def _judged(
+    candidates: Candidates,
+    factory: ReachJudgeFactory,
+    workers: int | None,
+    reporter: Reporter,
+    known: Mapping[str, Verdict] = MappingProxyType({}),
+    journal: Journal | None = None,
+) -> dict[str, Verdict]:
+    """Verdicts by grasp id; each that is not known is written to the journal at once."""
+    verdicts = dict(known)
+    left = [candidate for candidate in candidates if candidate.id not in verdicts]
+    outcomes = Counter(v.outcome for v in verdicts.values())
+    done, total = len(candidates) - len(left), len(candidates)
+    event = Progress(STARTING, done, total, outcomes=outcomes, counted_outcome=YES)
+    pace = ProgressMeter(reporter.show, event, "judging")
+    with closing(judge_all(left, factory, workers=workers)) as judged:
+        for candidate, verdict in judged:
             verdicts[candidate.id] = verdict
             if journal is not None:
                 journal.append(candidate.id, verdict)
             pace.step(outcome=verdict.outcome)
-        if folder is not None:
-            verdicts = folder.verdicts()  # with the digits that a later call will find
-    rows = [verdicts[id] for id in candidates.id]
-    settings = arm_settings(motion, exact=exact)
-    return _with_columns(candidates, rows, scene, station, settings)
+    return verdicts
 
 
 class ReachJudge:

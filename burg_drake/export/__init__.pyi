@@ -3,6 +3,7 @@ from .layout import (
     PlacedObject as PlacedObject,
 )
 from .scene_export import (
+    FORMATS as FORMATS,
     Exported as Exported,
     export_scene as export_scene,
 )

@@ -7,6 +7,7 @@ import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import burg_drake
 from burg_drake.core import MissingDependencyError, UnknownNameError, nearest
@@ -16,9 +17,11 @@ from burg_drake.export.folder import (
     require_own_folder,
     write_record,
 )
-from burg_drake.export.layout import Layout, lay_out
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.document import StationLike, as_station
+
+if TYPE_CHECKING:
+    from burg_drake.export.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Format:
         module: in this room, imported when needed.
         writer: its function of a layout and a folder, which returns notes.
         main: the file to open.
+        about: what it is, and for whom.
         hydroelastic: whether it has Drake's contact properties.
         package: that it needs beside those of burg_drake, as pip and as Python know it.
     """
@@ -36,17 +40,36 @@ class Format:
     module: str
     writer: str
     main: str
+    about: str
     hydroelastic: bool = False
     package: tuple[str, str] | None = None
 
 
 FORMATS = {
-    "sdf": Format("sdf_world", "write_sdf", "world.sdf", hydroelastic=True),
-    "dmd": Format("directives", "write_directives", "scene.dmd.yaml", hydroelastic=True),
-    "mjcf": Format("mjcf", "write_mjcf", "scene.xml"),
-    "usd": Format("usd", "write_usd", "scene.usda", package=("usd-core", "pxr")),
+    "sdf": Format(
+        module="sdf_world",
+        writer="write_sdf",
+        main="world.sdf",
+        about="an SDFormat world, for Gazebo and Drake",
+        hydroelastic=True,
+    ),
+    "dmd": Format(
+        module="directives",
+        writer="write_directives",
+        main="scene.dmd.yaml",
+        about="Drake's model directives",
+        hydroelastic=True,
+    ),
+    "mjcf": Format(module="mjcf", writer="write_mjcf", main="scene.xml", about="MuJoCo's XML"),
+    "usd": Format(
+        module="usd",
+        writer="write_usd",
+        main="scene.usda",
+        about="USD with rigid-body physics, as for Isaac Sim; needs pip install 'burg-drake[usd]'",
+        package=("usd-core", "pxr"),
+    ),
 }
-"""Formats by name: SDFormat, Drake's model directives, MuJoCo's MJCF, USD with its physics."""
+"""Formats by name."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +107,8 @@ def export_scene(
         MeshError: a mesh of the library is damaged.
         MissingDependencyError: `usd` without the package usd-core.
     """
+    from burg_drake.export.layout import lay_out
+
     scene = as_scene(scene)
     station = None if station is None else as_station(station)
     if to not in FORMATS:

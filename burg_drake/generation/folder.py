@@ -143,14 +143,14 @@ class SceneFolder:
             found = there.differences(provenance)
             if found:
                 raise InvalidInputError(
-                    f"{self.path} holds other scenes ({'; '.join(found)}); choose another -o, or"
-                    " delete it"
-                )
+                    f"{self.path} holds other scenes ({'; '.join(found)}); choose another folder,"
+                    " or delete it"
+                ).about("folder")
         elif any(self.path.iterdir()):
             raise InvalidInputError(
                 f"{self.path} is not empty, and holds no sampled scenes ({RECIPE_FILE} is missing);"
-                " choose another -o"
-            )
+                " choose another folder"
+            ).about("folder")
         else:
             save_document(provenance, recipe, "What the scenes of this folder were made with.")
         self._table = self.path / TABLE_FILE

@@ -15,6 +15,7 @@ import trimesh
 from burg_drake.core import Array
 from burg_drake.core.documents import Vector3
 from burg_drake.core.files import atomic_write
+from burg_drake.core.paths import MESH_FILE, SURFACE_FILE
 from burg_drake.objects.collision import contact_geometry, primitive_mesh
 from burg_drake.objects.library import (
     DEFAULT_FRICTION,
@@ -42,8 +43,6 @@ from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import Geometry, intact, read_record
 from burg_drake.pipeline.source import ObjectSource
 
-MESH_FILE = "mesh.obj"
-SURFACE_FILE = "surface.obj"
 PIECES_FOLDER = "pieces"
 Pieces = tuple[trimesh.Trimesh, ...]
 

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 
 from burg_drake.core.files import atomic_write
+from burg_drake.core.paths import MESH_FILE
 from burg_drake.objects.collision import deviation_warning
 from burg_drake.objects.library import (
     Decomposition,
@@ -22,7 +23,7 @@ from burg_drake.objects.library import (
     model_sdf,
 )
 from burg_drake.objects.physics import DEFAULT_DENSITY, implausible, mass_properties
-from burg_drake.pipeline.geometry import MESH_FILE, build_geometry
+from burg_drake.pipeline.geometry import build_geometry
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import (
     Geometry,

@@ -125,8 +125,9 @@ class BoardNode:
             )
         else:
             raise InvalidInputError(
-                "there was no camera_info yet; if the camera has none, give --intrinsics FILE"
-            )
+                "there was no camera_info yet; if the camera has none, give its intrinsics as a"
+                " file"
+            ).about("intrinsics")
         height, width = image.shape[:2]
         if (width, height) != (found.width, found.height):
             raise InvalidInputError(

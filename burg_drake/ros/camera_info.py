@@ -36,8 +36,8 @@ def intrinsics_of(message: Any, *, rectified: bool = False) -> Intrinsics:
     if min(fx, fy) <= 0.0:
         raise InvalidInputError(
             f"camera_info has {'P' if rectified else 'K'} = 0, the camera is not calibrated;"
-            " calibrate it, or give --intrinsics FILE"
-        )
+            " calibrate it, or give its intrinsics as a file"
+        ).about("intrinsics")
     if skew:
         raise InvalidInputError(f"camera_info has sheared pixels, skew {skew:g}")
     region = message.roi
@@ -62,8 +62,9 @@ def _distortion(message: Any) -> tuple[float, ...]:
     if message.distortion_model not in ROS_MODELS:
         raise InvalidInputError(
             f"camera_info has the distortion model {message.distortion_model!r}, plumb_bob and"
-            " rational_polynomial are read; rectify the images (image_proc) and give --rectified"
-        )
+            " rational_polynomial are read; rectify the images (image_proc) and start the node"
+            " for rectified ones"
+        ).about("rectified")
     return coefficients
 
 

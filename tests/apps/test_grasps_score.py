@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.grasps import score as score_verb
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.grasping.quality.metrics import DEFAULT_METRIC, METRICS
+from burg_drake.grasping.quality.metrics import METRICS
 
 Capture = pytest.CaptureFixture[str]
 
@@ -132,7 +131,3 @@ def test_a_scene_tells_collisions(scene_file: Path, tmp_path: Path, capsys: Capt
     (line,) = (x for x in capsys.readouterr().out.splitlines() if x.startswith("screened: "))
     told = dict(part.split() for part in line.removeprefix("screened: ").split(", "))
     assert told == {name: str(screened.count(name)) for name in set(screened)}
-
-
-def test_help_is_in_step_with_the_metrics() -> None:
-    assert score_verb.DEFAULT_METRIC == DEFAULT_METRIC

@@ -177,8 +177,14 @@ def test_a_narrower_call_keeps_what_is_known(copied: Run, tmp_path: Path) -> Non
         (["--translation-mm", "-1"], "-1 is below 0"),
         (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),
         (["-o", "rob"], "rob is not a table of a known format; give a file that ends in .csv or"),
-        (["-o", "RUN/results.csv"], "results.csv belongs to the run itself; choose another -o"),
-        (["-o", "RUN/journal.csv"], "journal.jsonl belongs to the run itself; choose another -o"),
+        (
+            ["-o", "RUN/results.csv"],
+            "results.csv belongs to the run itself; choose another file (--output)",
+        ),
+        (
+            ["-o", "RUN/journal.csv"],
+            "journal.jsonl belongs to the run itself; choose another file (--output)",
+        ),
     ],
 )
 def test_bad_arguments(options: list[str], message: str, run: Run, capsys: Capture) -> None:

@@ -7,12 +7,6 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.scene import export
-from burg_drake.export.scene_export import FORMATS
-
-
-def test_formats_are_those_of_the_room() -> None:
-    assert list(export.FORMATS) == list(FORMATS)
 
 
 def test_export_says_what_it_wrote(

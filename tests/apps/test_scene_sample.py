@@ -7,9 +7,6 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.scene import recipe
-from burg_drake.scene.document.layout import LAYOUTS, TRIES
-from burg_drake.scene.document.recipe import ATTEMPTS, SceneRecipe
 from burg_drake.scene.document.scene import load_scene
 
 SAMPLE = ("scene", "sample", "household", "--no-settle", "--quiet")
@@ -91,10 +88,3 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
 def test_what_cannot_be(arguments: list[str], message: str, capsys: Captured) -> None:
     assert main(["scene", "sample", *arguments]) == 2
     assert message in capsys.readouterr().err
-
-
-def test_options_are_in_step_with_recipes() -> None:
-    assert set(recipe.SPACINGS) | {"random", "packed", "heap"} == set(LAYOUTS)
-    assert recipe.DEFAULT_TRIES == TRIES
-    assert recipe.DEFAULT_ATTEMPTS == ATTEMPTS
-    assert SceneRecipe(library="household").count == recipe.DEFAULT_COUNT

@@ -6,20 +6,19 @@ import math
 import shutil
 from datetime import datetime
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.trials import plan
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
 from burg_drake.cameras.placement.document import load_placement
 from burg_drake.core.frames import make_pose
 from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import Among, RealTrial, Success, load_trials
+from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 from burg_drake.system_libraries import missing_render_libraries
 from tests.experiment.known_runs import ended, make_run, make_scene
 
@@ -57,10 +56,6 @@ def sheet(planned: Path) -> Path:
 
 def trial(sheet: Path, number: int) -> RealTrial:
     return load_trials(sheet).trial(number)
-
-
-def test_choices_are_those_of_the_sheet() -> None:
-    assert get_args(Among) == plan.AMONG and get_args(Success) == plan.SUCCESS
 
 
 def test_plan_tells_what_was_chosen_and_what_it_will_tell(planned: Path, capsys: Capture) -> None:

@@ -16,7 +16,7 @@ from burg_drake.cameras.optics.field_of_view import FieldOfView
 from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
 from burg_drake.cameras.projection.scene_mesh import build_scene_mesh
-from burg_drake.cameras.systems.board_loop import BoardLoop, build_board_loop
+from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
 from burg_drake.cameras.systems.pose_filter import PoseFilter
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
@@ -205,7 +205,7 @@ def test_images_at_a_rate(station: Station) -> None:
     """With a period the estimate stays until the next image, and then is of that one."""
     empty = SceneDocument(name="empty", library="household")
     scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
-    loop = build_board_loop(scene, station, style=PLAIN, period=0.1, depth=True)
+    loop = build_board_loop(scene, station, LoopCamera(period=0.1, depth=True), style=PLAIN)
     simulator = Simulator(loop.diagram)
     context = simulator.get_mutable_context()
     first, second = looking(0.8, 70, 0, 0), looking(0.7, 60, 50, 10)
@@ -245,7 +245,7 @@ def test_a_filter_is_not_an_image_late(station: Station) -> None:
     empty = SceneDocument(name="empty", library="household")
     scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
     pose_filter = PoseFilter(period=0.1, patience=1)
-    loop = build_board_loop(scene, station, style=PLAIN, period=0.1, filter=pose_filter)
+    loop = build_board_loop(scene, station, LoopCamera(period=0.1), style=PLAIN, filter=pose_filter)
     simulator = Simulator(loop.diagram)
     context = simulator.get_mutable_context()
     for k, roll in enumerate((0.0, 40.0, 80.0)):
@@ -272,9 +272,9 @@ def test_bad_input(scene: Scene, station: Station, loop: BoardLoop, context: Con
     with pytest.raises(UnknownNameError, match="has no camera 'bord'; did you mean 'board'"):
         build_board_loop(scene, station, "bord")
     with pytest.raises(InvalidInputError, match="samples 0 of a camera must be 1 to 8"):
-        build_board_loop(scene, station, samples=0)
+        build_board_loop(scene, station, LoopCamera(samples=0))
     with pytest.raises(InvalidInputError, match="period 0 of a camera must be above 0"):
-        build_board_loop(scene, station, period=0.0)
+        LoopCamera(period=0.0)
     tiny = replace(scene, document=replace(scene.document, board=Board(size=(0.03, 0.03))))
     with pytest.raises(InvalidInputError, match="do not fit on a board of 30 x 30 mm"):
         build_board_loop(tiny, station)

@@ -244,7 +244,8 @@ def test_another_run_is_not_mixed_in(
         )
     assert str(error.value) == (
         f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object,"
-        " sampled blind there, 6 an object, sampled blind here); choose another -o, or delete it"
+        " sampled blind there, 6 an object, sampled blind here); choose another folder, or"
+        " delete it"
     )
     with pytest.raises(InvalidInputError) as error:
         evaluate(
@@ -368,7 +369,7 @@ def test_own_files_are_not_overwritten(
             progress=False,
         )
     assert str(error.value) == (
-        f"{mine} is not empty and holds no run ({name} is in it); choose another -o"
+        f"{mine} is not empty and holds no run ({name} is in it); choose another folder"
     )
     assert {path.name: path.read_text() for path in mine.iterdir()} == {name: "my work"}
 

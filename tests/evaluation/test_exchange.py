@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.exchange import read_in_frame
+from burg_drake.evaluation.grasp_sets.exchange import SeenScene, read_in_frame
 from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import Scene
 
@@ -37,7 +37,7 @@ def file(grasps: GraspSet, tmp_path: Path) -> Path:
 
 
 def test_in_a_scene_grasps_are_on_every_instance(scene: Scene, file: Path) -> None:
-    read = read_in_frame(file, "world", scene=scene)
+    read = read_in_frame(file, "world", seen=SeenScene(scene=scene))
     instances = read.grasps.columns["instance"].tolist()
     assert (read.frame, sorted(instances)) == ("world", ["bar", "left", "right"])
     for X_SG, name in zip(read.grasps.X_OG, instances, strict=True):
@@ -49,16 +49,20 @@ def test_in_a_scene_grasps_are_on_every_instance(scene: Scene, file: Path) -> No
 def test_through_a_camera_and_back(
     scene: Scene, grasps: GraspSet, file: Path, tmp_path: Path, ids: dict[int, str]
 ) -> None:
-    seen = read_in_frame(file, "camera", scene=scene, X_SF=X_SC, object_ids=ids)
+    seen = read_in_frame(file, "camera", seen=SeenScene(scene=scene, X_SF=X_SC, object_ids=ids))
     write_grasp_file(seen.grasps, tmp_path / "seen.npy", "graspnet")
-    back = read_in_frame(tmp_path / "seen.npy", "object", scene=scene, X_SF=X_SC, object_ids=ids)
+    back = read_in_frame(
+        tmp_path / "seen.npy", "object", seen=SeenScene(scene=scene, X_SF=X_SC, object_ids=ids)
+    )
     assert sorted(back.grasps.columns["instance"].tolist()) == ["bar", "left", "right"]
     for X_OG, object in zip(back.grasps.X_OG, back.grasps.object, strict=True):
         np.testing.assert_allclose(X_OG, grasps.X_OG[grasps.object == object][0], atol=1e-6)
 
 
 def test_object_ids_are_written(scene: Scene, file: Path) -> None:
-    seen = read_in_frame(file, "camera", scene=scene, X_SF=X_SC, object_ids={4: "left", 9: "bar"})
+    seen = read_in_frame(
+        file, "camera", seen=SeenScene(scene=scene, X_SF=X_SC, object_ids={4: "left", 9: "bar"})
+    )
     ids = dict(zip(seen.grasps.columns["instance"], seen.grasps.columns["object_id"], strict=True))
     assert ids == {"left": 4, "right": -1, "bar": 9}
 
@@ -66,12 +70,12 @@ def test_object_ids_are_written(scene: Scene, file: Path) -> None:
 def test_between_camera_and_scene_a_pose_is_enough(
     scene: Scene, file: Path, tmp_path: Path
 ) -> None:
-    placed = read_in_frame(file, "world", scene=scene).grasps
+    placed = read_in_frame(file, "world", seen=SeenScene(scene=scene)).grasps
     write_grasp_file(placed, tmp_path / "placed.csv")
-    seen = read_in_frame(tmp_path / "placed.csv", "camera", X_SF=X_SC).grasps
+    seen = read_in_frame(tmp_path / "placed.csv", "camera", seen=SeenScene(X_SF=X_SC)).grasps
     np.testing.assert_allclose(X_SC @ seen.X_OG, placed.X_OG, atol=1e-12)
     write_grasp_file(seen, tmp_path / "seen.npy", "graspnet")
-    back = read_in_frame(tmp_path / "seen.npy", "world", X_SF=X_SC).grasps
+    back = read_in_frame(tmp_path / "seen.npy", "world", seen=SeenScene(X_SF=X_SC)).grasps
     np.testing.assert_allclose(back.X_OG, placed.X_OG, atol=1e-6)
 
 
@@ -87,7 +91,7 @@ def test_what_is_missing_is_named(scene: Scene, file: Path, tmp_path: Path) -> N
     ):
         read_in_frame(file, "world")
     with pytest.raises(InvalidInputError, match=r"wanted in a camera.*its pose"):
-        read_in_frame(file, "camera", scene=scene)
+        read_in_frame(file, "camera", seen=SeenScene(scene=scene))
     write_grasp_file(GraspSet.load(file), tmp_path / "a.csv")
     with pytest.raises(InvalidInputError, match=r"in a scene.*a camera.*pose"):
         read_in_frame(tmp_path / "a.csv", "camera")

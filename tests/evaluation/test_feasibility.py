@@ -25,6 +25,7 @@ from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.feasibility import reach, reach_columns
 from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.table_file import read_table, write_table
+from burg_drake.evaluation.store.plan_folder import PlanOutput
 from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -60,7 +61,7 @@ def plans(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def judged(scene: Scene, station: Station, plans: Path) -> GraspSet:
     given = GraspSet.create(GRASPS, object="box", width=0.06)
-    return reach(scene, station, given, plans=plans, plan_format="json", workers=1)
+    return reach(scene, station, given, plans=plans, workers=1)
 
 
 def X_WG(scene: Scene, station: Station, q: Array) -> Array:
@@ -141,7 +142,7 @@ def test_plans_go_to_a_folder_of_their_own(
     before = contents(plans)
     given = GraspSet.create(GRASPS[:2], object="box", width=0.06)
     with pytest.raises(InvalidInputError) as error:
-        reach(scene, station, given, exact=False, plans=plans, plan_format="csv")
+        reach(scene, station, given, exact=False, plans=PlanOutput(plans, format="csv"))
     assert re.fullmatch(
         rf"folder {plans} has plans of something else \(grasps is 4, content \w+ there, 2, content"
         r" \w+ here; check is exact there, screening here; format is json there, csv here\);"
@@ -161,7 +162,7 @@ def test_what_is_finished_is_not_asked_again(
     monkeypatch.setattr("burg_drake.evaluation.feasibility.ReachJudgeFactory", lambda *_: refuse)
     given = GraspSet.create(GRASPS, object="box", width=0.06)
     before = contents(plans)
-    again = reach(scene, station, given, plans=plans, plan_format="json")
+    again = reach(scene, station, given, plans=plans)
     assert contents(plans) == before
     for name, values in judged.columns.items():
         np.testing.assert_array_equal(again.column(name), values)
@@ -181,10 +182,10 @@ def test_what_failed_is_asked_again_on_request(
     failed = Verdict(Outcome.SIMULATION_FAILED, Stage.PLANNED, reason="it crashed")
     with (folder / "journal.jsonl").open("ab") as journal:
         journal.write(encode(f"box-{judged.id[2]}", failed))
-    kept = reach(scene, station, given, plans=folder, plan_format="json")
+    kept = reach(scene, station, given, plans=folder)
     assert np.flatnonzero(kept.column("outcome") == "").tolist() == [2]
     with pytest.raises(BurgError, match="no such model"):
-        reach(scene, station, given, plans=folder, plan_format="json", retry_failed=True)
+        reach(scene, station, given, plans=PlanOutput(folder, retry_failed=True))
 
 
 KILLED = """
@@ -192,7 +193,7 @@ import sys
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.feasibility import reach
 grasps = GraspSet.load(sys.argv[1])
-reach("tabletop_six", "panda_tabletop", grasps, plans=sys.argv[2], plan_format="json", workers=1)
+reach("tabletop_six", "panda_tabletop", grasps, plans=sys.argv[2], workers=1)
 """
 
 
@@ -211,7 +212,7 @@ def test_a_killed_call_is_gone_on_with(
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     (folder / f".{name}.0123456789abcdef").write_text("half of a pl")
-    found = reach(scene, station, given, plans=folder, plan_format="json", workers=1)
+    found = reach(scene, station, given, plans=folder, workers=1)
     ours, theirs = contents(folder), contents(plans)
     assert ours.keys() == theirs.keys()
     for file in set(ours) - {"journal.jsonl"}:

@@ -75,7 +75,7 @@ def test_shards_of_one_scene(
     assert two.notes == (
         "5 grasps are not judged",
         "shards that were not given: 2/3",
-        f"to judge the rest: the command of the runs with no --shard and -o {tmp_path / 'two'}",
+        f"to judge the rest, evaluate the same into {tmp_path / 'two'}, with no shard",
     )
     rest = run_one(scene, station, tmp_path / "two", executor=(executor := Inline()))
     assert executor.judged == 5 and same(whole.results, rest.results)
@@ -161,7 +161,7 @@ def test_refusals(
     for paths, out, message in (
         ([a.path, b.path], "c", "(seed is 0 there, 1 here); only shards and copies of one run"),
         ([a.path, many.path], "c", "many one of many; only runs of the same can be united"),
-        ([a.path], "b", "b is there already; choose another -o"),
+        ([a.path], "b", "b is there already; choose another folder"),
         ([tmp_path / "nothing"], "c", "holds no run (run.yaml is missing)"),
         ([], "c", "no runs are given; give the folders of one or more"),
     ):
@@ -200,7 +200,7 @@ def test_the_same_merge_finishes_what_was_killed(
         assert not (out / "report.html").exists()
         (note,) = out.glob(".merge.*")
         assert UNFINISHED.fullmatch(note.name)  # `evaluate` removes it
-        with pytest.raises(InvalidInputError, match="is there already; choose another -o"):
+        with pytest.raises(InvalidInputError, match="is there already; choose another folder"):
             unite(paths[:1], out)
         merged = unite(reversed(paths), out)
         assert same(merged.result.results, whole.result.results)

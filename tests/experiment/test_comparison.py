@@ -14,13 +14,11 @@ from sklearn.metrics import confusion_matrix
 
 import burg_drake as burg
 from burg_drake.apps.cli import main
-from burg_drake.apps.comparison.compare import DEFAULT_LIMIT_MM, SUCCESSES as OFFERED
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.robustness.shares import lifted_shares
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparing import SUCCESSES, compare
-from burg_drake.experiment.comparison.placement_error import LIMIT_MM
+from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
 from burg_drake.experiment.comparison.wording import headline
@@ -29,6 +27,7 @@ from burg_drake.experiment.pairing.pairs import NAMES
 from burg_drake.experiment.pairing.result_table import ResultTable
 from burg_drake.experiment.pairing.text_codes import Factor, Ids, text_keys
 from burg_drake.experiment.planning.plan import plan_trials
+from burg_drake.experiment.planning.settings import SelectionSettings
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,
     RealTrial,
@@ -289,7 +288,11 @@ def test_a_table_of_robustness_of_another_run_is_refused(tmp_path: Path) -> None
         with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
             compare(first, second, robustness=tmp_path / f"{refused}.csv")
         with pytest.raises(InvalidInputError, match=r"is of (run 0123456789ab|another run)"):
-            plan_trials(first, balance="probability", robustness=tmp_path / f"{refused}.csv")
+            plan_trials(
+                first,
+                settings=SelectionSettings(balance="probability"),
+                robustness=tmp_path / f"{refused}.csv",
+            )
 
 
 def test_texts_as_numbers() -> None:
@@ -340,7 +343,6 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert capsys.readouterr().err.startswith("burg-drake: error: ")
     assert main(["compare", str(sheet), str(first.path)]) == 2
     assert "is not a run; give the run first" in capsys.readouterr().err
-    assert OFFERED == SUCCESSES and DEFAULT_LIMIT_MM == LIMIT_MM
 
 
 def test_the_headline_where_nothing_succeeded(tmp_path: Path) -> None:

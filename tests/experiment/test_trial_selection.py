@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.records.table_file import write_table
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.planning.plan import plan_trials
+from burg_drake.experiment.planning.settings import SelectionSettings
 from burg_drake.experiment.planning.strata import allocate
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import TrialSheet, load_trials
@@ -45,6 +47,13 @@ def other(folder: Path) -> Run:
     return make_run(folder / "other", scene, {"mug": MUG, "box": BOX}, seed=7)
 
 
+def planned(
+    runs: Any, *, out: Path | None = None, table: Path | None = None, **chosen: Any
+) -> TrialSheet:
+    """A sheet of grasps that are chosen by these settings."""
+    return plan_trials(runs, settings=SelectionSettings(**chosen), robustness=table, out=out)
+
+
 def counts(sheet: TrialSheet) -> Counter[tuple[str, str]]:
     return Counter((t.object, t.simulated.value) for t in sheet.trials)
 
@@ -54,7 +63,7 @@ def grasps(sheet: TrialSheet) -> set[tuple[str, str]]:
 
 
 def test_success_and_failure_are_balanced_as_far_as_there_are_enough(hand: Run) -> None:
-    sheet = plan_trials(hand, per_object=6)
+    sheet = planned(hand, per_object=6)
     assert counts(sheet) == {
         ("mug", "lifted"): 3,
         ("box", "lifted"): 3,
@@ -63,14 +72,14 @@ def test_success_and_failure_are_balanced_as_far_as_there_are_enough(hand: Run) 
     strata = {(s.object, s.label): s for s in sheet.strata.values()}
     assert (strata["mug", "success"].population, strata["mug", "failure"].population) == (12, 6)
     assert sheet.notes == ("2 grasps of run two could not be simulated; left out",)
-    more = plan_trials(hand, per_object=16)
+    more = planned(hand, per_object=16)
     chosen = {(s.object, s.label): (s.selected, s.wanted) for s in more.strata.values()}
     assert chosen["mug", "failure"] == (6, 8) and chosen["mug", "success"] == (10, 8)
     assert "mug of run two: 6 of 8 with failure; others make up for it" in more.notes
     assert grasps(sheet) < grasps(more)
-    most = plan_trials(hand, per_object=30)
+    most = planned(hand, per_object=30)
     assert any("box (" in note and "20 of 30 in all" in note for note in most.notes)
-    held = plan_trials(hand, per_object=16, success="held")
+    held = planned(hand, per_object=16, success="held")
     assert {s.population for s in held.strata.values() if s.object == "mug"} == {15, 3}
 
 
@@ -79,23 +88,23 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
 ) -> None:
     lifted = [ended("lifted")] * 4
     run = make_run(tmp_path / "run", make_scene(tmp_path), {"mug": lifted, "box": lifted})
-    assert plan_trials(run, per_object=4).notes == (
+    assert planned(run, per_object=4).notes == (
         "box, mug of run two: 0 of 2 with failure; others make up for it",
         "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
         " predicted",
     )
     verdicts = {"mug": [*lifted, ended("slipped")], "box": lifted}
     uneven = make_run(tmp_path / "uneven", make_scene(tmp_path), verdicts)
-    assert plan_trials(uneven, per_object=4).notes[0] == (
+    assert planned(uneven, per_object=4).notes[0] == (
         "box (0 of 2), mug (1 of 2) of run two: too few with failure; others make up for it"
     )
     verdicts = {"mug": lifted, "box": [ended("slipped")]}
     mixed = make_run(tmp_path / "mixed", make_scene(tmp_path), verdicts)
-    assert not any("almost nothing" in note for note in plan_trials(mixed, per_object=4).notes)
+    assert not any("almost nothing" in note for note in planned(mixed, per_object=4).notes)
 
 
 def test_strata_by_outcome_and_without_any(hand: Run) -> None:
-    sheet = plan_trials(hand, per_object=6, balance="stage", among="clear")
+    sheet = planned(hand, per_object=6, balance="stage", among="clear")
     labels = {s.label: s.population for s in sheet.strata.values() if s.object == "mug"}
     assert labels == {
         "executed/lifted": 12,
@@ -103,11 +112,11 @@ def test_strata_by_outcome_and_without_any(hand: Run) -> None:
         "executed/lifted_disturbed": 3,
     }
     assert counts(sheet)["mug", "slipped"] == 2
-    assert {s.label for s in plan_trials(hand, balance="none").strata.values()} == {"all"}
+    assert {s.label for s in planned(hand, balance="none").strata.values()} == {"all"}
 
 
 def test_bins_of_a_margin_hold_as_many_grasps_each(hand: Run) -> None:
-    sheet = plan_trials(hand, per_object=6, balance="margin:clearance", bins=3)
+    sheet = planned(hand, per_object=6, balance="margin:clearance", bins=3)
     rows = {id: hand.row(id)["clearance"] for id in hand.candidates.id if id in hand.verdicts}
     mug = [s for s in sheet.strata.values() if s.object == "mug"]
     assert [s.population for s in mug] == [5, 5, 5] and {s.selected for s in mug} == {2}
@@ -121,13 +130,11 @@ def test_bins_of_a_margin_hold_as_many_grasps_each(hand: Run) -> None:
 
 def test_bins_of_probability_come_from_robustness(hand: Run, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="burg-drake robustness"):
-        plan_trials(hand, balance="probability")
+        planned(hand, balance="probability")
     ids = [id for id in hand.candidates.id if hand.verdicts[id].outcome.value == "lifted"]
     share = np.linspace(0.0, 1.0, len(ids))
     write_table(tmp_path / "r.csv", {"id": np.array(ids), "success": share})
-    sheet = plan_trials(
-        hand, per_object=4, balance="probability", bins=2, robustness=tmp_path / "r.csv"
-    )
+    sheet = planned(hand, per_object=4, balance="probability", bins=2, table=tmp_path / "r.csv")
     known = dict(zip(ids, share, strict=True))
     for held in ("mug", "box"):
         own = sorted(v for id, v in known.items() if id.startswith(held))
@@ -137,12 +144,12 @@ def test_bins_of_probability_come_from_robustness(hand: Run, tmp_path: Path) -> 
 
 
 def test_order_of_runs_and_seed(hand: Run, other: Run) -> None:
-    one = plan_trials([hand, other], per_object=4, blocks=2)
-    two = plan_trials([other.path, hand.path], per_object=4, blocks=2)
+    one = planned([hand, other], per_object=4, blocks=2)
+    two = planned([other.path, hand.path], per_object=4, blocks=2)
     assert one.trials == two.trials and one.strata == two.strata
     assert set(one.runs) == {"two", "another"}
-    assert plan_trials([hand, other], per_object=4, blocks=2, seed=1).trials != one.trials
-    alone = plan_trials(hand, per_object=4)
+    assert planned([hand, other], per_object=4, blocks=2, seed=1).trials != one.trials
+    alone = planned(hand, per_object=4)
     assert grasps(alone) < grasps(one)  # another run beside it changes nothing
     scenes = [trial.run for trial in one.trials]
     blocks = [trial.block for trial in one.trials]
@@ -150,15 +157,15 @@ def test_order_of_runs_and_seed(hand: Run, other: Run) -> None:
     for block in (1, 2, 3, 4):
         assert len({run for run, b in zip(scenes, blocks, strict=True) if b == block}) == 1
     assert scenes[0] != scenes[4] and scenes[8] != scenes[12]  # each scene once in a round
-    drawn = plan_trials([hand, other], per_object=4, scenes=1)
+    drawn = planned([hand, other], per_object=4, scenes=1)
     assert len(drawn.runs) == 1 and grasps(drawn) < grasps(one)
     with pytest.raises(InvalidInputError, match="3 scenes are wanted; the runs have 2"):
-        plan_trials([hand, other], scenes=3)
+        planned([hand, other], scenes=3)
 
 
 def test_chance_is_fair(hand: Run) -> None:
     """Each of 20 boxes is chosen in a quarter of the draws, and boxes come first in half."""
-    plans = [plan_trials(hand, per_object=5, balance="none", seed=seed) for seed in range(80)]
+    plans = [planned(hand, per_object=5, balance="none", seed=seed) for seed in range(80)]
     chosen = Counter(t.grasp for p in plans for t in p.trials if t.object == "box")
     assert len(chosen) == 20
     squares = sum((n - 20) ** 2 / 20 for n in chosen.values())
@@ -171,15 +178,15 @@ def test_a_grasp_of_two_runs_is_tried_once(folder: Path, hand: Run) -> None:
     scene = make_scene(folder)
     reached = [ended("no_ik"), *MUG[1:]]
     arm = make_run(folder / "arm", scene, {"mug": reached, "box": BOX}, mode="reach")
-    sheet = plan_trials([hand, arm], per_object=30)
+    sheet = planned([hand, arm], per_object=30)
     assert set(sheet.runs) == {"two-reach"}
     assert len({trial.content for trial in sheet.trials}) == len(sheet.trials) == 17 + 20
     assert any("38 grasps of run two-hand are in another run" in note for note in sheet.notes)
-    clear = plan_trials(arm, per_object=30, among="clear")
+    clear = planned(arm, per_object=30, among="clear")
     assert counts(clear)["mug", "no_ik"] == 1
-    assert counts(plan_trials(arm, per_object=30, among="reachable"))["mug", "no_ik"] == 0
+    assert counts(planned(arm, per_object=30, among="reachable"))["mug", "no_ik"] == 0
     with pytest.raises(InvalidInputError, match="mode hand, which asks no arm"):
-        plan_trials([hand], among="reachable")
+        planned([hand], among="reachable")
 
 
 @given(
@@ -198,16 +205,16 @@ def test_no_stratum_could_give_more_evenly(populations: dict[str, int], wanted: 
 
 def test_a_sheet_is_not_written_over_once_it_has_entries(hand: Run, tmp_path: Path) -> None:
     path = tmp_path / "trials.yaml"
-    plan_trials(hand, per_object=2, out=path)
-    plan_trials(hand, per_object=3, out=path)
+    planned(hand, per_object=2, out=path)
+    planned(hand, per_object=3, out=path)
     assert load_trials(path).selection.per_object == 3
     text = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
-    with pytest.raises(InvalidInputError, match=r"has entries for 1 trial; choose another -o"):
-        plan_trials(hand, out=path)
+    with pytest.raises(InvalidInputError, match=r"has entries for 1 trial; choose another file"):
+        planned(hand, out=path)
     path.write_text(text)  # by an editor with an old buffer
     with pytest.raises(InvalidInputError, match="has entries for 1 trial"):
-        plan_trials(hand, out=path)
+        planned(hand, out=path)
 
 
 @pytest.mark.parametrize(
@@ -222,12 +229,12 @@ def test_a_sheet_is_not_written_over_once_it_has_entries(hand: Run, tmp_path: Pa
 )
 def test_what_cannot_be_asked_for(hand: Run, words: dict[str, object], message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
-        plan_trials(hand, **words)  # type: ignore[arg-type]
+        planned(hand, **words)
 
 
 def test_runs_are_found_again_and_checked(hand: Run, other: Run, tmp_path: Path) -> None:
     path = hand.path.parent / "trials.yaml"
-    sheet = plan_trials([hand, other], per_object=3, out=path)
+    sheet = planned([hand, other], per_object=3, out=path)
     assert sheet.runs["two"].path == "hand"
     runs = load_sources(load_trials(path), path)
     rows = trial_rows(sheet, runs)
@@ -249,7 +256,7 @@ def test_grasps_that_changed_are_refused(folder: Path, tmp_path: Path, change: s
     scene = make_scene(folder)
     verdicts = {"mug": [ended("lifted"), ended("slipped")]}
     path = tmp_path / "trials.yaml"
-    sheet = plan_trials(make_run(tmp_path / "a", scene, verdicts), out=path)
+    sheet = planned(make_run(tmp_path / "a", scene, verdicts), out=path)
     trial = next(t for t in sheet.trials if t.simulated == "slipped")
     text = path.read_text()
     if change == "gone":

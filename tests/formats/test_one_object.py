@@ -14,13 +14,11 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.formats.common.conversion import with_objects_renamed
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.common.one_object import (
-    LIBRARY_MESHES,
     check_hand,
     description_of,
     object_name,
     success_of,
 )
-from burg_drake.pipeline.geometry import MESH_FILE, SURFACE_FILE
 
 THREE = np.repeat(np.eye(4)[None], 3, axis=0)
 
@@ -44,10 +42,6 @@ THREE = np.repeat(np.eye(4)[None], 3, axis=0)
 )
 def test_objects_are_called_after_their_files(file: str, name: str) -> None:
     assert object_name(file) == name
-
-
-def test_meshes_of_libraries_are_called_as_here() -> None:
-    assert LIBRARY_MESHES == (MESH_FILE, SURFACE_FILE)
 
 
 @pytest.mark.parametrize("parts", ["list", "mapping"])

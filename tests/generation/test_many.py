@@ -104,7 +104,7 @@ def test_another_recipe_is_refused(
     assert str(caught.value) == (
         f"{whole} holds other scenes (only is box, can, marble, mug there, none here; layout is"
         " random there, close here; fewer is off there, on here; seed is 0 there, 8 here); choose"
-        " another -o, or delete it"
+        " another folder, or delete it"
     )
     assert contents(whole) == before
     (tmp_path / "mine").mkdir()

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from burg_drake.apps import ros
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.ros.link import Names, Parent
+from burg_drake.ros.link import Names
 
 
 @pytest.mark.parametrize(
@@ -41,10 +40,3 @@ def test_topics_beside_the_images(image: str, compressed: bool, info: str) -> No
 def test_what_is_no_name(fields: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
         Names(**{"image": "/image"} | fields)
-
-
-def test_the_command_knows_the_defaults() -> None:
-    names = Names(image=ros.DEFAULT_IMAGE)
-    assert (names.node, names.board_frame) == (ros.DEFAULT_NODE, ros.DEFAULT_FRAME)
-    assert tuple(parent.value for parent in Parent) == ros.PARENTS
-    assert names.parent.value == ros.PARENTS[0]

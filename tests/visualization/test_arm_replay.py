@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from eye import VIEWS, in_view, messages
 
@@ -10,6 +12,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.planner import plan
 from burg_drake.motion.plans.grasp_plan import Plan
 from burg_drake.scene.document.scene import load_scene
+from burg_drake.simulation.trials.arm_trial import ArmTrial
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station
 from burg_drake.visualization.scenes.arm_replay import record_arm_trial
@@ -24,9 +27,9 @@ def test_the_arm_is_recorded_from_home_on() -> None:
     found = plan(scene, station, "box", X_OG, width=0.06)
     assert isinstance(found, Plan)
     meshcat = open_meshcat()
-    result = record_arm_trial(
-        scene, station, "box", X_OG, found, meshcat, engine=ENGINES["screening"]
-    )
+    whole = replace(ENGINES["screening"], whole_trial=True)
+    trial = ArmTrial(scene, station, engine=whole, transfer=True, meshcat=meshcat)
+    result = record_arm_trial(trial, "box", X_OG, found, meshcat)
     assert result.outcome is Outcome.LIFTED
     shortest = found.transfer.duration + found.approach.duration + found.lift.duration
     assert result.margins.end_time > shortest  # and the hand has closed and held

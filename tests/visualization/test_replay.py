@@ -48,8 +48,9 @@ def station() -> Station:
 def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
     early = HandTrial(scene, station).run("box", X_OG)
-    result = record_trial(scene, station, "box", X_OG, meshcat)
     whole = dataclasses.replace(ENGINES["standard"], whole_trial=True)
+    shown = HandTrial(scene, station, engine=whole, meshcat=meshcat)
+    result = record_trial(shown, "box", X_OG, meshcat)
     again = HandTrial(scene, station, engine=whole).run("box", X_OG)
     assert repr(result) == repr(again)  # NaN is not equal to itself
     assert result.outcome is early.outcome is Outcome.LIFTED
@@ -71,15 +72,18 @@ def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station:
 
 def test_a_collision_is_a_still_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
-    result = record_trial(scene, station, "box", X_OG @ make_pose(p_AB=(0, 0, 0.1)), meshcat)
+    trial = HandTrial(scene, station, meshcat=meshcat)
+    result = record_trial(trial, "box", X_OG @ make_pose(p_AB=(0, 0, 0.1)), meshcat)
     assert result.outcome is Outcome.COLLISION_TARGET
     assert b"set_animation" not in b"".join(messages(meshcat.StaticHtml()))
     assert meshcat.HasPath("/drake/visualizer/hand/panda_hand")
 
 
 def test_unknown_target(scene: Scene, station: Station) -> None:
+    meshcat = open_meshcat()
+    trial = HandTrial(scene, station, meshcat=meshcat)
     with pytest.raises(InvalidInputError, match=r"'table' is not a free object.*mug"):
-        record_trial(scene, station, "table", X_OG, open_meshcat())
+        record_trial(trial, "table", X_OG, meshcat)
 
 
 @pytest.mark.parametrize("yaw", np.deg2rad([0, 35, 90, 200]))

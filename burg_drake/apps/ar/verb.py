@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_measured_board,
     add_scene,
     add_verb,
@@ -35,7 +36,7 @@ IDLE_AFTER = 3.0
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "ar",
         run_ar,
@@ -45,7 +46,11 @@ def add_to(verbs: Any) -> None:
         "burg-drake ar tabletop_six --camera sim:panda_tabletop/board",
         "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml --no-browser"
         " --check --snapshot trial_7",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     add_scene(parser)
     parser.add_argument(
         "--camera",

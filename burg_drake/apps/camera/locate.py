@@ -7,6 +7,7 @@ import sys
 from typing import Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_measured_board,
     add_scene,
     add_station,
@@ -17,14 +18,18 @@ from burg_drake.apps.options import (
 
 def add_to(group: Any) -> None:
     """Adds the verb to the group `camera`."""
-    parser = add_verb(
+    add_verb(
         group,
         "locate",
         run_locate,
         "print where a fixed camera stands, from photos of the board, as lines for the station",
         "burg-drake camera locate tabletop_six photo.png --intrinsics K.yaml --station my.yaml",
         "burg-drake camera locate tabletop_six photos/ --intrinsics K.yaml --name top",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     add_scene(parser)
     parser.add_argument(
         "photos",

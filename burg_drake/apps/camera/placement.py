@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_measured_board,
     add_scene,
     add_verb,
@@ -27,7 +28,7 @@ FEW_MARKERS = 4
 
 def add_to(group: Any) -> None:
     """Adds the verb to the group `camera`."""
-    parser = add_verb(
+    add_verb(
         group,
         "placement",
         run_placement,
@@ -38,7 +39,11 @@ def add_to(group: Any) -> None:
         "",
         "Exit code 1 if an object is not seen, or its measurement is doubtful; 2 if there is no",
         "board in the photo, and then nothing is written.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     add_scene(parser)
     parser.add_argument("photo", metavar="PHOTO", help="image of the scene on its board")
     parser.add_argument(

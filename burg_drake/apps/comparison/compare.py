@@ -12,24 +12,20 @@ from burg_drake.apps.comparison.rejudge import (
     rejudge_words,
     show_rejudged,
 )
-from burg_drake.apps.options import add_verb, not_negative, seed
+from burg_drake.apps.options import Parser, add_verb, not_negative, seed
 from burg_drake.core import InvalidInputError, shown
 
 if TYPE_CHECKING:
     from burg_drake.experiment.comparison import Comparison
     from burg_drake.experiment.gap import Rejudging
 
-# Kept in step with experiment.comparison, which imports too much for a help text; a test compares
-# them.
-SUCCESSES = ("lifted", "held")
-DEFAULT_LIMIT_MM = 2.0
 TRIALS = (".yaml", ".yml")
 """Suffixes of trials files."""
 
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "compare",
         run_compare,
@@ -42,7 +38,13 @@ def add_to(verbs: Any) -> None:
         "",
         "Of two runs the second is what the first is measured by. With trials both are measured by",
         "them, and McNemar's test tells whether one is right more often.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.experiment.comparison import LIMIT_MM, SUCCESSES
+
     parser.add_argument("run_folder", metavar="RUN", help="folder of a run: its verdicts")
     parser.add_argument(
         "others",
@@ -60,7 +62,7 @@ def add_to(verbs: Any) -> None:
         "--placement-limit-mm",
         metavar="MM",
         type=not_negative,
-        default=DEFAULT_LIMIT_MM,
+        default=LIMIT_MM,
         help="how far off every object may be in trials with good placement (default: %(default)g)",
     )
     parser.add_argument(
@@ -110,9 +112,11 @@ def command_line(arguments: argparse.Namespace) -> str:
     """The command that makes this comparison again."""
     import shlex
 
+    from burg_drake.experiment.comparison import LIMIT_MM
+
     words = ["burg-drake", "compare", arguments.run_folder, *arguments.others]
     words += [] if arguments.success is None else ["--success", arguments.success]
-    if arguments.placement_limit_mm != DEFAULT_LIMIT_MM:
+    if arguments.placement_limit_mm != LIMIT_MM:
         words += ["--placement-limit-mm", f"{arguments.placement_limit_mm:g}"]
     words += [] if arguments.robustness is None else ["--robustness", arguments.robustness]
     words += [] if arguments.seed == 0 else ["--seed", str(arguments.seed)]

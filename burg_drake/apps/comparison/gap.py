@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
     DEFAULT_STATION,
-    SCENE_NAMES,
     Parser,
     add_cluster,
     add_given,
@@ -28,6 +27,7 @@ from burg_drake.apps.options import (
     read_given,
     require_file,
     require_sampled,
+    scene_names,
     settings_from,
     workers,
 )
@@ -73,7 +73,7 @@ def _add_options(parser: Parser) -> None:
         "source",
         metavar="SCENE|RUN",
         help="folder of a run, whose grasps are judged; or a scene file, or name of a built-in one:"
-        f" {', '.join(SCENE_NAMES)}",
+        f" {scene_names()}",
     )
     parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder for the steps")
     parser.add_argument(

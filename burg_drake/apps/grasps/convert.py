@@ -91,7 +91,7 @@ def run_convert(arguments: argparse.Namespace) -> int:
 
 def _read(arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper) -> ImportedGrasps:
     """The grasps in the frame that the target wants."""
-    from burg_drake.evaluation.grasp_sets import read_in_frame
+    from burg_drake.evaluation.grasp_sets import SeenScene, read_in_frame
     from burg_drake.formats.common import read_poses
     from burg_drake.scene.document import load_scene
 
@@ -102,10 +102,12 @@ def _read(arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper) 
         format=arguments.source,
         frame=FRAMES.get(arguments.frame),  # type: ignore[arg-type]
         objects=dict(arguments.rename),
-        scene=load_scene(arguments.scene) if arguments.scene else None,
-        X_SF=read_poses(arguments.camera_pose) if arguments.camera_pose else None,
-        object_ids=arguments.object_ids,
-        scene_id=arguments.scene_id,
+        seen=SeenScene(
+            scene=load_scene(arguments.scene) if arguments.scene else None,
+            X_SF=read_poses(arguments.camera_pose) if arguments.camera_pose else None,
+            object_ids=arguments.object_ids,
+            scene_id=arguments.scene_id,
+        ),
     )
 
 

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    Parser,
     add_format,
     add_quiet,
     add_renaming,
@@ -18,16 +19,10 @@ from burg_drake.core import InvalidInputError
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
 
-# Kept in step with grasping.quality, which imports too much for a help text; a test compares them.
-DEFAULT_METRIC = "load_margin"
-
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    from burg_drake.apps.grasps.source import add_source
-    from burg_drake.apps.options import add_file_options, add_file_station
-
-    parser = add_verb(
+    add_verb(
         group,
         "score",
         run_score,
@@ -46,7 +41,15 @@ def add_to(group: Any) -> None:
         "patch_area [m2], contact_offset [m]. In a scene also clearance [m], negative where the",
         "open hand overlaps something, nearest, screened (clear, or which collision),",
         "collides_with. Where a pad meets nothing, metrics are nan.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.apps.grasps.source import add_source
+    from burg_drake.apps.options import add_file_options, add_file_station
+    from burg_drake.grasping.quality import DEFAULT_METRIC
+
     parser.add_argument("file", metavar="FILE", help="grasp file of any format, or folder of a run")
     add_file_options(parser)
     parser.add_argument(

@@ -19,11 +19,6 @@ from burg_drake.apps.options import (
     workers,
 )
 
-# Kept in step with objects.meshes and objects.library, which import too much for a help text; a
-# test compares them.
-UNIT_NAMES = ("mm", "cm", "m", "in")
-CONTACT_KINDS = ("pieces", "compliant_pieces", "mesh", "primitive")
-
 FORMATS_TEXT = """\
 meshes: up to 512 MB and 2,000,000 triangles (1,000,000 of an open surface, which becomes a wall),
 textures up to 8192 x 8192 pixels; larger ones are refused
@@ -56,7 +51,7 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_build(group: Any) -> None:
-    build = add_verb(
+    add_verb(
         group,
         "build",
         run_build,
@@ -65,7 +60,11 @@ def _add_build(group: Any) -> None:
         "burg-drake library build mug.stl -o my_library --unit mm --mass mug=0.118",
         "burg-drake library build scans/ -o my_library --masses masses.yaml --friction 0.4",
         "burg-drake library build objects.yaml -o my_library",
+        options=_add_build_options,
     )
+
+
+def _add_build_options(build: Parser) -> None:
     build.epilog = f"{build.epilog}\n\n{FORMATS_TEXT}"
     build.add_argument(
         "meshes",
@@ -79,7 +78,7 @@ def _add_build(group: Any) -> None:
 
 
 def _add_add(group: Any) -> None:
-    add = add_verb(
+    add_verb(
         group,
         "add",
         run_add,
@@ -87,46 +86,66 @@ def _add_add(group: Any) -> None:
         "burg-drake library add my_library mug.obj --mass 0.118 --friction 0.4",
         "burg-drake library add my_library scan_7.ply --name towel --mass 0.2"
         " --wall-thickness 0.005",
+        options=_add_add_options,
     )
+
+
+def _add_add_options(add: Parser) -> None:
+    from burg_drake.objects.library import DEFAULT_FRICTION
+
     add.add_argument("library", metavar="LIBRARY", help="folder of the library")
     add.add_argument("mesh", metavar="MESH", help="mesh file")
     add.add_argument("--name", help="the object's name (default: that of the mesh file)")
     add.add_argument("--mass", metavar="KG", type=positive, help="mass")
-    add.add_argument("--friction", metavar="MU", type=coefficient, help="default: 0.24")
+    add.add_argument(
+        "--friction", metavar="MU", type=coefficient, help=f"default: {DEFAULT_FRICTION:g}"
+    )
     add.add_argument("--description", metavar="TEXT", help="for people")
     _add_common_values(add)
 
 
 def _add_imports(group: Any) -> None:
-    burg = add_verb(
+    add_verb(
         group,
         "import-burg",
         run_import_burg,
         "build a library from an object_library.yaml of BURG-Toolkit",
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake library import-burg object_library.yaml -o my_library --mass table=4",
+        options=_add_burg_options,
     )
-    burg.add_argument("file", metavar="FILE", help="object_library.yaml, version 1.0")
-    burg.add_argument(
-        "--skip", metavar="NAME", action="append", default=[], help="leave an object out"
-    )
-    ycb = add_verb(
+    add_verb(
         group,
         "import-ycb",
         run_import_ycb,
         "build a library from a download of the YCB object set, with its published masses",
         "burg-drake library import-ycb ~/data/ycb -o ycb_library",
+        options=_add_ycb_options,
     )
+
+
+def _add_burg_options(burg: Parser) -> None:
+    burg.add_argument("file", metavar="FILE", help="object_library.yaml, version 1.0")
+    burg.add_argument(
+        "--skip", metavar="NAME", action="append", default=[], help="leave an object out"
+    )
+    _add_import_options(burg, " (default: they stay fixed, as background)")
+
+
+def _add_ycb_options(ycb: Parser) -> None:
     ycb.add_argument(
         "folder", metavar="DIR", help="folder that holds the objects' folders or files"
     )
-    for verb, without in ((burg, " (default: they stay fixed, as background)"), (ycb, "")):
-        _add_output(verb)
-        _add_named_values(verb)
-        verb.add_argument(
-            "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
-        )
-        _add_effort(verb)
+    _add_import_options(ycb)
+
+
+def _add_import_options(parser: Parser, without: str = "") -> None:
+    _add_output(parser)
+    _add_named_values(parser)
+    parser.add_argument(
+        "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
+    )
+    _add_effort(parser)
 
 
 def _add_views(group: Any) -> None:
@@ -178,6 +197,8 @@ def _add_output(parser: Parser) -> None:
 
 
 def _add_named_values(parser: Parser) -> None:
+    from burg_drake.objects.library import DEFAULT_FRICTION
+
     parser.add_argument(
         "--mass",
         metavar="NAME=KG",
@@ -195,16 +216,19 @@ def _add_named_values(parser: Parser) -> None:
         type=friction,
         action="append",
         default=[],
-        help="coefficient of one object or of all (default: 0.24)",
+        help=f"coefficient of one object or of all (default: {DEFAULT_FRICTION:g})",
     )
 
 
 def _add_common_values(parser: Parser) -> None:
+    from burg_drake.objects.library import CONTACT_KINDS
+    from burg_drake.objects.meshes import UNITS
+
     parser.add_argument(
         "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
     )
     scale = parser.add_mutually_exclusive_group()
-    scale.add_argument("--unit", choices=UNIT_NAMES, help="unit of the meshes (default: m)")
+    scale.add_argument("--unit", choices=list(UNITS), help="unit of the meshes (default: m)")
     scale.add_argument(
         "--scale", type=positive, help="factor from the meshes' unit to metres: 0.0005, for example"
     )

@@ -1,6 +1,5 @@
 from .arguments import (
     DEFAULT_STATION as DEFAULT_STATION,
-    SCENE_NAMES as SCENE_NAMES,
     Parser as Parser,
     add_group as add_group,
     add_measured_board as add_measured_board,
@@ -22,6 +21,7 @@ from .arguments import (
     positive as positive,
     positive_int as positive_int,
     print_scale as print_scale,
+    scene_names as scene_names,
     seed as seed,
     workers as workers,
 )

@@ -11,10 +11,6 @@ from typing import Any, NoReturn
 from burg_drake.core import did_you_mean, nearest, quoted, shown
 
 DEFAULT_STATION = "panda_tabletop"
-# Kept in step with what the package installs; a test compares them.
-SCENE_NAMES = ("tabletop_close", "tabletop_six", "tabletop_twelve")
-
-
 RULER_MM = 100.0
 """Length of the printed rulers."""
 MOST = 10_000_000
@@ -127,8 +123,15 @@ def add_scene(parser: Parser) -> None:
     parser.add_argument(
         "scene",
         metavar="SCENE",
-        help=f"scene file, or name of a built-in one: {', '.join(SCENE_NAMES)}",
+        help=f"scene file, or name of a built-in one: {scene_names()}",
     )
+
+
+def scene_names() -> str:
+    """The built-in scenes, for a help text."""
+    from burg_drake.core.paths import builtin_names
+
+    return ", ".join(builtin_names("scenes"))
 
 
 def add_measured_board(

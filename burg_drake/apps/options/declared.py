@@ -37,9 +37,10 @@ def add_options(
         told: the default that the help tells all the same.
     """
     known = declared(settings)
+    options_of = {name: declaration.option(name) for name, (_, declaration) in known.items()}
     for name in names or tuple(known):
         field, declaration = known[name]
-        options: dict[str, Any] = {"help": declaration.help}
+        options: dict[str, Any] = {"help": declaration.help.format(**options_of)}
         default = told if unset else shown_value(field, declaration)
         if field.type == "bool":
             options["action"] = "store_true"
@@ -47,7 +48,7 @@ def add_options(
             options |= {"default": None if unset else default, **_value_options(field, declaration)}
             if default is not None and "(default" not in declaration.help:
                 text = f"{default:g}" if isinstance(default, float) else default
-                options["help"] = f"{declaration.help} (default: {text})"
+                options["help"] += f" (default: {text})"
         option = declaration.option(name)
         parser.add_argument(*declaration.flags, option, **options)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
-    SCENE_NAMES,
     Parser,
     add_cluster,
     add_given,
@@ -26,6 +25,7 @@ from burg_drake.apps.options import (
     require_file,
     require_sampled,
     require_standoff_of_arm,
+    scene_names,
     workers,
 )
 from burg_drake.apps.runs.campaign import evaluate_many
@@ -72,7 +72,7 @@ def _add_options(parser: Parser) -> None:
         metavar="SCENE",
         nargs="+",
         help="scene file, folder of scenes, or name of a built-in one:"
-        f" {', '.join(SCENE_NAMES)}; several make one run over all of them",
+        f" {scene_names()}; several make one run over all of them",
     )
     add_station(parser)
     parser.add_argument(

@@ -36,6 +36,7 @@ from burg_drake.core.files import require_writable
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
+    from burg_drake.evaluation.store import PlanOutput
     from burg_drake.scene.document import Scene
     from burg_drake.station.document import Station
 
@@ -149,9 +150,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
         grasps,
         motion=motion,
         exact=not arguments.screening,
-        plans=arguments.plans,
-        plan_format=arguments.plan_format or "json",
-        retry_failed=arguments.retry_failed,
+        plans=_plans(arguments),
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
@@ -176,6 +175,15 @@ def run_reach(arguments: argparse.Namespace) -> int:
     _print_failures(failed, "could not be judged", len(judged), retry)
     _print_failures(judged.select(unplanned), "have no plan", int(yes.sum()))
     return 0 if answered.all() and not unplanned.any() else 1
+
+
+def _plans(arguments: argparse.Namespace) -> PlanOutput | None:
+    """Where plans go, if they are wanted."""
+    from burg_drake.evaluation.store import PlanOutput
+
+    if arguments.plans is None:
+        return None
+    return PlanOutput(arguments.plans, arguments.plan_format or "json", arguments.retry_failed)
 
 
 def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:

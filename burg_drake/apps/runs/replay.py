@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from burg_drake.core.grasps import Verdict
     from burg_drake.evaluation.records import Columns, RecordedTrial, TrialOrigin
     from burg_drake.evaluation.store import Inputs
+    from burg_drake.motion.plans import Plan
     from burg_drake.simulation.trials import TrialResult
 
 
@@ -118,25 +119,55 @@ def _execute(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, 
     """
     from burg_drake.evaluation import decisive_mode, rerun
     from burg_drake.evaluation.stages import trial_verdict
-    from burg_drake.visualization.scenes import record_arm_trial, record_trial
 
     trial, origin = source.trial, source.origin
-    scene, station = source.inputs.scene, source.inputs.station
-    like: dict[str, Any] = {
-        "engine": origin.engine,
-        "settings": origin.settings(),
-        "friction": trial.friction,
-        "mass": trial.mass,
-    }
-    by_hand = like | {"lift": trial.lift}
-    what = (scene, station, trial.instance, trial.X_OG)
     if decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
-        shown = record_trial(*what, meshcat, **by_hand)
+        shown = _show_hand(source, meshcat)
         return trial_verdict(shown), shown, "the hand alone"
-    verdict, plan = rerun(scene, station, trial, origin)
+    verdict, plan = rerun(source.inputs.scene, source.inputs.station, trial, origin)
     if plan is not None:
-        return verdict, record_arm_trial(*what, plan, meshcat, **like), "the arm from home on"
-    return verdict, record_trial(*what, meshcat, **by_hand), "the hand alone"
+        return verdict, _show_arm(source, plan, meshcat), "the arm from home on"
+    return verdict, _show_hand(source, meshcat), "the hand alone"
+
+
+def _show_hand(source: ReplaySource, meshcat: Any) -> TrialResult:
+    """The whole trial of the hand alone, recorded."""
+    from burg_drake.simulation.trials import HandTrial
+    from burg_drake.visualization.scenes import record_trial
+
+    trial = source.trial
+    return record_trial(
+        HandTrial(source.inputs.scene, source.inputs.station, **_whole(source, meshcat)),
+        trial.instance,
+        trial.X_OG,
+        meshcat,
+        friction=trial.friction,
+        mass=trial.mass,
+        lift=trial.lift,
+    )
+
+
+def _show_arm(source: ReplaySource, plan: Plan, meshcat: Any) -> TrialResult:
+    """The whole trial of the arm from its home posture on, recorded."""
+    from burg_drake.simulation.trials import ArmTrial
+    from burg_drake.visualization.scenes import record_arm_trial
+
+    trial, inputs = source.trial, source.inputs
+    return record_arm_trial(
+        ArmTrial(inputs.scene, inputs.station, transfer=True, **_whole(source, meshcat)),
+        trial.instance,
+        trial.X_OG,
+        plan,
+        meshcat,
+        friction=trial.friction,
+        mass=trial.mass,
+    )
+
+
+def _whole(source: ReplaySource, meshcat: Any) -> dict[str, Any]:
+    """What trials of both kinds take to be as recorded, but shown and to the end."""
+    engine = replace(source.origin.engine, whole_trial=True)
+    return {"engine": engine, "settings": source.origin.settings(), "meshcat": meshcat}
 
 
 def _from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:

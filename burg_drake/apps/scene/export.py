@@ -6,20 +6,12 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.options import add_scene, add_verb
-
-# Kept in step with export.export, which imports too much for a help text; a test compares them.
-FORMATS = {
-    "sdf": "an SDFormat world, for Gazebo and Drake",
-    "dmd": "Drake's model directives",
-    "mjcf": "MuJoCo's XML",
-    "usd": "USD with rigid-body physics, as for Isaac Sim; needs pip install 'burg-drake[usd]'",
-}
+from burg_drake.apps.options import Parser, add_scene, add_verb
 
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "export",
         run_export,
@@ -28,8 +20,15 @@ def add_to(group: Any) -> None:
         "burg-drake scene export my_scene.yaml --station my_station.yaml --to mjcf -o my_mjcf",
         "",
         "The folder has all that it needs, and can be moved or zipped.",
-        *(f"{name:5}{text}" for name, text in FORMATS.items()),
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.export import FORMATS
+
+    formats = (f"  {name:5}{format.about}" for name, format in FORMATS.items())
+    parser.epilog = "\n".join([str(parser.epilog), *formats])
     add_scene(parser)
     parser.add_argument("--to", choices=FORMATS, required=True, help="format")
     parser.add_argument(

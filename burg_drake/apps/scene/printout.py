@@ -6,12 +6,12 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.options import add_measured_board, add_scene, add_verb, not_negative
+from burg_drake.apps.options import Parser, add_measured_board, add_scene, add_verb, not_negative
 
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "printout",
         run_printout,
@@ -22,7 +22,11 @@ def add_to(verbs: Any) -> None:
         "",
         "Print at 100 % and hold a ruler to the two printed ones. If they are not 100 mm long,",
         "give what they measure: --measured-mm 98.5, or along x and y --measured-mm 98.5,99.2.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     add_scene(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"

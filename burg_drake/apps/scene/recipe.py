@@ -14,10 +14,9 @@ if TYPE_CHECKING:
     from burg_drake.scene.document import SceneRecipe
     from burg_drake.station.document import Station
 
-# In step with scene.recipe and scene.layout, which import numpy; a test compares them.
-DEFAULT_COUNT, DEFAULT_TRIES, DEFAULT_ATTEMPTS = 6, 100, 100
 MOST_OBJECTS = 1000
-SPACINGS = ("wide", "close", "touching")
+OWN_OPTIONS = ("random", "packed", "heap")
+"""Layouts that are no spacings."""
 
 
 def add_recipe(parser: Any) -> None:
@@ -40,13 +39,15 @@ def written(name: str) -> str:
 
 
 def _add_objects(parser: Any) -> None:
+    from burg_drake.scene.document import SceneRecipe
+
     group = parser.add_argument_group("objects")
     group.add_argument(
         "-n",
         metavar="N",
         dest="objects",
         type=positive_int,
-        default=DEFAULT_COUNT,
+        default=SceneRecipe.count,
         help="objects in a scene (default: %(default)d)",
     )
     group.add_argument("--only", metavar="A,B", help="draw from these objects alone")
@@ -73,6 +74,8 @@ def _add_objects(parser: Any) -> None:
 
 
 def _add_layout(parser: Any) -> None:
+    from burg_drake.scene.document import LAYOUTS, SceneRecipe
+
     group = parser.add_argument_group("layout")
     group.add_argument(
         "--size",
@@ -84,7 +87,7 @@ def _add_layout(parser: Any) -> None:
     how = group.add_mutually_exclusive_group()
     how.add_argument(
         "--spacing",
-        choices=SPACINGS,
+        choices=[name for name in LAYOUTS if name not in OWN_OPTIONS],
         help="40 mm apart, 2 to 10 mm beside another one, or in contact (default: anywhere)",
     )
     how.add_argument("--packed", action="store_true", help="side by side, as dense as it gets")
@@ -93,7 +96,7 @@ def _add_layout(parser: Any) -> None:
         "--tries",
         metavar="K",
         type=positive_int,
-        default=DEFAULT_TRIES,
+        default=SceneRecipe.tries,
         help="random places for each object (default: %(default)d)",
     )
     group.add_argument(
@@ -105,6 +108,8 @@ def _add_layout(parser: Any) -> None:
 
 
 def _add_rules(parser: Any) -> None:
+    from burg_drake.scene.document import SceneRecipe
+
     group = parser.add_argument_group("rules")
     add_station(group)
     group.add_argument(
@@ -127,7 +132,7 @@ def _add_rules(parser: Any) -> None:
         "--attempts",
         metavar="N",
         type=positive_int,
-        default=DEFAULT_ATTEMPTS,
+        default=SceneRecipe.attempts,
         help="scenes that are drawn until one is accepted (default: %(default)d)",
     )
 

@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_quiet, add_verb
+from burg_drake.apps.options import Parser, add_quiet, add_verb
 from burg_drake.apps.scene.recipe import add_recipe, recipe_defaults, recipe_of, written
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "sample",
         run_sample,
@@ -35,7 +35,11 @@ def add_to(group: Any) -> None:
         "Each scene is drawn until it fulfils all that is asked, and settled in simulation.",
         "Interrupt it whenever you like: the same command goes on, and a larger --count adds",
         "scenes. Exit code 1 if not all scenes were accepted; scenes.csv says why.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "library", metavar="LIBRARY", nargs="?", help="folder of a library, or `household`"
     )

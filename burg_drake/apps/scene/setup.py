@@ -8,7 +8,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import SCENE_NAMES, add_station, add_verb, port
+from burg_drake.apps.options import Parser, add_station, add_verb, port, scene_names
 from burg_drake.apps.terminal import (
     deaf_to_interrupts,
     open_in_browser,
@@ -28,7 +28,7 @@ a few megabytes is enough."""
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "setup",
         run_setup,
@@ -38,14 +38,18 @@ def add_to(verbs: Any) -> None:
         "burg-drake setup my_library",
         "burg-drake setup tabletop_six --open",
         "burg-drake setup my_scene.yaml --host 0.0.0.0",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "what",
         metavar="SCENE|LIBRARY",
         nargs="?",
         default=DEFAULT_LIBRARY,
         help="scene file, which is opened in its folder; or the start of a new scene in the working"
-        f" directory: a library's folder, or a built-in name ({', '.join(SCENE_NAMES)},"
+        f" directory: a library's folder, or a built-in name ({scene_names()},"
         f" {DEFAULT_LIBRARY}) (default: %(default)s)",
     )
     add_station(parser)

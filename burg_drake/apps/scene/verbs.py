@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
     group = add_group(verbs, "scene", "show, validate, settle, sample, export and import scenes")
-    show = add_verb(
+    add_verb(
         group,
         "show",
         run_show,
@@ -38,24 +38,32 @@ def add_to(verbs: Any) -> None:
         "burg-drake scene show tabletop_six",
         "burg-drake scene show my_scene.yaml --station my_station.yaml",
         "burg-drake scene show tabletop_six --html scene.html",
+        options=_add_show_options,
     )
-    add_scene(show)
-    add_station(show)
-    show.add_argument("--no-robot", action="store_true", help="leave the arm out")
-    add_view(show)
-    validate = add_verb(
+    add_verb(
         group,
         "validate",
         run_validate,
         "check a scene: bounds of the board, ground, overlaps (exit code 1 if anything is wrong)",
         "burg-drake scene validate my_scene.yaml",
+        options=_add_validate_options,
     )
-    add_scene(validate)
-    add_station(validate)
     _add_settle(group)
     sample.add_to(group)
     export.add_to(group)
     importing.add_to(group)
+
+
+def _add_show_options(parser: Parser) -> None:
+    add_scene(parser)
+    add_station(parser)
+    parser.add_argument("--no-robot", action="store_true", help="leave the arm out")
+    add_view(parser)
+
+
+def _add_validate_options(parser: Parser) -> None:
+    add_scene(parser)
+    add_station(parser)
 
 
 def _add_settle(group: Any) -> None:

@@ -6,21 +6,16 @@ import argparse
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_verb, positive_int, seed
+from burg_drake.apps.options import Parser, add_options, add_verb, settings_from
 from burg_drake.core.files import require_writable
 
 if TYPE_CHECKING:
     from burg_drake.experiment.trials import TrialSheet
 
-# Kept in step with experiment.trials.sheet, which imports too much for a help text; a test compares
-# them.
-AMONG = ("clear", "reachable", "executed")
-SUCCESS = ("lifted", "held")
-
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "plan",
         run_plan,
@@ -31,63 +26,22 @@ def add_to(group: Any) -> None:
         "",
         "The same grasps are chosen whatever the order of the runs. A grasp that several runs have",
         "judged on the same scene and station is tried once.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.experiment.planning import SelectionSettings
+
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
-    parser.add_argument(
-        "--per-object",
-        metavar="N",
-        type=positive_int,
-        default=10,
-        help="grasps of each object of a run, if there are as many (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--balance",
-        metavar="BY",
-        default="outcome",
-        help="what the grasps of an object are balanced by, as far as there are enough: outcome"
-        " (success and failure in simulation), stage (each outcome by itself), margin:NAME,"
-        " probability (success under noise, of `robustness`) or none (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--bins",
-        metavar="N",
-        type=positive_int,
-        default=4,
-        help="of a margin or a probability, with as many grasps each (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--among",
-        choices=AMONG,
-        default="executed",
-        help="choose among grasps at which the hand is clear, that the arm can be at, or that were"
-        " tried in simulation (default: %(default)s; without an arm that is the same as clear)",
-    )
-    parser.add_argument(
-        "--success",
-        choices=SUCCESS,
-        default="lifted",
-        help="what counts: lifted, or held, also where another object was moved"
-        " (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--scenes", metavar="N", type=positive_int, default=0, help="draw N scenes (default: all)"
-    )
-    parser.add_argument(
-        "--blocks",
-        metavar="N",
-        type=positive_int,
-        default=1,
-        help="blocks for the trials of a scene; each scene has one before any has its second"
-        " (default: %(default)s)",
-    )
+    choice = ("per_object", "balance", "bins", "among", "success", "scenes", "blocks")
+    add_options(parser, SelectionSettings, *choice)
     parser.add_argument(
         "--robustness",
         metavar="TABLE",
         help="table with the probabilities (default: robustness.csv in the run's folder)",
     )
-    parser.add_argument(
-        "--seed", metavar="N", type=seed, default=0, help="of choice and order (default: 0)"
-    )
+    add_options(parser, SelectionSettings, "seed")
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="trials file to write (.yaml)"
     )
@@ -95,19 +49,17 @@ def add_to(group: Any) -> None:
 
 def run_plan(arguments: argparse.Namespace) -> int:
     """Chooses, writes, and prints what was chosen and what it will tell."""
-    from burg_drake.experiment.planning import difference_text, plan_trials, power_table
+    from burg_drake.experiment.planning import (
+        SelectionSettings,
+        difference_text,
+        plan_trials,
+        power_table,
+    )
 
     require_writable(arguments.output)
     sheet = plan_trials(
         arguments.runs,
-        per_object=arguments.per_object,
-        balance=arguments.balance,
-        bins=arguments.bins,
-        among=arguments.among,
-        success=arguments.success,
-        scenes=arguments.scenes,
-        blocks=arguments.blocks,
-        seed=arguments.seed,
+        settings=settings_from(arguments, SelectionSettings),
         robustness=arguments.robustness,
         out=arguments.output,
     )

@@ -116,7 +116,7 @@ def _of_ros(data: Tree, name: str) -> Intrinsics:
         fisheye = " (a fisheye lens)" if model in ("equidistant", "fisheye") else ""
         raise InvalidInputError(
             f"{name}: distortion_model {quoted(model)}{fisheye} is not supported, plumb_bob and"
-            " rational_polynomial are; `burg-drake camera calibrate --model rational` makes one"
+            " rational_polynomial are; `burg-drake camera calibrate` makes one of the latter"
         )
     if any(coefficients) and len(coefficients) not in ROS_MODELS[model]:
         raise DocumentError(

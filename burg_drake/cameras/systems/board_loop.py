@@ -45,6 +45,30 @@ SAMPLES = 2
 take 0.06 s more an image of 640 x 480 pixels (`benchmarks/board_loop.py`)."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoopCamera:
+    """The camera of a loop.
+
+    Attributes:
+        name: in the station.
+        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
+        depth: the estimator gets the depth image, too, which says at what scale the board is.
+        period: between images [s]. If not given, there is one for every moment.
+
+    Raises:
+        InvalidInputError: the period is not above 0.
+    """
+
+    name: str = "board"
+    samples: int = SAMPLES
+    depth: bool = False
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.period is not None and self.period <= 0.0:
+            raise InvalidInputError(f"period {self.period:g} of a camera must be above 0 [s]")
+
+
 @dataclass(frozen=True, eq=False)
 class BoardLoop:
     """A built loop.
@@ -92,15 +116,12 @@ class BoardLoop:
 def build_board_loop(
     scene: SceneLike,
     station: StationLike,
-    camera: str = "board",
+    camera: str | LoopCamera = "board",
     *,
     robot: Robot = "none",
     engine: Engine = ENGINES["standard"],
     style: OverlayStyle | None = None,
     filter: PoseFilter | None = None,
-    depth: bool = False,
-    samples: int = SAMPLES,
-    period: float | None = None,
     meshcat: Meshcat | None = None,
 ) -> BoardLoop:
     """Builds the diagram of a station whose camera looks at the board.
@@ -108,25 +129,21 @@ def build_board_loop(
     Args:
         scene: what stands on the board, and is drawn over the image at its place.
         station: has the camera.
-        camera: its name.
+        camera: its name, or also how it takes images.
         robot, engine, meshcat: see `station.diagram.build_station_diagram`.
         style: of the overlay, if not the default.
         filter: between estimate and overlay; the overlay gets the estimate itself if not given.
-        depth: the estimator gets the depth image, too, which says at what scale the board is.
-        samples: rays along each side of a pixel of the colour image, see `Camera.samples`.
-        period: between images [s]. If not given, there is one for every moment.
 
     Raises:
         UnknownNameError: there is no such camera.
-        InvalidInputError: the period is not above 0, `samples` is out of range, or the board's
-            markers do not fit on it; and as `build_station_diagram`.
+        InvalidInputError: `samples` is out of range, or the board's markers do not fit on it; and
+            as `build_station_diagram`.
         MissingDependencyError: a system library of the renderer is missing.
     """
     scene, station = as_scene(scene), as_station(station)
-    if period is not None and period <= 0.0:
-        raise InvalidInputError(f"period {period:g} of a camera must be above 0 [s]")
-    simulated = replace(station.camera(camera), samples=samples)
-    cameras = {**station.document.cameras, camera: simulated}
+    camera = LoopCamera(name=camera) if isinstance(camera, str) else camera
+    simulated = replace(station.camera(camera.name), samples=camera.samples)
+    cameras = {**station.document.cameras, camera.name: simulated}
     station = replace(station, document=replace(station.document, cameras=cameras))
     intrinsics = of_camera(simulated)
     built = build_station_diagram(
@@ -134,13 +151,13 @@ def build_board_loop(
     )
     builder = DiagramBuilder()
     builder.AddSystem(built.diagram)
-    color_image = _images(builder, built, f"camera.{camera}.color_image", period)
+    color_image = _images(builder, built, camera, "color_image")
     estimator = builder.AddNamedSystem(
         "board_pose_estimator", BoardPoseEstimator(scene.board, intrinsics)
     )
     builder.Connect(color_image, estimator.GetInputPort("color_image"))
-    if depth:
-        depth_image = _images(builder, built, f"camera.{camera}.depth_image", period)
+    if camera.depth:
+        depth_image = _images(builder, built, camera, "depth_image")
         builder.Connect(depth_image, estimator.GetInputPort("depth_image"))
     X_SC, valid = estimator.GetOutputPort("X_SC"), estimator.GetOutputPort("valid")
     if filter is not None:
@@ -156,18 +173,19 @@ def build_board_loop(
 
     _export_station(builder, built.diagram)
     _export_board(builder, estimator, filter, overlay)
-    sensor = built.diagram.GetSubsystemByName(f"camera.{camera}")
+    sensor = built.diagram.GetSubsystemByName(f"camera.{camera.name}")
     return BoardLoop(builder.Build(), built, sensor, intrinsics)
 
 
 def _images(
-    builder: DiagramBuilder, built: StationDiagram, port: str, period: float | None
+    builder: DiagramBuilder, built: StationDiagram, camera: LoopCamera, kind: str
 ) -> OutputPort:
     """A camera's images, held for a period if there is one."""
+    port = f"camera.{camera.name}.{kind}"
     images = built.diagram.GetOutputPort(port)
-    if period is None:
+    if camera.period is None:
         return images
-    hold = builder.AddNamedSystem(f"{port}.hold", ZeroOrderHold(period, images.Allocate()))
+    hold = builder.AddNamedSystem(f"{port}.hold", ZeroOrderHold(camera.period, images.Allocate()))
     builder.Connect(images, hold.get_input_port())
     return hold.get_output_port()
 

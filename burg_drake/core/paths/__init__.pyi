@@ -9,6 +9,10 @@ from .names import (
     require_name as require_name,
     require_names as require_names,
 )
+from .object_files import (
+    MESH_FILE as MESH_FILE,
+    SURFACE_FILE as SURFACE_FILE,
+)
 from .packages import (
     DRAKE_MODELS as DRAKE_MODELS,
     MANIFEST as MANIFEST,

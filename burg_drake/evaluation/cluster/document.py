@@ -127,7 +127,7 @@ class ClusterDocument:
 
 @dataclass(frozen=True)
 class Cluster:
-    """What `--cluster` names.
+    """A cluster as people name it.
 
     Attributes:
         local: number of workers on this machine; 0 if the document says where they are.
@@ -141,7 +141,7 @@ class Cluster:
 
 
 def read_cluster(text: str) -> Cluster:
-    """What a text after `--cluster` names.
+    """The cluster that a text names.
 
     Args:
         text: `local:4`, the address of a scheduler, or the path of a cluster file.

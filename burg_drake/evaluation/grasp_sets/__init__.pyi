@@ -6,6 +6,7 @@ from .candidate_files import (
 )
 from .exchange import (
     IN_WORDS as IN_WORDS,
+    SeenScene as SeenScene,
     read_in_frame as read_in_frame,
 )
 from .input import (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,23 @@ from burg_drake.scene.document import Scene
 IN_WORDS = {"object": "the frame of their object", "world": "a scene", "camera": "a camera"}
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SeenScene:
+    """What is known of the scene in which a file's grasps were seen, or are to be placed.
+
+    Attributes:
+        scene: where objects stand.
+        X_SF: (4, 4) the camera in the scene frame; where a world is not the scene frame, that.
+        object_ids: names of instances by the file's object ids.
+        scene_id: the one to take of a file of several scenes.
+    """
+
+    scene: Scene | None = None
+    X_SF: Array | None = None
+    object_ids: Mapping[int, str] = field(default_factory=dict)
+    scene_id: str | None = None
+
+
 def read_in_frame(
     path: str | Path,
     wanted: Frame,
@@ -26,10 +44,7 @@ def read_in_frame(
     format: str | None = None,
     frame: Frame | None = None,
     objects: Mapping[str, str] | None = None,
-    scene: Scene | None = None,
-    X_SF: Array | None = None,
-    object_ids: Mapping[int, str] | None = None,
-    scene_id: str | None = None,
+    seen: SeenScene | None = None,
 ) -> ImportedGrasps:
     """Reads grasps and measures them in another frame, with the help of a scene where it takes one.
 
@@ -40,10 +55,7 @@ def read_in_frame(
         format: of the file; None to tell by the content.
         frame: what its poses are measured in, in place of what the format says.
         objects: new names of objects by those that the file has; one by the empty text is for all.
-        scene: where objects stand.
-        X_SF: (4, 4) the camera in the scene frame; where a world is not the scene frame, that.
-        object_ids: names of instances by the file's object ids.
-        scene_id: the one to take of a file of several scenes.
+        seen: the scene, as far as it is known.
 
     Raises:
         InvalidInputError: the file cannot be read, or a scene or the camera's pose is missing.
@@ -54,40 +66,41 @@ def read_in_frame(
     if given == wanted:
         grasps = with_objects_renamed(imported.grasps, objects or {})
         return ImportedGrasps(grasps, wanted, imported.notes)
+    seen = seen or SeenScene()
     if "object" not in (given, wanted):
-        if X_SF is None:
+        if seen.X_SF is None:
             raise InvalidInputError(
                 f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
                 f" {IN_WORDS[wanted]}; give the camera's pose in the scene"
             ).about("X_SF")
-        grasps = _moved(imported.grasps, X_SF if given == "camera" else inverse(X_SF))
+        grasps = _moved(imported.grasps, seen.X_SF if given == "camera" else inverse(seen.X_SF))
         return ImportedGrasps(grasps, wanted, imported.notes)
-    if scene is None:
+    if seen.scene is None:
         raise InvalidInputError(
             f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
             f" {IN_WORDS[wanted]}; give the scene in which the objects stand"
         ).about("scene")
-    if wanted == "camera" and X_SF is None:
+    if wanted == "camera" and seen.X_SF is None:
         raise InvalidInputError("grasps are wanted in a camera; give its pose").about("X_SF")
     placed = read_grasps(
-        scene,
+        seen.scene,
         path,
         gripper,
         format=format,
         objects=objects,
         frame=given,
-        X_SF=None if given == "object" else X_SF,
-        object_ids=object_ids if wanted == "object" else None,
-        scene_id=scene_id,
+        X_SF=None if given == "object" else seen.X_SF,
+        object_ids=seen.object_ids if wanted == "object" else None,
+        scene_id=seen.scene_id,
     )
-    X_SX = make_pose() if wanted == "object" or X_SF is None else X_SF
     if wanted == "object":
         named = [
             part.with_columns(instance=np.full(len(part), name))
             for name, part in placed.by_instance.items()
         ]
         return ImportedGrasps(GraspSet.concatenate(named), wanted, placed.notes)
-    grasps = _with_ids(in_frame(scene, placed.by_instance, X_SX), object_ids or {})
+    X_SX = make_pose() if seen.X_SF is None else seen.X_SF
+    grasps = _with_ids(in_frame(seen.scene, placed.by_instance, X_SX), seen.object_ids)
     return ImportedGrasps(grasps, wanted, placed.notes)
 
 

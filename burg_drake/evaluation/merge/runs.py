@@ -62,10 +62,8 @@ class Merged:
             notes.append(f"{len(self.scenes):,} scenes have not been begun: {listing(self.scenes)}")
         if self.shards and not shard:
             notes.append(f"shards that were not given: {listing(self.shards)}")
-        how = f"--shard {shard}" if shard else "no --shard"
-        notes.append(
-            f"to judge the rest: the command of the runs with {how} and -o {self.result.path}"
-        )
+        how = f"shard {shard}" if shard else "no shard"
+        notes.append(f"to judge the rest, evaluate the same into {self.result.path}, with {how}")
         return tuple(notes)
 
 
@@ -149,7 +147,7 @@ def _distinct(paths: Sequence[str | Path]) -> list[Path]:
 def _place_beside(folder: Path) -> Path:
     """An empty folder beside another; those of merges that were killed go."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-        raise InvalidInputError(f"{folder} is there already; choose another -o")
+        raise InvalidInputError(f"{folder} is there already; choose another folder").about("out")
     parent = writable_folder(folder.absolute().parent)
     left = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{16}}")
     for path in parent.iterdir():

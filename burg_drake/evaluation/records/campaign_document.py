@@ -153,6 +153,6 @@ def require_same_campaign(folder: Path, there: CampaignDocument, here: CampaignD
     found = campaign_differences(there, here)
     if found:
         raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(found)}); choose another -o, or delete it"
-        )
+            f"{folder} holds another run ({'; '.join(found)}); choose another folder, or delete it"
+        ).about("out")
     require_same_shard(folder, there.shard, here.shard)

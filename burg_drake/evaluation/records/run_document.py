@@ -228,8 +228,8 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
     found = differences(identity(there), identity(here))
     if found:
         raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(found)}); choose another -o, or delete it"
-        )
+            f"{folder} holds another run ({'; '.join(found)}); choose another folder, or delete it"
+        ).about("out")
     require_same_shard(folder, there.shard, here.shard)
 
 
@@ -243,9 +243,9 @@ def require_same_shard(folder: Path, there: str, here: str) -> None:
         held = f"shard {there} of this run" if there else "all of this run"
         asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
-            f"{folder} holds {held}, and {asked} is given; choose another -o, and burg-drake merge"
-            " unites shards"
-        )
+            f"{folder} holds {held}, and {asked} is given; choose another folder, and burg-drake"
+            " merge unites shards"
+        ).about("out")
 
 
 def differences(there: dict[str, str], here: dict[str, str]) -> list[str]:

@@ -136,7 +136,9 @@ def _require_other_files(run: Run, *written: Path) -> None:
     own = [path.resolve() for path in (run.table_path, run.path / JOURNAL_FILE)]
     for path in written:
         if path.resolve() in own:
-            raise InvalidInputError(f"{path} belongs to the run itself; choose another -o")
+            raise InvalidInputError(f"{path} belongs to the run itself; choose another file").about(
+                "out"
+            )
 
 
 def _choose(

@@ -35,6 +35,7 @@ from .part_writer import (
 from .plan_folder import (
     PlanFolder as PlanFolder,
     PlanFormat as PlanFormat,
+    PlanOutput as PlanOutput,
     plans_document as plans_document,
 )
 from .run_folder import (

@@ -200,10 +200,11 @@ def require_campaign_folder(folder: Path) -> None:
         return
     if (folder / RUN_FILE).exists():
         raise InvalidInputError(
-            f"{folder} holds a run of one scene, and several scenes are given; choose another -o"
-        )
+            f"{folder} holds a run of one scene, and several scenes are given; choose another"
+            " folder"
+        ).about("out")
     foreign = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if foreign:
         raise InvalidInputError(
-            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another -o"
-        )
+            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another folder"
+        ).about("out")

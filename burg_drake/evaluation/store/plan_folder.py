@@ -39,6 +39,26 @@ DOCUMENT_FILE = "plans.yaml"
 HEADER = "Record of the plans in this folder; written by the program."
 
 
+@dataclass(frozen=True)
+class PlanOutput:
+    """Where the plans of `reach` go, and how.
+
+    Attributes:
+        folder: gets the timed motion of each grasp that the arm can execute, as
+            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
+            interrupted call, which the same call goes on with. What is finished is kept, and
+            grasps are tried again whose worker process was ended from outside or whose plan is
+            missing.
+        format: `csv` for tables, with what their columns are beside them; see `plans.csv_file`.
+            `load_plan` reads both.
+        retry_failed: try all grasps again that an earlier call with this folder could not judge.
+    """
+
+    folder: str | Path
+    format: PlanFormat = "json"
+    retry_failed: bool = False
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlansDocument:
     """Schema of plans.yaml.

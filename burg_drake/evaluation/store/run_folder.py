@@ -338,8 +338,8 @@ def require_run_folder(folder: Path) -> None:
     foreign = sorted(names - {JOURNAL_FILE, GRASPS_FILE} if begun else names)
     if foreign:
         raise InvalidInputError(
-            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another -o"
-        )
+            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another folder"
+        ).about("out")
 
 
 def portable_station(station: Station, folder: Path) -> StationDocument:

@@ -1,4 +1,7 @@
-from .comparing import compare as compare
+from .comparing import (
+    SUCCESSES as SUCCESSES,
+    compare as compare,
+)
 from .comparison import (
     Comparison as Comparison,
     Coverage as Coverage,
@@ -9,7 +12,10 @@ from .groups import (
     Stopped as Stopped,
 )
 from .judge_assessment import Judgement as Judgement
-from .placement_error import PlacementAgreement as PlacementAgreement
+from .placement_error import (
+    LIMIT_MM as LIMIT_MM,
+    PlacementAgreement as PlacementAgreement,
+)
 from .record import (
     comparison_json as comparison_json,
     plain as plain,

@@ -97,11 +97,10 @@ def _nothing_in_common(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> st
     if found.other_content:
         return (
             f"{paths} have {found.other_content} grasps with the same ids, but none with the same"
-            " pose and width; give the second run the grasps of the first: evaluate --grasps"
+            " pose and width; evaluate the second run with the grasps of the first,"
             f" {sides[0].path / 'grasps.npz'}"
         )
     return (
         f"{paths} have no grasp in common ({found.only_first} and {found.only_second} are judged);"
-        f" give the second run the grasps of the first: evaluate --grasps"
-        f" {sides[0].path / 'grasps.npz'}"
+        f" evaluate the second run with the grasps of the first, {sides[0].path / 'grasps.npz'}"
     )

@@ -115,17 +115,7 @@ def measure_gap(
     mode_for(station, last)
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     path = Path(out)
-    document = GapDocument(
-        source="" if run is None else run.document.hash,
-        scene=scene.content,
-        station=station.content,
-        last=last,
-        place_mm=1e3 * noise.place,
-        turn_deg=float(np.rad2deg(noise.turn)),
-        seed=noise.seed,
-        samples=samples,
-        versions=software_versions(),
-    )
+    document = _asked(run, scene, station, last, settings)
     _begin(path, document)
     options = {"executor": executor, "progress": progress}
     begin = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
@@ -151,6 +141,24 @@ def measure_gap(
     return GapSteps(path, document, tuple(steps), extra)
 
 
+def _asked(
+    run: Run | None, scene: Scene, station: Station, last: Mode, settings: GapSettings
+) -> GapDocument:
+    """What a call asks for, with the versions that are installed."""
+    noise = settings.noise
+    return GapDocument(
+        source="" if run is None else run.document.hash,
+        scene=scene.content,
+        station=station.content,
+        last=last,
+        place_mm=1e3 * noise.place,
+        turn_deg=float(np.rad2deg(noise.turn)),
+        seed=noise.seed,
+        samples=settings.samples,
+        versions=software_versions(),
+    )
+
+
 def _begin(path: Path, document: GapDocument) -> None:
     """Makes the folder and says first of all what is asked there, which refuses others from then
     on, however this call ends."""
@@ -171,8 +179,8 @@ def _require_same(path: Path, there: GapDocument, document: GapDocument) -> None
         if old != new:
             raise InvalidInputError(
                 f"{path} has steps of something else ({name} is {_short(old)} there,"
-                f" {_short(new)} here); choose another -o, or delete it"
-            )
+                f" {_short(new)} here); choose another folder, or delete it"
+            ).about("out")
 
 
 def _short(value: object) -> str:

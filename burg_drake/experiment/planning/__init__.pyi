@@ -5,3 +5,4 @@ from .power import (
     power_table as power_table,
     smallest_difference as smallest_difference,
 )
+from .settings import SelectionSettings as SelectionSettings

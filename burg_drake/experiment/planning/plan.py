@@ -10,17 +10,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 
-from burg_drake.core import (
-    InvalidInputError,
-    content_hash,
-    nearest,
-    quoted,
-    software_versions,
-)
+from burg_drake.core import InvalidInputError, content_hash, software_versions
 from burg_drake.core.grasps import Outcome
 from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.planning.eligible import (
@@ -30,13 +23,11 @@ from burg_drake.experiment.planning.eligible import (
     make_pools,
 )
 from burg_drake.experiment.planning.selection import Chosen, choose, drawn_scenes
+from burg_drake.experiment.planning.settings import SelectionSettings
 from burg_drake.experiment.trials import (
-    Among,
-    Balance,
     RealTrial,
     Selection,
     Stratum,
-    Success,
     TrialSheet,
     entered,
     journal_path,
@@ -46,21 +37,11 @@ from burg_drake.experiment.trials import (
     source_of,
 )
 
-MARGIN = "margin:"
-"""Begins the name of a margin to balance by."""
-
 
 def plan_trials(
     runs: Run | Campaign | str | Path | Iterable[Run | Campaign | str | Path],
     *,
-    per_object: int = 10,
-    balance: str = "outcome",
-    bins: int = 4,
-    among: Among = "executed",
-    success: Success = "lifted",
-    scenes: int = 0,
-    blocks: int = 1,
-    seed: int = 0,
+    settings: SelectionSettings | None = None,
     robustness: str | Path | None = None,
     out: str | Path | None = None,
 ) -> TrialSheet:
@@ -69,20 +50,7 @@ def plan_trials(
     Args:
         runs: one or several, of one scene or of many, or their folders. A grasp that several have
             judged on the same scene and station is tried once.
-        per_object: how many grasps of each object of a run, if there are as many.
-        balance: what each object's grasps are balanced by, as far as there are enough: `outcome`,
-            success and failure in simulation; `stage`, each outcome by itself; `margin:NAME`, bins
-            of equal numbers of a margin; `probability`, such bins of the predicted probability of
-            success, see `assess_robustness`; `none`.
-        bins: their number.
-        among: what is chosen from: `executed`, grasps that were tried in simulation, which in mode
-            `hand` all are at which the hand is clear; `reachable`, those that the arm can be at;
-            `clear`, all those at which the hand is clear, though no arm may come there.
-        success: what counts: `lifted`, or `held`, also where another object was moved.
-        scenes: how many scenes to draw at random; 0 for all.
-        blocks: in how many blocks the trials of a scene come; each scene has one block before any
-            has its second one.
-        seed: of choice and order.
+        settings: how many of which grasps, and in which order; as usual if None.
         robustness: table with probabilities, of the one run; those in the runs' folders if None.
         out: file to write; none if None.
 
@@ -90,34 +58,25 @@ def plan_trials(
         The sheet. Its notes say where there were too few grasps.
 
     Raises:
-        InvalidInputError: there is no run, or nothing to choose from; a balance that does not
-            exist; or the file has entries already.
+        InvalidInputError: there is no run, or nothing to choose from; or the file has entries
+            already.
         UnknownNameError: there is no such margin.
     """
     given = [runs] if isinstance(runs, (Run, Campaign, str, Path)) else list(runs)
-    selection = _selection(
-        balance,
-        per_object=per_object,
-        bins=bins,
-        among=among,
-        success=success,
-        scenes=scenes,
-        blocks=blocks,
-        seed=seed,
-    )
+    selection = (settings or SelectionSettings()).selection()
     if out is not None:
         require_unused(out)
     gathered = gather_runs(given)
     if robustness is not None and len(gathered) > 1:
         raise InvalidInputError("a table of robustness is of one run; give that run alone")
-    pools, notes = make_pools(gathered, among)
+    pools, notes = make_pools(gathered, selection.among)
     pools = drawn_scenes(pools, selection)
     table = None if robustness is None else Path(robustness)
     strata, chosen, more = choose(pools, selection, table)
     if not chosen:
         raise InvalidInputError(
             f"{', '.join(str(run.path) for run in gathered.values())}: there is no grasp to choose"
-            f" among those that are {among}"
+            f" among those that are {selection.among}"
         )
     folder = None if out is None else Path(out).absolute().parent
     used = {pool.key: pool.run for pool, _, _ in chosen}
@@ -151,25 +110,8 @@ def require_unused(path: str | Path) -> None:
         count = max(filled, len({entry.number for entry in recorded}))
         raise InvalidInputError(
             f"{path} has entries for {count} {'trial' if count == 1 else 'trials'};"
-            " choose another -o, or move it and its journal away"
-        )
-
-
-def _selection(balance: str, **values: object) -> Selection:
-    kinds = [name for name in get_args(Balance) if name != "margin"]
-    margin = balance.removeprefix(MARGIN) if balance.startswith(MARGIN) else ""
-    if not margin and balance not in kinds:
-        known = nearest(balance, [*kinds, f"{MARGIN}NAME"])
-        raise InvalidInputError(f"there is no balance {quoted(balance)}; {known}")
-    for name, kind in (("among", Among), ("success", Success)):
-        if values[name] not in get_args(kind):
-            known = nearest(str(values[name]), get_args(kind))
-            raise InvalidInputError(f"there is no {name} {quoted(values[name])}; {known}")
-    if not (margin or balance == "probability"):
-        values["bins"] = 0
-    elif values["bins"] == 0:
-        raise InvalidInputError("bins is 0; it has to be 1 at least")
-    return Selection(balance="margin" if margin else balance, margin=margin, **values)  # type: ignore[arg-type]
+            " choose another file, or move it and its journal away"
+        ).about("out")
 
 
 def _ordered(chosen: Chosen, selection: Selection) -> list[tuple[int, EligibleGrasps, int, str]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, listing
 from burg_drake.core.grasps import UNTRIED, GraspSet, Outcome, parts_of
-from burg_drake.core.paths import with_shareable_references
+from burg_drake.core.paths import MESH_FILE, SURFACE_FILE, with_shareable_references
 from burg_drake.formats.common.grasp_format import Gripper
 
 SUCCESS_COLUMN = "object_in_gripper"
@@ -20,9 +20,6 @@ HANDS = {"panda": "panda_hand", "franka_panda": "panda_hand"}
 """Our hands by the names that other projects give them."""
 
 MESH_SUFFIXES = ("obj", "stl", "ply", "off", "dae", "glb", "gltf", "usd", "usda", "usdc", "usdz")
-
-LIBRARY_MESHES = ("mesh.obj", "surface.obj")
-"""Kept in step with pipeline.geometry, which formats must not need; a test compares them."""
 
 
 def only_object(grasps: GraspSet, kind: str) -> str:
@@ -49,7 +46,7 @@ def object_name(file: str) -> str:
     Meshes of our libraries are called alike and lie in a folder an object: `mug/mesh.obj`.
     """
     *folders, last = file.replace("\\", "/").rstrip("/").split("/")
-    if last in LIBRARY_MESHES and folders and folders[-1]:
+    if last in (MESH_FILE, SURFACE_FILE) and folders and folders[-1]:
         return folders[-1]
     stem, _, suffix = last.rpartition(".")
     return stem if stem and suffix.lower() in MESH_SUFFIXES else last

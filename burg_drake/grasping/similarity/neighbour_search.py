@@ -72,7 +72,7 @@ class Tolerance:
     angle: float = setting(math.radians(15.0), "largest angle between them", unit=DEGREES, low=0)
     distance: float = setting(
         math.inf,
-        "largest sum of the two, with --mm-per-deg for each degree (default: not bounded)",
+        "largest sum of the two, with {lever} for each degree (default: not bounded)",
         unit=MILLIMETRES,
         low=0,
     )

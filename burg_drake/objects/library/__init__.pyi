@@ -7,6 +7,7 @@ from .document import (
     package_name as package_name,
 )
 from .entry import (
+    CONTACT_KINDS as CONTACT_KINDS,
     DEFAULT_FRICTION as DEFAULT_FRICTION,
     ContactGeometry as ContactGeometry,
     ContactKind as ContactKind,

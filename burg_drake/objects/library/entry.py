@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.core.documents import Pose, Vector3, require_ranges
@@ -15,6 +15,7 @@ Inertia = tuple[float, float, float, float, float, float]
 """Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2]."""
 
 ContactKind = Literal["pieces", "compliant_pieces", "mesh", "primitive"]
+CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
 
 PRIMITIVE_SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
 """Number of lengths that a primitive has."""

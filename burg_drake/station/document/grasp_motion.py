@@ -60,7 +60,7 @@ class GraspMotion:
     least_lift: float | None = _length(
         None,
         "least_lift",
-        "lift as far as there is room, at most by --lift-mm and at least by this; the column"
+        "lift as far as there is room, at most by {lift_height} and at least by this; the column"
         " lift_height tells how far",
     )
     lift_direction: Vector3 = setting(

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from pydrake.geometry import Meshcat
 
 from burg_drake.core import Array
 from burg_drake.motion.plans import Plan
-from burg_drake.scene.document import Scene
-from burg_drake.simulation.trials import DEFAULT_TRIAL, ArmTrial, TrialResult, TrialSettings
-from burg_drake.station.document import ENGINES, Engine, Station
+from burg_drake.simulation.trials import ArmTrial, TrialResult
 from burg_drake.visualization.meshcat import aim_at
 from burg_drake.visualization.scenes.replay import FRAMES_PER_SECOND, VIEW, play_in_a_loop
 from burg_drake.visualization.scenes.scene import draw_board, robot_points, scene_points
@@ -23,41 +19,34 @@ POSTURES = 25
 
 
 def record_arm_trial(
-    scene: Scene,
-    station: Station,
+    trial: ArmTrial,
     instance: str,
     X_OG: Array,
     plan: Plan,
     meshcat: Meshcat,
     *,
-    engine: Engine = ENGINES["standard"],
-    settings: TrialSettings = DEFAULT_TRIAL,
     friction: float | None = None,
     mass: float | None = None,
 ) -> TrialResult:
     """Executes a plan once more and leaves the recording in Meshcat, where it plays in a loop.
 
-    The arm is shown from its home posture on, and to the end, beyond the moment at which the
-    outcome was decided.
-
     Args:
-        scene, station: as in the trial to be shown.
+        trial: as that to be shown, and in `meshcat`. With `transfer` the arm is shown from its home
+            posture on; with `Engine.whole_trial` to the end, beyond the moment at which the
+            outcome was decided.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
         plan: leads to it.
-        meshcat: where to show it.
-        engine, settings, friction, mass: as in the trial to be shown.
+        meshcat: where the trial is shown.
+        friction, mass: as in the trial to be shown.
 
     Returns:
-        What became of the whole trial, which began at home.
+        What became of the trial.
 
     Raises:
         InvalidInputError: as `ArmTrial.run`.
     """
-    engine = replace(engine, whole_trial=True)
-    trial = ArmTrial(
-        scene, station, engine=engine, settings=settings, transfer=True, meshcat=meshcat
-    )
+    scene, station = trial.diagram.scene, trial.diagram.station
     draw_board(scene, station, meshcat, labels=False)
     arm = station.document.arm
     assert arm is not None  # ArmTrial has seen to it

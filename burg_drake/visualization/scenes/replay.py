@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
-from burg_drake.core import Array, InvalidInputError, check_pose
-from burg_drake.scene.document import Scene
-from burg_drake.simulation.trials import DEFAULT_TRIAL, HandTrial, TrialResult, TrialSettings
+from burg_drake.core import Array
+from burg_drake.simulation.trials import HandTrial, TrialResult
 from burg_drake.station.diagram import FloatingHand
-from burg_drake.station.document import ENGINES, Engine, Station
 from burg_drake.visualization.meshcat import aim_at
 from burg_drake.visualization.scenes.scene import draw_board, robot_points, scene_points
 
@@ -30,44 +27,35 @@ CLEAR_VIEW = 0.10
 
 
 def record_trial(
-    scene: Scene,
-    station: Station,
+    trial: HandTrial,
     instance: str,
     X_OG: Array,
     meshcat: Meshcat,
     *,
-    engine: Engine = ENGINES["standard"],
-    settings: TrialSettings = DEFAULT_TRIAL,
     friction: float | None = None,
     mass: float | None = None,
     lift: float | None = None,
 ) -> TrialResult:
     """Executes a grasp once more and leaves the recording in Meshcat, where it plays in a loop.
 
-    The trial is shown to its end, beyond the moment at which its outcome was decided. A grasp whose
-    open hand collides leaves a still picture of that.
+    A grasp whose open hand collides leaves a still picture of that.
 
     Args:
-        scene, station: as in the trial to be shown.
+        trial: as that to be shown, and in `meshcat`. With `Engine.whole_trial` it is shown to its
+            end, beyond the moment at which its outcome was decided.
         instance: name of the target in the scene.
         X_OG: (4, 4) grasp in the target's frame.
-        meshcat: where to show it.
-        engine, settings, friction, mass, lift: as in the trial to be shown.
+        meshcat: where the trial is shown.
+        friction, mass, lift: as in the trial to be shown.
 
     Returns:
-        What became of the whole trial; the same as without a picture.
+        What became of the trial; the same as without a picture.
 
     Raises:
-        InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
+        InvalidInputError: as `HandTrial.run`.
     """
-    if instance not in scene.instances:
-        raise InvalidInputError(
-            f"{instance!r} is not a free object of scene {scene.name!r};"
-            f" free are: {', '.join(scene.instances) or '(none)'}"
-        )
-    engine = replace(engine, whole_trial=True)
-    trial = HandTrial(scene, station, engine=engine, settings=settings, meshcat=meshcat)
-    X_WG = trial.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
+    scene, station = trial.diagram.scene, trial.diagram.station
+    X_WG = trial.X_WG(instance, X_OG)
     hand = _show_start(trial, X_WG)
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]

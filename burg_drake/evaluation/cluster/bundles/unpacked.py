@@ -64,7 +64,7 @@ def unpack(data: bytes, place: Path, name: str) -> Path:
     except OSError as error:
         raise InvalidInputError(
             f"cannot unpack the scene into {folder}: {error.strerror}; give Dask's workers another"
-            " --local-directory"
+            " local directory"
         ) from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)

@@ -1,0 +1,95 @@
+"""How grasps are chosen for trials on the robot, in one object: the settings of `plan_trials`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import get_args
+
+from burg_drake.core import InvalidInputError, nearest, quoted, setting
+from burg_drake.experiment.trials import Among, Balance, Selection, Success
+
+MARGIN = "margin:"
+"""Begins the name of a margin to balance by."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelectionSettings:
+    """Which grasps of each object are chosen, and in which order they are tried.
+
+    Attributes:
+        per_object: how many grasps of each object of a run, if there are as many.
+        balance: what each object's grasps are balanced by, as far as there are enough: `outcome`,
+            success and failure in simulation; `stage`, each outcome by itself; `margin:NAME`, bins
+            of equal numbers of a margin; `probability`, such bins of the predicted probability of
+            success, see `assess_robustness`; `none`.
+        bins: their number.
+        among: what is chosen from: `executed`, grasps that were tried in simulation, which in mode
+            `hand` all are at which the hand is clear; `reachable`, those that the arm can be at;
+            `clear`, all those at which the hand is clear, though no arm may come there.
+        success: what counts: `lifted`, or `held`, also where another object was moved.
+        scenes: how many scenes to draw at random; 0 for all.
+        blocks: in how many blocks the trials of a scene come; each scene has one block before any
+            has its second one.
+        seed: of choice and order.
+
+    Raises:
+        InvalidInputError: a balance that does not exist, or a number that is too small.
+    """
+
+    per_object: int = setting(10, "grasps of each object of a run, if there are as many", low=1)
+    balance: str = setting(
+        "outcome",
+        "what the grasps of an object are balanced by, as far as there are enough: outcome"
+        " (success and failure in simulation), stage (each outcome by itself), margin:NAME,"
+        " probability (success under noise, of `robustness`) or none",
+        metavar="BY",
+    )
+    bins: int = setting(4, "of a margin or a probability, with as many grasps each", low=1)
+    among: Among = setting(
+        "executed",
+        "choose among grasps at which the hand is clear, that the arm can be at, or that were"
+        " tried in simulation (default: executed; without an arm that is the same as clear)",
+        choices=get_args(Among),
+    )
+    success: Success = setting(
+        "lifted",
+        "what counts: lifted, or held, also where another object was moved",
+        choices=get_args(Success),
+    )
+    scenes: int = setting(0, "draw N scenes (default: all)", low=1)
+    blocks: int = setting(
+        1, "blocks for the trials of a scene; each scene has one before any has its second", low=1
+    )
+    seed: int = setting(0, "of choice and order")
+
+    def __post_init__(self) -> None:
+        kinds = [name for name in get_args(Balance) if name != "margin"]
+        if not self._margin and self.balance not in kinds:
+            known = nearest(self.balance, [*kinds, f"{MARGIN}NAME"])
+            raise InvalidInputError(f"there is no balance {quoted(self.balance)}; {known}")
+        for name, kind in (("among", Among), ("success", Success)):
+            value = getattr(self, name)
+            if value not in get_args(kind):
+                known = nearest(str(value), get_args(kind))
+                raise InvalidInputError(f"there is no {name} {quoted(value)}; {known}")
+        if self._has_bins and self.bins == 0:
+            raise InvalidInputError("bins is 0; it has to be 1 at least")
+        self.selection()
+
+    def selection(self) -> Selection:
+        """The same as trials files have it."""
+        more = {
+            "balance": "margin" if self._margin else self.balance,
+            "margin": self._margin,
+            "bins": self.bins if self._has_bins else 0,
+        }
+        return Selection(**(asdict(self) | more))
+
+    @property
+    def _margin(self) -> str:
+        """Name of the margin to balance by; empty if it is something else."""
+        return self.balance.removeprefix(MARGIN) if self.balance.startswith(MARGIN) else ""
+
+    @property
+    def _has_bins(self) -> bool:
+        return bool(self._margin) or self.balance == "probability"
