@@ -83,16 +83,15 @@ def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
         "cube-0015": ("reach", Stage.REACHABLE, died),
         "cube-0016": ("reach_error", Stage.REACHABLE, "RuntimeError: no joint"),
     }
-    for crashing in (("cube-0003", "cube-0012"), ("cube-0015", "cube-0016"), tuple(expect)):
-        how = tuple((id, expect[id][0]) for id in crashing)
-        make = Make(CrashingJudge(how=how, batches=(20, 7)))
-        judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
-        failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
-        assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
-            id: expect[id][1:] for id in crashing
-        }
-        others = {c.id: expected(c.id) for c in grasps(20) if c.id not in crashing}
-        assert {id: v.outcome for id, v in judged.items() if id not in crashing} == others
+    how = tuple((id, kind) for id, (kind, *_) in expect.items())
+    make = Make(CrashingJudge(how=how, batches=(20, 7)))
+    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
+    failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
+    assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
+        id: told[1:] for id, told in expect.items()
+    }
+    others = {c.id: expected(c.id) for c in grasps(20) if c.id not in expect}
+    assert {id: v.outcome for id, v in judged.items() if id not in expect} == others
 
 
 def test_grasps_are_screened_together_and_once(tmp_path) -> None:
@@ -117,17 +116,16 @@ def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
 def test_deaths_without_end_end_the_run() -> None:
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
     judged = []
-    with pytest.raises(SimulationError, match=r"^5 grasps in a row could not .*: .*SIGSEGV"):
-        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=WorkerLimits(hopeless=5)):
+    with pytest.raises(SimulationError, match=r"^2 grasps in a row could not .*: .*SIGSEGV"):
+        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=WorkerLimits(hopeless=2)):
             judged.append(candidate.id)
-    assert len(set(judged)) == len(judged) == 5  # none of them is lost
+    assert len(set(judged)) == len(judged) == 2  # none of them is lost
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_row_of_crashing_grasps_does_not_end_the_run(workers: int) -> None:
-    crashing = [c.id for c in grasps(20)[6:11]]
+def test_a_row_of_crashing_grasps_does_not_end_the_run() -> None:
+    crashing = [c.id for c in grasps(20)[6:9]]
     make = Make(CrashingJudge(how=tuple((id, "segfault") for id in crashing)))
-    judged = {c.id: v.outcome for c, v in judge_all(grasps(20), make, workers=workers)}
+    judged = {c.id: v.outcome for c, v in judge_all(grasps(20), make, workers=2)}
     failed = dict.fromkeys(crashing, Outcome.SIMULATION_FAILED)
     assert judged == {c.id: expected(c.id) for c in grasps(20)} | failed
 
