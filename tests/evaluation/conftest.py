@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,15 @@ from burg_drake.station.document.station_document import Station, load_station
 
 # Worker processes and scripts import the judges by name.
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_chart_of_reach() -> Iterator[None]:
+    """How far the arm reaches is most of the work of a page, and has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        place = "burg_drake.evaluation.report.page.reachability_section"
+        patch.setattr(place, lambda run: None)
+        yield
 
 
 @pytest.fixture

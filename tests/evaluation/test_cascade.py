@@ -202,6 +202,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     run = judge(short, "run")
     assert run.complete and run.failures == [killed, crashing] and run.interrupted == [killed]
     assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
+    assert run.row(crashing)["reason"] == "the worker process was ended by SIGSEGV"
 
     run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
     assert judged("short again") == [killed] and run.interrupted == [killed]
@@ -411,33 +412,6 @@ def test_no_grasps_are_a_complete_run(
 ) -> None:
     run = evaluate(scene, station, tmp_path / "run", grasps={}, progress=False)
     assert run.complete and run.report_path.exists() and run.best() == []
-
-
-def test_failures_are_reported_and_the_others_go_on(
-    scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
-) -> None:
-    from known_judge import CrashingJudge
-
-    id = evaluate(
-        scene,
-        station,
-        tmp_path / "a",
-        settings=EvaluationSettings(grasps_per_object=2, blind=True),
-        executor=Inline(),
-        progress=False,
-    ).candidates.id[0]
-    judge = Make(CrashingJudge(how=((id, "segfault"),)))
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
-    run = evaluate(
-        scene,
-        station,
-        tmp_path / "b",
-        settings=EvaluationSettings(grasps_per_object=2, blind=True),
-        workers=1,
-        progress=False,
-    )
-    assert run.complete and run.failures == [id]
-    assert run.row(id)["reason"] == "the worker process was ended by SIGSEGV"
 
 
 def test_bad_input_is_said_before_any_work(
