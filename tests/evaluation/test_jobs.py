@@ -82,7 +82,7 @@ def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
         " ended by SIGSEGV",
     }
     with pytest.raises(InvalidInputError, match="no such model"):
-        list(executor.judge(jobs))
+        list(LocalExecutor(1).judge(jobs[1:2]))
 
 
 def test_workers_that_have_no_job_left_help_with_one(tmp_path: Path) -> None:

@@ -250,7 +250,9 @@ def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
 def test_open_meshes_become_walls(tmp_path: Path) -> None:
     lidless = _box()
     lidless.update_faces(lidless.triangles_center[:, 2] < 0.0149)
-    source = ObjectSource(name="box", mesh=lidless, mass=0.1, wall_thickness=0.001)
+    source = ObjectSource(
+        name="box", mesh=lidless, pieces=(_box(),), mass=0.1, wall_thickness=0.001
+    )
     report = build([source], tmp_path / "lib")
     properties = report.library.entry("box").mass_properties
     area = 0.1 * 0.06 + 2.0 * (0.1 + 0.06) * 0.03
