@@ -161,7 +161,7 @@ def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
     judge = build_judge(scene, station, engine=ENGINES["standard"], mode="hand")
     (screen,) = judge.screens
-    sampled = list(sample_candidates(scene, station, 25, 3, SamplingSettings(blind=True)))
+    sampled = list(sample_candidates(scene, station, 15, 3, SamplingSettings(blind=True)))
     grasps = [sampled[k] for k in np.random.default_rng(0).permutation(len(sampled))]
     together = screen.ask(grasps)
     assert 5 < sum(d.outcome is None for d in together) < len(grasps) - 5
