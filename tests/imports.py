@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import burg_drake
+
 
 @dataclass(frozen=True)
 class Import:
@@ -73,7 +75,7 @@ class Package:
     def statements(self) -> dict[str, list[ast.Import | ast.ImportFrom]]:
         """Their imports, those within functions, too."""
         return {
-            name: [x for x in ast.walk(tree) if isinstance(x, (ast.Import, ast.ImportFrom))]
+            name: [x for x in all_statements(tree) if isinstance(x, (ast.Import, ast.ImportFrom))]
             for name, tree in self.trees.items()
         }
 
@@ -141,6 +143,16 @@ class Package:
                         yield Import(module, str(node.module), alias.name, node.lineno)
 
 
+def all_statements(node: ast.AST) -> Iterator[ast.AST]:
+    """What is in a module or a statement, without what statements are made of: in a tenth of the
+    time of `ast.walk`."""
+    for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+        children = getattr(node, field, ())
+        for child in children if isinstance(children, list) else ():
+            yield child
+            yield from all_statements(child)
+
+
 def _reached(start: str, following, seen: set[str]) -> list[str]:
     """What can be reached of what was not seen before, the farthest first."""
     if start in seen:
@@ -155,3 +167,7 @@ def _reached(start: str, following, seen: set[str]) -> list[str]:
             seen.add(step)
             path.append((step, iter(following(step))))
     return found
+
+
+HOUSE = Package(Path(burg_drake.__file__).parent)
+"""Read once for all tests of a process."""
