@@ -125,7 +125,7 @@ Grasps = tuple[list[str], Array, Array]
 
 @pytest.fixture(scope="module")
 def grasps(scene: Scene, reach: ArmReach) -> Grasps:
-    """From the front, three of each object, at which the open hand is clear."""
+    """From the front, two of each object, at which the open hand is clear."""
     clearance = HandClearance(build_station_diagram(scene, reach.diagram.station, robot="hand"))
     names, poses, widths = [], [], []
     for name in scene.instances:
@@ -134,7 +134,7 @@ def grasps(scene: Scene, reach: ArmReach) -> Grasps:
             mesh, 1000, rng_from("motions", name), AntipodalSettings(friction=0.5)
         )
         X = reach.diagram.X_WO(name) @ sampled.X_OG
-        front = np.flatnonzero((X[:, 0, 2] > 0.5) & clearance.is_clear(X))[:3]
+        front = np.flatnonzero((X[:, 0, 2] > 0.5) & clearance.is_clear(X))[:2]
         names += [name] * len(front)
         poses.append(X[front])
         widths.append(sampled.width[front])
@@ -150,7 +150,7 @@ def test_hand_and_target_go_back_and_up(
     reach: ArmReach, grasps: Grasps, found: list[Reach]
 ) -> None:
     reached = [reach for reach in found if reach.outcome is None]
-    assert len(reached) > 4 and len({round(reach.lift, 3) for reach in reached}) > 1
+    assert len(reached) > 2 and len({round(reach.lift, 3) for reach in reached}) > 1
     X_WA, X_HG = reach.diagram.station.document.arm.X_WA.matrix(), reach.diagram.station.hand.X_HG
     for one in reached:
         witness = one.witness
@@ -185,7 +185,7 @@ def test_it_does_not_matter_how_a_grasp_is_given_or_with_what_others(
     reach: ArmReach, grasps: Grasps, found: list[Reach]
 ) -> None:
     names, X, widths = grasps
-    some = [k for k, one in enumerate(found) if one.outcome is None][:2]
+    some = [k for k, one in enumerate(found) if one.outcome is None][:1]
     some += [k for k, one in enumerate(found) if one.outcome is not None][:1]
     for k in some:
         one = reach.check(names[k], swap_fingers(X[k]), float(widths[k]))

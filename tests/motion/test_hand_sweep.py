@@ -205,7 +205,7 @@ def test_dense_samples_in_drake_agree(
     shelf: tuple[Scene, Station], swept: HandSweep, clearance: HandClearance
 ) -> None:
     rng, seen = np.random.default_rng(2), set[tuple[bool, bool]]()
-    for name, X in random_grasps(*shelf, 4):
+    for name, X in random_grasps(*shelf, 3):
         width = rng.uniform(0.0, 0.08, len(X))
         approach, lift = swept.approach(name, X), swept.lift(name, X, width)
         for i, X_WG in enumerate(X):
@@ -229,7 +229,7 @@ def test_dense_samples_in_drake_agree_on_the_way_back_and_aside(
     """Of the hand alone, which counts against all: without a target."""
     swept, seen = swept_away, set[tuple[bool, bool]]()
     rng = np.random.default_rng(2)
-    for name, X in random_grasps(*shelf, 4):
+    for name, X in random_grasps(*shelf, 3):
         width = rng.uniform(0.0, 0.08, len(X))
         retreat, lift = swept.retreat("", X, width), swept.lift("", X, width)
         for i, X_WG in enumerate(X):
@@ -299,7 +299,7 @@ def test_a_bound_below_every_sample(
 def test_a_grasp_alone_and_in_any_batch(
     shelf: tuple[Scene, Station], swept_away: HandSweep
 ) -> None:
-    name, X = random_grasps(*shelf, 12)[0]
+    name, X = random_grasps(*shelf, 8)[0]
     width = np.random.default_rng(3).uniform(0.0, 0.08, len(X))
     order = np.random.default_rng(4).permutation(len(X))
     swept, other = swept_away, HandSweep(*shelf, AWAY)

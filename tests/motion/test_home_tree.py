@@ -23,7 +23,7 @@ from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
-GOALS = 10
+GOALS = 8
 """Poses of the hand that are to be reached in each station."""
 AUDIT = 0.01
 """Steps of the audit [m]."""
