@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-import burg_drake
-from tests.imports import Import, Package
+from tests.imports import HOUSE, Import, Package
 from tests.rules import (
     beside_faces,
     crowded,
@@ -28,7 +27,6 @@ from tests.rules import (
     wrong_faces,
 )
 
-HOUSE = Package(Path(burg_drake.__file__).parent)
 ARCHITECTURE = Path(__file__).parents[1] / "ARCHITECTURE.md"
 ROOMS = {
     "core": "files documents paths grasps terminal workers",

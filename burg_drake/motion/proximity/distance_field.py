@@ -125,7 +125,7 @@ def _bounds_at(
     reach = np.float32(cell * np.sqrt(3.0) / 2)
     seed = np.full(shape, np.inf, dtype=np.float32)  # upper bounds of occupied cells
     exact = np.full(shape, np.inf, dtype=np.float32)
-    grid = np.stack(np.meshgrid(*ticks, indexing="ij")).astype(np.float32)
+    grid = [t.astype(np.float32) for t in np.meshgrid(*ticks, indexing="ij", sparse=True)]
     hulls = False
     for solid in solids:
         if not isinstance(solid, HullSolid):
@@ -144,10 +144,13 @@ def _bounds_at(
     from scipy.ndimage import distance_transform_edt  # not needed for what is in the cache
 
     occupied = np.isfinite(seed)
-    distance, nearest = distance_transform_edt(
-        ~occupied, sampling=cell, return_distances=True, return_indices=True
+    nearest = distance_transform_edt(
+        ~occupied, sampling=cell, return_distances=False, return_indices=True
     )
-    distance = distance.astype(np.float32)
+    squared = np.zeros(shape)
+    for cells, own in zip(nearest, np.indices(shape, sparse=True), strict=True):
+        squared += ((cells - own) * cell) ** 2
+    distance = np.sqrt(squared).astype(np.float32)
     upper = distance + seed[tuple(nearest)]
     lower = np.where(occupied, near, np.maximum(distance - reach, near))
     return np.minimum(lower, exact), np.minimum(upper, exact)

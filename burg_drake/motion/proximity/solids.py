@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from burg_drake.core import Array, Single, content_hash
 from burg_drake.geometry import Ball, Boxes, Cylinder, Shape
+
+Points = Single | Sequence[Single]
+"""(3, ...) points, or their three coordinates in shapes that broadcast, as those of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +36,8 @@ class BoxSolid:
         """(3,) its upper corner."""
         return np.asarray(self.X_WB[:3, 3] + np.abs(self.X_WB[:3, :3]) @ self.half)
 
-    def _beyond(self, p: Single) -> list[Single]:
-        """How far points (3, ...) are outside of each pair of faces; negative between them."""
+    def _beyond(self, p: Points) -> list[Single]:
+        """How far points are outside of each pair of faces; negative between them."""
         R = self.X_WB[:3, :3]
         beyond = []
         for axis in range(3):
@@ -55,7 +59,7 @@ class BoxSolid:
         np.maximum(x, y, out=x)
         return np.maximum(x, z, out=x)
 
-    def distance(self, p: Single) -> Single:
+    def distance(self, p: Points) -> Single:
         """The signed distance."""
         x, y, z = self._beyond(p)
         inside = np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
@@ -85,8 +89,8 @@ class BallSolid:
         """(3,) its upper corner."""
         return np.asarray(self.center + self.radius)
 
-    def distance(self, p: Single) -> Single:
-        """The signed distance at points (3, ...)."""
+    def distance(self, p: Points) -> Single:
+        """The signed distance at points."""
         x, y, z = (a - np.float32(c) for a, c in zip(p, self.center, strict=True))
         return np.asarray(np.sqrt(x * x + y * y + z * z) - np.float32(self.radius))
 
