@@ -1,8 +1,9 @@
 """Images of a board with exact truth, to test and to compare what estimates poses from images.
 
 Made without a renderer: each pixel is the mean over its area of what the sheet shows there, so that
-an edge lies where the pose puts it to about a hundredth of a pixel. White paper with the markers on
-a table; covers may lie on it, and blur, noise, uneven light and lens distortion may be added.
+an edge lies where the pose puts it to a few hundredths of a pixel, or better if asked. White paper
+with the markers on a table; covers may lie on it, and blur, noise, uneven light and lens distortion
+may be added.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from burg_drake.core.frames import Array
 from burg_drake.scene.document.markers import MarkerLayout
 from burg_drake.scene.document.scene import Board
 
-SAMPLES = 89
-"""Samples a pixel that an edge crosses; a Fibonacci number, see `_lattice`."""
+COARSE, FINE = 34, 89
+"""Samples a pixel that an edge crosses; Fibonacci numbers, see `_lattice`."""
 CHUNK = 1 << 9
 """Pixels that are sampled at once; few enough that their samples stay in the processor's cache."""
 HORIZON = -0.02
@@ -58,6 +59,7 @@ def board_image(
     look: ImageDegradation = ImageDegradation(),
     scale: tuple[float, float] = (1.0, 1.0),
     rng: np.random.Generator | None = None,
+    samples: int = COARSE,
 ) -> NDArray[np.uint8]:
     """What a camera sees of a board that lies on a table.
 
@@ -70,6 +72,8 @@ def board_image(
         look: blur, noise, light.
         scale: size of the print against the document, along x and y, from S's origin.
         rng: for noise.
+        samples: of a pixel that an edge crosses, a Fibonacci number; `FINE` where the last
+            hundredths of a pixel count.
 
     Returns:
         (H, W, 3) RGB image.
@@ -80,7 +84,7 @@ def board_image(
     if look.noise > 0.0 and rng is None:
         raise InvalidInputError("noise needs a random generator; give rng")
     sheet = _Sheet(board, np.empty((0, 5)) if covers is None else np.asarray(covers, float), scale)
-    image = area_means(sheet, intrinsics, np.asarray(X_SC, dtype=float))
+    image = area_means(sheet, intrinsics, np.asarray(X_SC, dtype=float), samples)
     return degraded(image, look, rng)
 
 
@@ -222,7 +226,7 @@ def _under(covers: Array, p_S: Array) -> NDArray[np.bool_]:
     return hidden
 
 
-def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
+def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int = COARSE) -> Array:
     """(H, W, 3) color, averaged over each pixel's area."""
     h, w = intrinsics.height, intrinsics.width
     u, v = np.meshgrid(np.arange(w + 1) - 0.5, np.arange(h + 1) - 0.5)
@@ -238,7 +242,7 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
     kinds = kinds.ravel().astype(np.int8)
     image = looks[kinds[corners[0]]]
     rows, columns = np.nonzero((corners != corners[0]).any(axis=0))
-    fx, fy = _lattice()
+    fx, fy = _lattice(samples)
     for k in range(0, len(rows), CHUNK):
         r, c = rows[k : k + CHUNK, None, None], columns[k : k + CHUNK, None, None]
         across, down = fx[None, :, None], fy[None, :, None]
@@ -248,7 +252,7 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
         below = below + rays[r + 1, c + 1, np.arange(3)] * across
         inside = kinds[sheet.region(_on_plane(X_SC, above * (1 - down) + below * down))]
         counts = np.stack([(inside == kind).sum(axis=1) for kind in range(len(looks))], axis=1)
-        image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / SAMPLES
+        image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / samples
     p_S = _on_plane(X_SC, rays[:-1, :-1])
     return image[..., :3] + image[..., 3:] * _grain(p_S)[..., None]
 
@@ -264,10 +268,10 @@ def _on_plane(X_SC: Array, rays_S: Array) -> Array:
     return X_SC[:2, 3] - X_SC[2, 3] * rays_S[..., :2] / rays_S[..., 2:]
 
 
-def _lattice() -> tuple[Array, Array]:
+def _lattice(samples: int) -> tuple[Array, Array]:
     """Points in a unit square that no edge of any direction runs along (a Fibonacci lattice)."""
-    k = np.arange(SAMPLES)
-    x, y = (k + 0.5) / SAMPLES, np.mod(k * GOLDEN, 1.0)
+    k = np.arange(samples)
+    x, y = (k + 0.5) / samples, np.mod(k * GOLDEN, 1.0)
     return x, y + 0.5 - y.mean()
 
 
