@@ -204,6 +204,17 @@ class _Sheet:
             i[near] = np.where(_under(cover[None], p_S[near]), self._kinds.size + k, i[near])
         return i
 
+    def mixed(self, regions: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """(N,) whether what lies between points (M, N) may look unlike; of neighbours, at most one
+        line along x and one along y is between them."""
+        i, j = np.divmod(np.minimum(regions, self._kinds.size - 1), len(self._x) + 1)
+        (top, left), (bottom, right) = (i.min(0), j.min(0)), (i.max(0), j.max(0))
+        kinds = self._kinds
+        unlike = (np.stack([kinds[bottom, left], kinds[bottom, right], kinds[top, right]])
+                  != kinds[top, left]).any(axis=0)  # fmt: skip
+        near = (bottom - top <= 1) & (right - left <= 1)
+        return unlike | ~near | (regions >= kinds.size).any(axis=0)
+
     @property
     def colors(self) -> Array:
         """(regions, 3) color of each."""
@@ -242,6 +253,8 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int 
     kinds = kinds.ravel().astype(np.int8)
     image = looks[kinds[corners[0]]]
     rows, columns = np.nonzero((corners != corners[0]).any(axis=0))
+    mixed = sheet.mixed(corners[:, rows, columns])
+    rows, columns = rows[mixed], columns[mixed]
     fx, fy = _lattice(samples)
     for k in range(0, len(rows), CHUNK):
         r, c = rows[k : k + CHUNK, None, None], columns[k : k + CHUNK, None, None]
