@@ -165,7 +165,7 @@ def covers_of(
 class _Sheet:
     """What lies where on the table's plane.
 
-    The plane is cut by all lines along which a cell of a marker or the sheet ends; `_kinds` tells
+    The plane is cut by all lines along which a cell of a marker or the sheet ends; `kinds` tells
     what is between them.
     """
 
@@ -183,7 +183,7 @@ class _Sheet:
             columns = np.searchsorted(x, x0 + cell * (np.arange(layout.cells) + 0.5))
             for row, ink in zip(rows, black, strict=True):
                 kinds[row, columns[ink]] = INK
-        self._x, self._y, self._kinds, self._covers = x * scale[0], y * scale[1], kinds, covers
+        self._x, self._y, self.kinds, self._covers = x * scale[0], y * scale[1], kinds, covers
 
     def region(self, p_S: Array) -> NDArray[np.intp]:
         """Number of the rectangle or cover that holds each point of the plane.
@@ -201,30 +201,19 @@ class _Sheet:
         for k, cover in enumerate(self._covers):
             center, reach = cover[:2], np.hypot(*cover[2:4])
             near = np.flatnonzero(((high > center - reach) & (low < center + reach)).all(axis=1))
-            i[near] = np.where(_under(cover[None], p_S[near]), self._kinds.size + k, i[near])
+            i[near] = np.where(_under(cover[None], p_S[near]), self.kinds.size + k, i[near])
         return i
-
-    def mixed(self, regions: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """(N,) whether what lies between points (M, N) may look unlike; of neighbours, at most one
-        line along x and one along y is between them."""
-        i, j = np.divmod(np.minimum(regions, self._kinds.size - 1), len(self._x) + 1)
-        (top, left), (bottom, right) = (i.min(0), j.min(0)), (i.max(0), j.max(0))
-        kinds = self._kinds
-        unlike = (np.stack([kinds[bottom, left], kinds[bottom, right], kinds[top, right]])
-                  != kinds[top, left]).any(axis=0)  # fmt: skip
-        near = (bottom - top <= 1) & (right - left <= 1)
-        return unlike | ~near | (regions >= kinds.size).any(axis=0)
 
     @property
     def colors(self) -> Array:
         """(regions, 3) color of each."""
-        kinds = np.r_[self._kinds.ravel(), np.full(len(self._covers), COVER)]
+        kinds = np.r_[self.kinds.ravel(), np.full(len(self._covers), COVER)]
         return COLORS[kinds]
 
     @property
     def on_table(self) -> NDArray[np.bool_]:
         """(regions,) the region is bare table."""
-        return np.r_[self._kinds.ravel() == TABLE, np.zeros(len(self._covers), bool)]
+        return np.r_[self.kinds.ravel() == TABLE, np.zeros(len(self._covers), bool)]
 
 
 def _under(covers: Array, p_S: Array) -> NDArray[np.bool_]:
@@ -253,7 +242,7 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int 
     kinds = kinds.ravel().astype(np.int8)
     image = looks[kinds[corners[0]]]
     rows, columns = np.nonzero((corners != corners[0]).any(axis=0))
-    mixed = sheet.mixed(corners[:, rows, columns])
+    mixed = _mixed(sheet.kinds, corners[:, rows, columns])
     rows, columns = rows[mixed], columns[mixed]
     fx, fy = _lattice(samples)
     for k in range(0, len(rows), CHUNK):
@@ -268,6 +257,17 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int 
         image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / samples
     p_S = _on_plane(X_SC, rays[:-1, :-1])
     return image[..., :3] + image[..., 3:] * _grain(p_S)[..., None]
+
+
+def _mixed(kinds: NDArray[np.int_], regions: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(N,) whether something else than at points (M, N) may lie between them: if all look alike
+    in the block of rectangles that they span, and it has two along x and along y at most, no."""
+    i, j = np.divmod(np.minimum(regions, kinds.size - 1), kinds.shape[1])
+    (y0, x0), (y1, x1) = (i.min(axis=0), j.min(axis=0)), (i.max(axis=0), j.max(axis=0))
+    block = np.stack([kinds[y0, x0], kinds[y0, x1], kinds[y1, x0], kinds[y1, x1]])
+    alike = (block == block[0]).all(axis=0) & (y1 - y0 <= 1) & (x1 - x0 <= 1)
+    covered = (regions >= kinds.size).any(axis=0)
+    return np.asarray(~alike | covered)
 
 
 def _rays(intrinsics: Intrinsics, pixels: Array) -> Array:

@@ -149,10 +149,10 @@ def test_outlines_are_on_the_edges_that_drake_renders(
     ids = [int(i) for i in built.free.values()]
     label = np.where(np.isin(label, ids), label, 0)
     # edges lie between pixels: middles and ends of their sides
-    right = np.argwhere(label[:, 1:] != label[:, :-1]) + (0.0, 0.5)
-    below = np.argwhere(label[1:] != label[:-1]) + (0.5, 0.0)
-    edges = [right + (k, 0.0) for k in (-0.5, 0.0, 0.5)]
-    edges += [below + (0.0, k) for k in (-0.5, 0.0, 0.5)]
+    right = np.argwhere(label[:, 1:] != label[:, :-1]) + np.array([0.0, 0.5])
+    below = np.argwhere(label[1:] != label[:-1]) + np.array([0.5, 0.0])
+    along = np.array([-0.5, 0.0, 0.5])[:, None, None]
+    edges = np.concatenate([*(right + along * (1.0, 0.0)), *(below + along * (0.0, 1.0))])
 
     X_SC = output(loop, context, "board.X_SC")
     lines = visible_lines(build_scene_mesh(scene), FieldOfView(loop.intrinsics), X_SC)
@@ -160,7 +160,7 @@ def test_outlines_are_on_the_edges_that_drake_renders(
     column, row = (fine * (middle + 0.5) - 0.5).T
     inside = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1)
     at = np.stack([row[inside], column[inside]], axis=1)
-    distance = KDTree(np.concatenate(edges)).query(at)[0] / fine  # in pixels of the camera
+    distance = KDTree(edges).query(at)[0] / fine  # in pixels of the camera
     assert len(distance) > 500
     assert np.median(distance) < 0.1
     assert np.quantile(distance, 0.95) < 0.25
@@ -207,7 +207,9 @@ def test_images_at_a_rate(station: Station) -> None:
     """With a period the estimate stays until the next image, and then is of that one."""
     empty = SceneDocument(name="empty", library="household")
     scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
-    loop = build_board_loop(scene, station, LoopCamera(period=0.1, samples=1, depth=True), style=PLAIN)
+    loop = build_board_loop(
+        scene, station, LoopCamera(period=0.1, samples=1, depth=True), style=PLAIN
+    )
     simulator = Simulator(loop.diagram)
     context = simulator.get_mutable_context()
     first, second = looking(0.8, 70, 0, 0), looking(0.7, 60, 50, 10)
