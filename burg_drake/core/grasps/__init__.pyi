@@ -1,6 +1,5 @@
 from .column import (
     PLAIN as PLAIN,
-    SHOWN_UNITS as SHOWN_UNITS,
     TEXT as TEXT,
     Column as Column,
 )
@@ -8,6 +7,8 @@ from .column_meanings import (
     INPUT_PREFIX as INPUT_PREFIX,
     column_metadata as column_metadata,
     describe as describe,
+    shown_number as shown_number,
+    shown_unit as shown_unit,
 )
 from .csv_metadata_file import (
     csv_metadata as csv_metadata,

@@ -16,6 +16,7 @@ SHOWN_UNITS: Mapping[str, tuple[str, float]] = {
     "rad": ("°", 180 / math.pi),
     "m2": ("mm²", 1e6),
     "N": ("N", 1.0),
+    "s": ("s", 1.0),
 }
 """Units for people by that of a column, and how many of them it is."""
 
@@ -28,7 +29,14 @@ class Column:
         unit: `TEXT`, `PLAIN`, or a unit such as m, rad, N, s; `g` is the standard gravity of
             9.81 m/s2, and `weights` are those of the object.
         description: what its values are, in which frame.
+        own_unit: for people, where it is not the usual one of its unit, and the factor to it.
     """
 
     unit: str
     description: str
+    own_unit: tuple[str, float] | None = None
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit in which people read it, empty if there is none, and the factor to it."""
+        return self.own_unit or SHOWN_UNITS.get(self.unit, ("", 1.0))

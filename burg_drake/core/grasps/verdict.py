@@ -87,7 +87,11 @@ class Margins:
     )
     duration: float = margin("s", "duration of the planned motion", mode="arm", stage=Stage.PLANNED)
     tracking_error: float = margin(
-        "rad", "largest deviation of a joint from its command", mode="arm", smaller_is_better=True
+        "rad",
+        "largest deviation of a joint from its command",
+        mode="arm",
+        smaller_is_better=True,
+        own_unit=("mrad", 1e3),
     )
     tracking_distance: float = margin(
         "m",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import SHOWN_UNITS, Stage, describe
+from burg_drake.core.grasps import Stage, shown_unit
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import (
     LIFTED,
@@ -39,13 +39,6 @@ class Margin:
 
     column: str
     title: str
-
-    @property
-    def shown(self) -> tuple[str, float]:
-        """The axis's unit, and the factor from SI to it."""
-        column = describe(self.column)
-        assert column is not None
-        return SHOWN_UNITS[column.unit]
 
 
 CLEARANCE = Margin("clearance", "room around the open hand")
@@ -116,7 +109,7 @@ def _charts(
 ) -> list[Html]:
     charts = []
     for margin in margins:
-        _, factor = margin.shown
+        _, factor = shown_unit(margin.column)
         values = columns.get(margin.column, np.empty(0)) * factor
         known = np.isfinite(values)
         if known.any():
@@ -133,6 +126,5 @@ def _chart(
     }
     success = series.pop(LIFTED)
     failures = [series[k] for k in sorted(series)]
-    return mirrored_histogram(
-        success, failures, title=margin.title, unit=margin.shown[0], limit=limit
-    )
+    unit, _ = shown_unit(margin.column)
+    return mirrored_histogram(success, failures, title=margin.title, unit=unit, limit=limit)
