@@ -155,7 +155,7 @@ def _evaluate_one(
 ) -> Run:
     scene = as_scene(scene)
     station, mode = request.station, request.mode
-    request.asked(scene)
+    request.requested(scene)
     given = request.given(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():

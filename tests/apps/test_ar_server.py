@@ -262,7 +262,7 @@ def test_clients_that_go_away_leave_no_trace(
 
 def test_a_taken_port(server: ViewServer) -> None:
     port = server.server_address[1]
-    with pytest.raises(InvalidInputError, match=f"port {port} of 127.0.0.1 is taken"):
+    with pytest.raises(InvalidInputError, match=f"port {port} of 127.0.0.1 is in use"):
         ViewServer(server.live, server.actions, port=port)
     with pytest.raises(InvalidInputError, match=r"cannot be served on 192\.0\.2\.1"):
         ViewServer(server.live, server.actions, host="192.0.2.1")

@@ -280,7 +280,7 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 ) -> None:
     """After the first look at the workers."""
     nodes = LocalNodes(0)
-    look = ClusterWorkers.look
+    look = ClusterWorkers.update
 
     def look_and_kill(self: ClusterWorkers) -> list[Any]:
         lost = look(self)
@@ -289,7 +289,7 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
         nodes.scheduler.wait()
         return lost
 
-    monkeypatch.setattr(ClusterWorkers, "look", look_and_kill)
+    monkeypatch.setattr(ClusterWorkers, "update", look_and_kill)
     try:
         lost = r"^the scheduler at tcp://127\S+ does not answer any more; verdicts so far are kept"
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:

@@ -222,7 +222,7 @@ def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_port_that_is_taken_is_named(door: ServedPage) -> None:
-    with pytest.raises(InvalidInputError, match=f"port {door.port} of 127.0.0.1 is taken"):
+    with pytest.raises(InvalidInputError, match=f"port {door.port} of 127.0.0.1 is in use"):
         serve(port=door.port)
     with pytest.raises(InvalidInputError, match=r"cannot be served on 192\.0\.2\.1"):
         serve("192.0.2.1")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import chosen_motion, how_to_retry, read_given, require_standoff_of_arm
-from burg_drake.apps.runs.settings import asked_settings
+from burg_drake.apps.runs.settings import requested_settings
 from burg_drake.core import InvalidInputError, listing
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def evaluate_many(
         list(references),
         station,
         arguments.output,
-        settings=asked_settings(arguments, mode, motion),
+        settings=requested_settings(arguments, mode, motion),
         grasps=_given(arguments, station),
         executor=executor,
         workers=arguments.workers,

@@ -29,7 +29,7 @@ from burg_drake.apps.options import (
     scene_names,
 )
 from burg_drake.apps.runs.campaign import evaluate_many
-from burg_drake.apps.runs.settings import asked_settings
+from burg_drake.apps.runs.settings import requested_settings
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.store import Run
@@ -134,7 +134,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             scene,
             station,
             arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-            settings=asked_settings(arguments, mode, motion),
+            settings=requested_settings(arguments, mode, motion),
             grasps=given.by_instance if given else None,
             executor=executor,
             workers=arguments.workers,

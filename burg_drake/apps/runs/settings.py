@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from burg_drake.station.document import GraspMotion
 
 
-def asked_settings(
+def requested_settings(
     arguments: argparse.Namespace, mode: Mode, motion: GraspMotion
 ) -> EvaluationSettings:
     """The settings that options ask for, on a station that has this mode and motion."""

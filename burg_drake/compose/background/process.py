@@ -193,11 +193,11 @@ def do_in_background(task: BackgroundTask[T]) -> T:
 
 
 def _reports_to(job: BackgroundJob[Any]) -> Callable[[Any], None]:
-    def told(message: tuple[float, str, Any]) -> None:
+    def forward(message: tuple[float, str, Any]) -> None:
         if not job.cancelled:
             job.report(*message)
 
-    return told
+    return forward
 
 
 def _finish(job: BackgroundJob[T], future: Future[T]) -> None:

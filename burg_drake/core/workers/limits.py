@@ -43,7 +43,7 @@ def time_limit(limit: TimeLimit | None) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def let_time_limits_end_this_process() -> None:
+def restore_time_limit_signals() -> None:
     """Undoes what a parent may have set: its children inherit which signals are ignored."""
     for number in TOO_LONG:
         signal.signal(number, signal.SIG_DFL)

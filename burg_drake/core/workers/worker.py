@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from burg_drake.core.errors import SimulationError, TaskCancelled, one_line
-from burg_drake.core.workers.limits import let_time_limits_end_this_process, time_limit
+from burg_drake.core.workers.limits import restore_time_limit_signals, time_limit
 from burg_drake.core.workers.messages import (
     Call,
     Done,
@@ -36,7 +36,7 @@ def main(handle: int, own_group: bool = False) -> None:
         os.setpgid(0, 0)
     # A filter, because importing pydrake sets the logger's level back.
     logging.getLogger("drake").addFilter(lambda record: record.levelno >= logging.WARNING)
-    let_time_limits_end_this_process()
+    restore_time_limit_signals()
     connection = Connection(handle)
     _loop = _WorkerLoop(connection)
     try:

@@ -44,7 +44,7 @@ class Dispatch:
     Attributes:
         client: of Dask.
         limits: of the workers' children.
-        workers: of the cluster.
+        cluster: the workers.
         jobs: those under way.
     """
 
@@ -52,7 +52,7 @@ class Dispatch:
         self.client = client
         self.limits = limits
         self._tend = tend
-        self.workers = ClusterWorkers(client)
+        self.cluster = ClusterWorkers(client)
         self.jobs: list[SentJob] = []
         self._name = f"burg-drake-{uuid.uuid4().hex}"
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -72,7 +72,7 @@ class Dispatch:
         try:
             while True:
                 if time.monotonic() > self._seen + LOOK:
-                    yield from self.look()
+                    yield from self.update_workers()
                 self.hand_out()
                 if not self._sent and not any(job.left for job in self.jobs):
                     if self.take_up() is not None:
@@ -87,7 +87,7 @@ class Dispatch:
         """Has the workers, and those that join later, supervise children of this run. A worker that
         dies meanwhile is no reason to stop."""
         for attempt in range(1, ATTEMPTS + 1):
-            self.workers.look()  # before anything is registered where others would not know it
+            self.cluster.update()  # before anything is registered where others would not know it
             try:
                 self.client.register_plugin(Supervisor(self._name), name=self._name)
                 return
@@ -96,13 +96,13 @@ class Dispatch:
                     raise lost_scheduler(self.client) from error
                 time.sleep(LOOK)
 
-    def look(self) -> Iterator[Answer]:
+    def update_workers(self) -> Iterator[Answer]:
         """Sees who is there."""
         self._tend()
-        for worker in self.workers.look():
+        for worker in self.cluster.update():
             yield from self.lose(worker)
         self._seen = time.monotonic()
-        if self.workers.by_address:
+        if self.cluster.workers:
             self._waiting.end()
         else:
             self._waiting.go_on()
@@ -110,16 +110,16 @@ class Dispatch:
     def hand_out(self) -> None:
         """Gives every worker what it has room for; those with the least come first."""
         while True:
-            free = [worker for worker in self.workers.by_address.values() if worker.room > 0]
-            for worker in free:
+            workers = [worker for worker in self.cluster.workers.values() if worker.room > 0]
+            for worker in workers:
                 worker.job = self.choose(worker)
-            free = [worker for worker in free if worker.job is not None]
-            if not free:
+            workers = [worker for worker in workers if worker.job is not None]
+            if not workers:
                 return
-            least = min(worker.load for worker in free)
-            for worker in free:
+            least = min(worker.load for worker in workers)
+            for worker in workers:
                 if worker.load <= least and worker.job is not None and worker.job.left:
-                    self.send(worker.job.cut(max(1, self.workers.threads)), worker)
+                    self.send(worker.job.cut(max(1, self.cluster.threads)), worker)
 
     def choose(self, worker: ClusterWorker) -> SentJob | None:
         """What a worker is to work on: its job, or the next one, or one that others are at."""
@@ -209,7 +209,7 @@ class Dispatch:
             elif not chunk.job.failed:
                 yield from self.take(chunk, answers)
         for job, addresses in missing.values():
-            there = [a for a in dict.fromkeys(addresses) if a in self.workers.by_address]
+            there = [a for a in dict.fromkeys(addresses) if a in self.cluster.workers]
             deliver_bundle(self.client, job, there)
 
     def take(self, chunk: SentChunk, answers: Answers) -> Iterator[Answer]:
@@ -287,7 +287,7 @@ class Dispatch:
         """A result did not come: the worker is lost, which a look will tell, or is busy."""
         if self.client.status != "running":
             raise lost_scheduler(self.client)
-        if worker.address in self.workers.by_address:
+        if worker.address in self.cluster.workers:
             self._done.put(future)
         self._seen = -LOOK
 

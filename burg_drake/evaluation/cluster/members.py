@@ -57,19 +57,19 @@ class ClusterWorkers:
     """Workers by address.
 
     Attributes:
-        by_address: the workers.
+        workers: the workers.
     """
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self.by_address: dict[str, ClusterWorker] = {}
+        self.workers: dict[str, ClusterWorker] = {}
 
     @property
     def threads(self) -> int:
         """Number of chunks that they work on at a time."""
-        return sum(worker.threads for worker in self.by_address.values())
+        return sum(worker.threads for worker in self.workers.values())
 
-    def look(self) -> list[ClusterWorker]:
+    def update(self) -> list[ClusterWorker]:
         """Takes on new workers whose versions are ours and whose addresses are safe.
 
         Returns:
@@ -79,14 +79,14 @@ class ClusterWorkers:
             ClusterError: the scheduler is lost, or a worker has other versions or is not safe.
         """
         there = threads_by_address(self._client)
-        lost = [worker for address, worker in self.by_address.items() if address not in there]
+        lost = [worker for address, worker in self.workers.items() if address not in there]
         for worker in lost:
-            del self.by_address[worker.address]
-        new = [address for address in there if address not in self.by_address]
+            del self.workers[worker.address]
+        new = [address for address in there if address not in self.workers]
         for address in new:
             require_safe(address, "worker ")
         for address in admitted(self._client, new):
-            self.by_address[address] = ClusterWorker(address, there[address])
+            self.workers[address] = ClusterWorker(address, there[address])
         return lost
 
 

@@ -157,7 +157,7 @@ class Supervisor(WorkerPlugin):
 def judge_chunk(chunk: Chunk) -> Answers:
     """The task of Dask."""
     worker = get_worker()
-    make_judge = chunk.recipe.here(_place(worker))
+    make_judge = chunk.recipe.load(_place(worker))
     if make_judge is None:
         return Answers(missing=True)
     supervisor: Supervisor | None = worker.plugins.get(chunk.run)

@@ -54,7 +54,7 @@ def best_rows(
     """
     chosen = are_of(only, "the table", columns["object"], columns["instance"])
     lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & chosen)
-    lifted = _roomiest(columns, lifted, count, each=each)
+    lifted = _clearest(columns, lifted, count, each=each)
     room = _room(columns, lifted)
     penalty = (
         _rounded(columns["slip"][lifted], LENGTH_STEP) / SLIP_SCALE
@@ -82,7 +82,7 @@ def _room(columns: Columns, rows: NDArray[np.int64]) -> Array:
     return np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-np.inf)
 
 
-def _roomiest(
+def _clearest(
     columns: Columns, rows: NDArray[np.int64], count: int, *, each: bool
 ) -> NDArray[np.int64]:
     """Those of some rows that can be among the first `count`, of each object or of all together:

@@ -108,7 +108,7 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
     document = CampaignDocument(
         command=command(),
         station=input_of(request.station, "stations"),
-        grasps=replace(request.asked_of_all(), content=given_content(request.grasps)),
+        grasps=replace(request.requested_of_all(), content=given_content(request.grasps)),
         engine=request.engine,
         trial=request.trial,
         mode=request.mode,
@@ -157,15 +157,15 @@ class _Call:
             self.reports,
         )
         with ExitStack() as stack:
-            crew = stack.enter_context(
+            processes = stack.enter_context(
                 SceneProcesses(Preparer(self.each, self.check), keeping, self.executor.workers)
             )
             if left:
-                self._judge(left, crew)
-            crew.close()
+                self._judge(left, processes)
+            processes.close()
         return load_campaign(self.folder)
 
-    def _judge(self, left: list[str], crew: SceneProcesses) -> None:
+    def _judge(self, left: list[str], processes: SceneProcesses) -> None:
         document = self.campaign.document
         self.expected = self.campaign.expected_by_scene
         there = sum(n for name, n in self.expected.items() if name not in left)
@@ -179,10 +179,10 @@ class _Call:
         )
         begun = time.monotonic()
         try:
-            jobs = cast(Iterable[Job], self._jobs(left, crew))  # None only where it is polled
+            jobs = cast(Iterable[Job], self._jobs(left, processes))  # None only where it is polled
             with closing(self.executor.judge(jobs, self._give_up)) as answers:
                 for job, candidate, verdict in answers:
-                    self._take(job, candidate.id, verdict, crew)
+                    self._take(job, candidate.id, verdict, processes)
         finally:
             for judging in list(self.judging.values()):
                 judging.close()
@@ -192,25 +192,27 @@ class _Call:
                 replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
             )
 
-    def _jobs(self, left: list[str], crew: SceneProcesses) -> Generator[Job | None, None, None]:
+    def _jobs(
+        self, left: list[str], processes: SceneProcesses
+    ) -> Generator[Job | None, None, None]:
         """Scenes that are prepared, one after the other; None while workers have others to judge
         and the next one is not ready."""
-        crew.prepare(
+        processes.prepare(
             Prepare(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
         )
         while True:
-            if self.judging and not crew.ready():
+            if self.judging and not processes.ready():
                 yield None
                 continue
-            prepared = crew.prepared()
+            prepared = processes.prepared()
             if prepared is None:
                 return
-            job = self._begin(*prepared, crew)
+            job = self._begin(*prepared, processes)
             if job is not None:
                 yield job
 
     def _begin(
-        self, item: Prepare, scene: Scene | BaseException | None, crew: SceneProcesses
+        self, item: Prepare, scene: Scene | BaseException | None, processes: SceneProcesses
     ) -> Job | None:
         """What is to be judged of a scene that is prepared, if anything."""
         if scene is None:
@@ -223,7 +225,7 @@ class _Call:
         judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
         self.ledger.note(judging.state("open"))
         if not judging.left:
-            self._finish(judging, crew)
+            self._finish(judging, processes)
             return None
         judging.begin()
         self._expect(item.name, judging.mine)
@@ -236,25 +238,25 @@ class _Call:
         )
         return Job(item.name, factory, judging.left)
 
-    def _take(self, job: Job, id: str, verdict: Verdict, crew: SceneProcesses) -> None:
+    def _take(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
         judging = self.judging[job.key]
         judging.take(id, verdict)
         self.judged += 1
         self.pace.step(outcome=verdict.outcome, note=self._note())
         if judging.is_done:
             del self.judging[job.key]
-            self._finish(judging, crew)
+            self._finish(judging, processes)
         elif judging.is_part_due():
-            crew.take(job.key)
+            processes.take(job.key)
 
     def _give_up(self, failed: JobFailed) -> None:
         """A scene whose judge cannot be built, for example."""
         self.judging.pop(failed.job.key).close()
         self._fail(failed.job.key, failed.error)
 
-    def _finish(self, judging: SceneJudging, crew: SceneProcesses) -> None:
+    def _finish(self, judging: SceneJudging, processes: SceneProcesses) -> None:
         self.ledger.note(judging.state("done"))
-        crew.finish(judging.name)
+        processes.finish(judging.name)
 
     def _fail(self, name: str, error: BaseException) -> None:
         why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"

@@ -133,19 +133,19 @@ class Request:
         found = {name: part for name, part in found.items() if name in chosen}
         return replace(self, only=only, grasps=found) if found else None
 
-    def asked(self, scene: Scene) -> Grasps:
+    def requested(self, scene: Scene) -> Grasps:
         """What is asked of the grasps; what comes of it is filled in when it is known.
 
         Raises:
             UnknownNameError: `only` has a name that is not in the scene.
         """
-        asked = self.asked_of_all()
+        requested = self.requested_of_all()
         if self.grasps is not None:
-            return asked
+            return requested
         chosen = chosen_instances(scene, self.only)
-        return replace(asked, only=() if chosen == tuple(scene.instances) else chosen)
+        return replace(requested, only=() if chosen == tuple(scene.instances) else chosen)
 
-    def asked_of_all(self) -> Grasps:
+    def requested_of_all(self) -> Grasps:
         """The same, whatever the scene."""
         if self.grasps is not None:
             return Grasps(origin="given", count=0, objects={}, content="")
@@ -175,7 +175,7 @@ class Request:
                 else str(scene.library.root.resolve()),
                 objects={i.object: scene.library.entry(i.object).build for i in instances},
             ),
-            grasps=self.asked(scene),
+            grasps=self.requested(scene),
             engine=self.engine,
             trial=self.trial,
             mode=self.mode,

@@ -96,7 +96,7 @@ class SceneProcesses:
         """
         if self._finisher is not None and self._used:
             self._submit(self._finisher, CloseParts())
-            self._hear(wait=True)
+            self._collect_finished(wait=True)
         for work in self._failed or (() if self._used else (CloseParts(),)):
             self._here(work)  # where it fails again it is an error
         if self._failed:
@@ -125,13 +125,13 @@ class SceneProcesses:
             return
         self._used = True
         self._submit(self._finisher, work)
-        self._hear(wait=False)
+        self._collect_finished(wait=False)
 
     def _submit(self, finisher: WorkerPool, work: Finish | CloseParts) -> None:
         task = Task(finish_scene, (work,), session=self._session)
         self._finishing.append((work, finisher.submit_task(task)))
 
-    def _hear(self, wait: bool) -> None:
+    def _collect_finished(self, wait: bool) -> None:
         """Notes what could not be written, of what is finished, or of all when that is."""
         while self._finishing and (wait or self._finishing[0][1].done()):
             work, future = self._finishing.popleft()

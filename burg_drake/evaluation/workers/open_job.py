@@ -69,7 +69,7 @@ class OpenJob:
         """Number of grasps that no worker has."""
         return len(self.open) + sum(map(len, self.unscreened))
 
-    def know(self, batches: tuple[int, ...]) -> None:
+    def set_screens(self, batches: tuple[int, ...]) -> None:
         """Learns of the screens, from the first worker that is ready; all grasps are open then."""
         if not self.unscreened and batches:
             self.batches = batches

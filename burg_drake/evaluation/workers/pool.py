@@ -136,7 +136,7 @@ class JudgePool:
             build: Task[Any] = Task(screen_sizes, session=job.session)
             self.submit(slot, [(GivenWork(slot, job, ()), build)])
             return
-        job.know(self._screens[job.key])
+        job.set_screens(self._screens[job.key])
         work, limit = job.next_work(), self.limits.of_task
         if isinstance(work, Screening):
             given = GivenWork(slot, job, work.grasps, screening=True)
@@ -173,7 +173,7 @@ class JudgePool:
         elif not given.grasps:
             if error is None:
                 self._screens[job.key] = future.result()
-                job.know(future.result())
+                job.set_screens(future.result())
         elif given.screening:
             if (
                 error is not None

@@ -115,7 +115,7 @@ def measure_gap(
     mode_for(station, last)
     executor = LocalExecutor.of_this_machine() if executor is None else executor
     path = Path(out)
-    document = _asked(run, scene, station, last, settings)
+    document = _requested(run, scene, station, last, settings)
     _begin(path, document)
     options = {"executor": executor, "progress": progress}
     begin = {"grasps": grasps, "settings": evaluation or EvaluationSettings()}
@@ -141,7 +141,7 @@ def measure_gap(
     return GapSteps(path, document, tuple(steps), extra)
 
 
-def _asked(
+def _requested(
     run: Run | None, scene: Scene, station: Station, last: Mode, settings: GapSettings
 ) -> GapDocument:
     """What a call asks for, with the versions that are installed."""

@@ -107,7 +107,7 @@ class _ClosedFormBatch:
                 if chain is not None:
                     found[grasp] = chain
             left = [g for g in left if g not in found]
-            self._measure_impatient(left)
+            self._measure_failing(left)
         return [found[g] for g in grasps]
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
@@ -191,7 +191,7 @@ class _ClosedFormBatch:
             self._level[members] = level
             self._failed[members] = 0
 
-    def _measure_impatient(self, grasps: Sequence[int]) -> None:
+    def _measure_failing(self, grasps: Sequence[int]) -> None:
         """Measures all postures of grasps whose chains keep failing."""
         by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
         for g in grasps:

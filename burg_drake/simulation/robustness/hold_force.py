@@ -70,7 +70,7 @@ def tug(
         RuntimeError, SystemExit: from Drake.
     """
 
-    def bears(direction: Array, amplitude: float) -> bool:
+    def withstands(direction: Array, amplitude: float) -> bool:
         return grip.withstands(
             lambda t: amplitude * min(1.0, t / settings.tug_rise) * direction,
             settings.tug_rise + settings.tug_time,
@@ -78,7 +78,7 @@ def tug(
             steady_from=settings.tug_rise,
         )
 
-    return _hold_forces(grip, _chosen(DIRECTIONS, directions), bears, settings)
+    return _hold_forces(grip, _chosen(DIRECTIONS, directions), withstands, settings)
 
 
 def shake(
@@ -103,14 +103,14 @@ def shake(
     """
     omega = 2.0 * np.pi * settings.frequency
 
-    def bears(axis: Array, amplitude: float) -> bool:
+    def withstands(axis: Array, amplitude: float) -> bool:
         return grip.withstands(
             lambda t: amplitude * min(1.0, t * settings.frequency) * np.sin(omega * t) * axis,
             settings.periods / settings.frequency,
             settings.slide,
         )
 
-    return _hold_forces(grip, _chosen(AXES, axes), bears, settings)
+    return _hold_forces(grip, _chosen(AXES, axes), withstands, settings)
 
 
 def _chosen(known: Mapping[str, Array], names: Iterable[str]) -> dict[str, Array]:

@@ -77,7 +77,7 @@ class Fingers:
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
+class _FingerCommand:
     """Positions that the fingers go to, (2,) [m], and with which velocities now, (2,) [m/s]."""
 
     q: Array
@@ -134,18 +134,18 @@ class HandDriver(LeafSystem):
 
     def _remember(self, context: Context, state: State) -> None:
         values = state.get_mutable_discrete_state()
-        wanted = self._wanted(context)
+        wanted = self._finger_command(context)
         values.set_value(self._held, wanted.q)
         values.set_value(self._braked, self._brake.Eval(context)[self._fingers.dofs])
 
     def _calc_command(self, context: Context, output: BasicVector) -> None:
-        wanted = self._wanted(context)
+        wanted = self._finger_command(context)
         eased = wanted.v - self._against(context, wanted.v) / self._damping
         output.SetFromVector([*wanted.q, *eased])
 
     def _calc_brake(self, context: Context, output: BasicVector) -> None:
         brake = np.zeros(self._size)
-        brake[self._fingers.dofs] = self._against(context, self._wanted(context).v)
+        brake[self._fingers.dofs] = self._against(context, self._finger_command(context).v)
         output.SetFromVector(brake)
 
     def _against(self, context: Context, speed: Array) -> Array:
@@ -161,7 +161,7 @@ class HandDriver(LeafSystem):
                 )
         return np.asarray(-np.sign(speed) * (most - limit))
 
-    def _wanted(self, context: Context) -> _Wanted:
+    def _finger_command(self, context: Context) -> _FingerCommand:
         position, desired_state = (
             port.HasValue(context) for port in (self._position, self._desired_state)
         )
@@ -173,7 +173,7 @@ class HandDriver(LeafSystem):
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
         q, planned = self._state.Eval(context)[self._fingers.q], self._planned(context)
         if planned is not None and planned.closed:
-            return _Wanted(fingers.closed, fingers.towards_closed * fastest)
+            return _FingerCommand(fingers.closed, fingers.towards_closed * fastest)
         if planned is None and desired_state:
             speeds = self._desired_state.Eval(context)[2:]
             if not np.isfinite(speeds).all():
@@ -181,14 +181,14 @@ class HandDriver(LeafSystem):
                     f"hand.desired_state wants fingers at {speeds.tolist()} m/s; give finite"
                     " numbers"
                 )
-            return _Wanted(q, speeds)
+            return _FingerCommand(q, speeds)
         goal = context.get_discrete_state(self._held).value()
         if planned is not None:
             goal = fingers.at(self._distance(planned.opening, "the plan's opening"))
         elif position:
             wanted = float(self._position.Eval(context)[0])
             goal = fingers.at(self._distance(wanted, "hand.position"))
-        return _Wanted(goal, np.clip(FOLLOWING * (goal - q), -fastest, fastest))
+        return _FingerCommand(goal, np.clip(FOLLOWING * (goal - q), -fastest, fastest))
 
     def _planned(self, context: Context) -> PlannedCommand | None:
         """What the plan wants now; None without one, and before it starts."""

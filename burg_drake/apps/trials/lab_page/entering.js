@@ -22,7 +22,7 @@ function renderWidth() {
   $("width").setAttribute("aria-invalid", bad);
   $("widthnote").hidden = !bad && !(width > opening);
   $("widthnote").classList.toggle("bad", bad);
-  $("widthnote").textContent = bad ? "Not a width in mm; nothing is entered until it is mended or empty."
+  $("widthnote").textContent = bad ? "Not a width in mm; nothing is entered until it is corrected or empty."
     : `The hand opens ${opening} mm; is ${width} right?`;
 }
 

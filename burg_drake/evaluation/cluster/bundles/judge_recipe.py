@@ -61,7 +61,7 @@ class JudgeRecipe:
         """Names the judge."""
         return hashlib.sha256(self.make_judge).hexdigest()
 
-    def here(self, place: Path) -> Pickled | None:
+    def load(self, place: Path) -> Pickled | None:
         """The factory for this machine; None if the bundle is not here yet.
 
         Args:
