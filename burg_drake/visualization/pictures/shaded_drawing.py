@@ -24,7 +24,7 @@ LIGHT = np.array([-0.45, -0.75, -0.48])
 DETAIL = 3
 """Pixels a SVG unit, in which contours are found."""
 SMOOTHING = 9
-"""Width of the filter that mends jagged borders of tones [pixel]; odd."""
+"""Width of the square by whose majority jagged borders of tones are mended [pixel]; odd."""
 TOLERANCE = 0.9
 """By which a contour may be simplified [pixel]."""
 SURFACES = 64
@@ -56,7 +56,7 @@ def shaded_outline(solids: Sequence[SolidMesh], view: FlatView) -> list[str]:
         rule `evenodd`; the first is the outline of everything. Empty where there is no such tone.
     """
     levels = _levels(solids, view)
-    return [_contours(levels > tone) for tone in range(TONES)]
+    return [_contours(_mended(levels > tone)) for tone in range(TONES)]
 
 
 def surface_of(library: ObjectLibrary, name: str) -> SolidMesh:
@@ -103,9 +103,20 @@ def _levels(solids: Sequence[SolidMesh], view: FlatView) -> NDArray[np.uint8]:
     depth = view.depths(triangles).mean(axis=1)
     tones = _tones(triangles, view)
     pixels = np.round(view.places(triangles) * DETAIL * 2**SUBPIXEL).astype(np.int32)
-    for k in np.argsort(-depth, kind="stable").tolist():
-        cv2.fillConvexPoly(image, pixels[k], int(tones[k]) + 1, shift=SUBPIXEL)
-    return np.asarray(cv2.medianBlur(image, SMOOTHING), dtype=np.uint8)
+    order = np.argsort(-depth, kind="stable")
+    for corner, level in zip(pixels[order], (tones[order] + 1).tolist(), strict=True):
+        cv2.fillConvexPoly(image, corner, level, shift=SUBPIXEL)
+    return image
+
+
+def _mended(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A mask (H, W) in which each pixel is as most of those around it are, by a moving sum."""
+    around = cv2.boxFilter(
+        *(mask.view(np.uint8), cv2.CV_16U, (SMOOTHING, SMOOTHING)),
+        normalize=False,
+        borderType=cv2.BORDER_REPLICATE,
+    )
+    return np.asarray(around > SMOOTHING**2 // 2)
 
 
 def _tones(triangles: Array, view: FlatView) -> NDArray[np.int64]:
