@@ -13,6 +13,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.station.document.engine import Engine
 
 SCENE = """\
 version: 1
@@ -55,13 +56,16 @@ def scene_file(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Three grasps on the box with known outcomes; the arm is not asked."""
-    folder = tmp_path_factory.mktemp("run") / "box"
+    return box_run(tmp_path_factory.mktemp("run") / "box", "screening")
+
+
+def box_run(folder: Path, engine: str | Engine) -> Run:
     grasps = GraspSet.create(X_OG, object="box", width=0.06)
     return evaluate(
         "tabletop_six",
         "panda_tabletop",
         folder,
-        settings=EvaluationSettings(mode="hand", engine="screening"),
+        settings=EvaluationSettings(mode="hand", engine=engine),
         grasps={"box": grasps},
         workers=1,
         progress=False,

@@ -28,10 +28,22 @@ OUTCOMES = ["lifted", "no_contact"]
 QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
 
 
+TWO = """\
+version: 1
+name: two
+library: household
+instances:
+- {object: mug, X_SO: {translation: [0.125242, 0.109047, 0.0], rpy_deg: [0, 0, 140]}}
+- {object: box, X_SO: {translation: [0.475, 0.115, -2.1e-05], rpy_deg: [0, 0, 75]}}
+"""
+"""Where `tabletop_six` has them."""
+
+
 def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
-    """The results of evaluating on the built-in scene."""
+    """The results of evaluating on a scene of two objects."""
+    (folder / "two.yaml").write_text(TWO)
     options = ["-o", str(folder / "run"), *QUICK]
-    assert main(["evaluate", "tabletop_six", *arguments, *options]) == 0
+    assert main(["evaluate", str(folder / "two.yaml"), *arguments, *options]) == 0
     return read_table(folder / "run" / "results.csv")
 
 
