@@ -26,6 +26,15 @@ instances:
   - object: bottle
     X_SO: {translation: [0.29, 0.11, 0.0]}
 """
+TWO = """\
+version: 1
+name: tabletop_two
+library: household
+instances:
+- {object: mug, X_SO: {translation: [0.125242, 0.109047, 0.0], rpy_deg: [0, 0, 140]}}
+- {object: box, X_SO: {translation: [0.475, 0.115, -2.1e-05], rpy_deg: [0, 0, 75]}}
+"""
+"""Of the built-in `tabletop_six`, where they are."""
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p_AB=(0, 0, -0.1))])
@@ -60,9 +69,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def box_run(folder: Path, engine: str | Engine) -> Run:
+    folder.with_suffix(".yaml").write_text(TWO)
     grasps = GraspSet.create(X_OG, object="box", width=0.06)
     return evaluate(
-        "tabletop_six",
+        folder.with_suffix(".yaml"),
         "panda_tabletop",
         folder,
         settings=EvaluationSettings(mode="hand", engine=engine),

@@ -17,6 +17,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
+from tests.apps.conftest import TWO
 
 Capture = pytest.CaptureFixture[str]
 
@@ -26,17 +27,6 @@ X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0.0, 0.0, -0.1))])
 """And one 100 mm higher, in thin air."""
 OUTCOMES = ["lifted", "no_contact"]
 QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
-
-
-TWO = """\
-version: 1
-name: two
-library: household
-instances:
-- {object: mug, X_SO: {translation: [0.125242, 0.109047, 0.0], rpy_deg: [0, 0, 140]}}
-- {object: box, X_SO: {translation: [0.475, 0.115, -2.1e-05], rpy_deg: [0, 0, 75]}}
-"""
-"""Where `tabletop_six` has them."""
 
 
 def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
