@@ -199,14 +199,17 @@ def test_a_run_by_its_margins(run: Run, capsys: Capture) -> None:
     assert shown(capsys, run.path, "--color", "stage") == ["■ executed (2)", "■ clear (1)"]
 
 
-def test_columns_of_a_run_by_the_names_of_its_table(tmp_path: Path, capsys: Capture) -> None:
+def test_columns_of_a_run_by_the_names_of_its_table(
+    scene_file: Path, tmp_path: Path, capsys: Capture
+) -> None:
     X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), np.array([[0.0, 0.0, 0.0]]))  # in the table
     given = GraspSet.create(X_OG, object="mug", columns={"maker": ["me"], "outcome": ["slipped"]})
     given.save(tmp_path / "given.h5")
     folder = str(tmp_path / "run")
-    options = ["--mode", "hand", "--workers", "1", "--quiet", "-o", folder]
+    options = ["--mode", "hand", "--engine", "screening", "--workers", "1", "--quiet"]
     file = str(tmp_path / "given.h5")
-    assert main(["evaluate", "tabletop_six", "--grasps", file, *options]) == 0
+    scene = str(scene_file)
+    assert main(["evaluate", scene, "--grasps", file, *options, "-o", folder]) == 0
     capsys.readouterr()
     assert shown(capsys, folder, "--color", "given_maker") == ["■ me (1)"]
     assert shown(capsys, folder, "--color", "maker") == ["■ me (1)"]

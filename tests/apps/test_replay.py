@@ -25,6 +25,7 @@ from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
 
 SCENE = """\
 version: 1
@@ -195,11 +196,14 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
 
 def test_a_row_of_an_arm_trial_is_replayed_with_the_arm(tmp_path: Path, capsys: Capture) -> None:
     above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+    (tmp_path / "box.yaml").write_text(SCENE.partition("  - object: can")[0])
     run = evaluate(
-        "tabletop_six",
+        tmp_path / "box.yaml",
         "panda_tabletop",
         tmp_path / "run",
-        settings=EvaluationSettings(engine="screening", mode="arm"),
+        settings=EvaluationSettings(
+            engine=ENGINE, mode="arm", motion=GraspMotion(lift_height=0.05)
+        ),
         grasps={"box": GraspSet.create(above, object="box", width=0.06)},
         workers=1,
         progress=False,

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.reachability import reachability_section
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import Scene

@@ -15,10 +15,10 @@ from page_reading import Node, part, read_page
 from statsmodels.stats.proportion import proportion_confint
 
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.report.elements.charts import Series
 from burg_drake.evaluation.report.elements.mirrored import Limit, mirrored_histogram
 from burg_drake.evaluation.report.elements.style import STYLES
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.pictures import GRASPS, INSTANCES, drawn_rows
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.visualization.style.palette import group_of
