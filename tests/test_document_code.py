@@ -29,7 +29,7 @@ SIX = {'load_scene("tabletop_six")': "load_scene('small.yaml')"}
 SMALLER = {
     "README": {
         **SIX,
-        '=100, engine="standard")': "=2, engine='screening', only=['mug'])",
+        '=100, engine="standard")': "=1, engine='screening', only=['mug'])",
         "scene, station, 50, ": "scene, station, 8, ",
         "scene, station, 500)": "scene, station, 1, only=['mug', 'box'])",
         "burg.reach(scene, station, grasps)": "burg.reach(scene, station, grasps, workers=1)",
