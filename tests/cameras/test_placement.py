@@ -150,7 +150,7 @@ def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_han
         assert seen.angle is not None
         assert np.rad2deg(seen.angle) == pytest.approx(turn, abs=0.5)
     assert hidden.status == "uncertain"
-    assert "turned by another" in hidden.reason or "another place" in hidden.reason
+    assert "rotated by another" in hidden.reason or "another place" in hidden.reason
 
 
 @needs_renderer

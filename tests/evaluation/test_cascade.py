@@ -111,7 +111,7 @@ def patch(name, value):
     __import__(module)
     setattr(sys.modules[module], attribute, value)
 known_judge.install(patch, Path(sys.argv[2]), pause=0.2)
-from burg_drake.evaluation import EvaluationSettings, evaluate
+from burg_drake import EvaluationSettings, evaluate
 settings = EvaluationSettings(grasps_per_object=40, blind=True)
 evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], settings=settings, workers=2)
 """

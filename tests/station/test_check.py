@@ -114,7 +114,7 @@ def test_beside_the_table(library: Path, panda: Station, tmp_path: Path) -> None
     issue = only(check_scene(scene_of(library, tmp_path, (0.2, 0.2, HEIGHT)), moved))
     assert issue.kind == "out_of_bounds"
     assert issue.amount == pytest.approx(0.05)
-    assert "stands 50.0 mm beside the table of station 'bare'" in issue.message
+    assert "is 50.0 mm off the table of station 'bare'" in issue.message
 
 
 def test_the_arm_at_home_is_in_the_way(library: Path, panda: Station, tmp_path: Path) -> None:

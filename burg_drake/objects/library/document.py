@@ -6,7 +6,6 @@ relative to the library's folder, so that it can be moved or zipped as it is.
 
 from __future__ import annotations
 
-import functools
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -124,10 +123,11 @@ class ObjectLibrary:
             UnknownNameError: the file is missing.
             MeshError: it is damaged.
         """
+        import trimesh
+
         path = self.path(relative)
         try:
-            status = path.stat()
-            mesh = _read_mesh(path, status.st_mtime_ns, status.st_size).copy(include_cache=True)
+            mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
             corners = np.asarray(mesh.vertices)[mesh.faces]  # fails for faces of no vertices
         except Exception as error:  # the reader raises whatever it stumbles over
             raise self.damaged(path) from error
@@ -160,14 +160,6 @@ class ObjectLibrary:
         if not manifest.is_file() or manifest.read_text() != package:
             atomic_write(manifest, package)
         save_document(self.document, self.root / LIBRARY_FILE)
-
-
-@functools.lru_cache(maxsize=32)
-def _read_mesh(path: Path, changed: int, size: int) -> trimesh.Trimesh:
-    """A mesh file; reading the text of one takes ten times as long as copying what was read."""
-    import trimesh
-
-    return trimesh.load(path, force="mesh", process=False, skip_materials=True)
 
 
 def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibrary:
